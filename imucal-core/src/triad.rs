@@ -1,0 +1,113 @@
+//! The affine triad: what a calibration is once it has been fitted.
+//!
+//! ```text
+//! calibrated = gain · (raw − bias)          correct, on the device
+//! raw        = gain⁻¹ · calibrated + bias   predict, in the simulator
+//! ```
+//!
+//! | symbol | meaning | paper |
+//! | --- | --- | --- |
+//! | `gain` | 3×3, calibrated unit per raw unit: inverse of scale, non-orthogonality and mounting | K⁻¹ |
+//! | `bias` | raw output at zero input, raw unit | b |
+//!
+//! Source: Secer & Barshan 2016, eq. (1) with h affine; the split of K is a reconstruction, since only the
+//! paper's first two pages were at hand. Not modelled: anything that is not affine in the input (quadratic
+//! scale, saturation, bandwidth), temperature (see [`crate::corrector`]).
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::scalar::Scalar;
+
+/// An affine calibration of three axes, raw unit in, calibrated unit out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Triad<T: Scalar> {
+    /// Calibrated unit per raw unit, row by output axis. Upper triangular where the frame is the sensor's own.
+    pub gain: Matrix3<T>,
+    /// Raw output at zero input, raw unit.
+    pub bias: Vector3<T>,
+}
+
+impl<T: Scalar> Triad<T> {
+    /// Changes nothing: unit gain, no bias.
+    pub fn identity() -> Self {
+        Self {
+            gain: Matrix3::identity(),
+            bias: Vector3::zeros(),
+        }
+    }
+
+    /// `gain · (raw − bias)`: a raw sample, sensor axes and raw unit, to calibrated axes and unit.
+    #[inline]
+    pub fn correct(&self, raw: &Vector3<T>) -> Vector3<T> {
+        self.gain * (raw - self.bias)
+    }
+
+    /// `gain⁻¹ · calibrated + bias`: what the sensor would put out; `None` where the gain is singular.
+    pub fn predict(&self, calibrated: &Vector3<T>) -> Option<Vector3<T>> {
+        Some(self.sensitivity()? * calibrated + self.bias)
+    }
+
+    /// K, raw unit per calibrated unit: the inverse of the gain; `None` where that is singular.
+    pub fn sensitivity(&self) -> Option<Matrix3<T>> {
+        self.gain.try_inverse()
+    }
+
+    /// The same triad for raw values of another affine unit, `raw = offset + per_unit · raw'`.
+    ///
+    /// `self` takes `raw'`, the result takes `raw`. `per_unit` must not be zero.
+    pub fn in_unit(&self, offset: T, per_unit: T) -> Self {
+        Self {
+            gain: self.gain / per_unit,
+            bias: self.bias * per_unit + Vector3::repeat(offset),
+        }
+    }
+
+    /// Every entry is finite.
+    pub fn is_finite(&self) -> bool {
+        self.gain.iter().chain(self.bias.iter()).all(|x| x.finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    prop_compose! {
+        /// A triad as sensors have them: axes within 20 % of nominal, skew below 6°, bias below one full scale.
+        fn triad()(scale in prop::array::uniform3(0.8f64..1.2), skew in prop::array::uniform6(-0.1f64..0.1),
+                   bias in prop::array::uniform3(-50.0f64..50.0)) -> Triad<f64> {
+            Triad {
+                gain: Matrix3::new(scale[0], skew[0], skew[1], skew[2], scale[1], skew[3], skew[4], skew[5], scale[2]),
+                bias: Vector3::from(bias),
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn correct_undoes_predict_over_the_valid_range(t in triad(), x in prop::array::uniform3(-100.0f64..100.0)) {
+            let x = Vector3::from(x);
+            let raw = t.predict(&x).unwrap();
+            prop_assert!((t.correct(&raw) - x).norm() < 1e-11 * (1.0 + x.norm()));
+        }
+
+        #[test]
+        fn a_change_of_unit_changes_no_calibrated_value(t in triad(), x in prop::array::uniform3(-100.0f64..100.0),
+                offset in -4e4f64..4e4, per_unit in 1.0f64..5e3) {
+            let x = Vector3::from(x);
+            let counts = x * per_unit + Vector3::repeat(offset);
+            let (a, b) = (t.correct(&x), t.in_unit(offset, per_unit).correct(&counts));
+            prop_assert!((a - b).norm() < 1e-9 * (1.0 + a.norm()));
+        }
+    }
+
+    #[test]
+    fn a_singular_gain_has_no_prediction() {
+        let t = Triad {
+            gain: Matrix3::<f32>::zeros(),
+            bias: Vector3::zeros(),
+        };
+        assert!(t.predict(&Vector3::x()).is_none());
+    }
+}

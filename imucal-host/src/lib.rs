@@ -1,0 +1,1 @@
+//! Calibrate IMU recordings through `imucal-core`.
