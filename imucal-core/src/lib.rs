@@ -14,5 +14,9 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod model;
+pub mod observation;
+pub mod rotation;
 pub mod scalar;
+pub mod solver;
 pub mod triad;

@@ -1,0 +1,264 @@
+//! What a fit is given: rests, turns between rests, and points of a cloud.
+//!
+//! | observation | made of | used by |
+//! | --- | --- | --- |
+//! | [`Moments`] | the samples of one sensor during a rest | accelerometer, gyroscope bias |
+//! | [`Rest`] | the moments of both inertial sensors, and the temperature | everything |
+//! | [`Block`] | a few gyroscope samples, compressed | [`Turn`] |
+//! | [`Turn`] | the blocks from inside one rest to inside the next | gyroscope |
+//!
+//! All in SI of the sensor's nominal output (m/s², rad/s, µT), sensor frame `s`, before calibration.
+
+use nalgebra::Vector3;
+
+use crate::scalar::Scalar;
+
+/// Mean and spread of a triad's samples, gathered one at a time (Welford 1962).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moments<T: Scalar> {
+    count: u32,
+    mean: Vector3<T>,
+    squares: Vector3<T>,
+}
+
+impl<T: Scalar> Default for Moments<T> {
+    fn default() -> Self {
+        Self {
+            count: 0,
+            mean: Vector3::zeros(),
+            squares: Vector3::zeros(),
+        }
+    }
+}
+
+impl<T: Scalar> Moments<T> {
+    /// Takes one sample in; its unit is that of the mean.
+    pub fn push(&mut self, sample: &Vector3<T>) {
+        self.count = self.count.saturating_add(1);
+        let before = sample - self.mean;
+        self.mean += before / T::of(f64::from(self.count));
+        self.squares += before.component_mul(&(sample - self.mean));
+    }
+
+    /// Samples taken in.
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// Mean of the samples; zero before the first.
+    pub fn mean(&self) -> Vector3<T> {
+        self.mean
+    }
+
+    /// Unbiased variance of a sample on each axis; zero below two samples.
+    pub fn variance(&self) -> Vector3<T> {
+        if self.count < 2 {
+            return Vector3::zeros();
+        }
+        self.squares / T::of(f64::from(self.count - 1))
+    }
+}
+
+/// A stretch in which the sensor lay still.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rest<T: Scalar> {
+    /// Middle of the rest on the IMU's clock, s.
+    pub time: T,
+    /// Accelerometer: specific force `f_s`, m/s².
+    pub acc: Moments<T>,
+    /// Gyroscope: rate `w_ns_s`, rad/s; no samples where there is none.
+    pub gyr: Moments<T>,
+    /// Mean temperature, °C; NaN where it is not measured.
+    pub temperature: T,
+}
+
+/// Some gyroscope samples of one stretch, as three sums: 36 bytes in `f32`, whatever their number.
+///
+/// With ω_i the rate held during Δt_i, and T_i the time of the block after sample i less the time before it:
+///
+/// ```text
+/// s0 = Σ ω_i Δt_i      s1 = Σ ω_i Δt_i T_i      c = Σ_{i<j} ω_i × ω_j Δt_i Δt_j
+/// ```
+///
+/// From them follows, for any gain A and bias b and to second order, the block's rotation vector
+/// `A (s0 − T b) + ½ cof(A) (c − s1 × b)`. Source: models.md 3 (a reconstruction), here for samples that need
+/// not be equally spaced; equal to it where they are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Block<T: Scalar> {
+    /// Angle, rad.
+    pub s0: Vector3<T>,
+    /// First moment of the angle, rad·s.
+    pub s1: Vector3<T>,
+    /// Coning sum, rad².
+    pub c: Vector3<T>,
+}
+
+/// How long each block of a turn lasts, s.
+#[derive(Clone, Copy, Debug)]
+pub enum Durations<'a, T> {
+    /// All the same.
+    Uniform(T),
+    /// One for each block; blocks beyond the last are taken to have no length.
+    Each(&'a [T]),
+}
+
+impl<T: Scalar> Durations<'_, T> {
+    /// Duration of block `index`, s.
+    pub fn get(&self, index: usize) -> T {
+        match self {
+            Self::Uniform(duration) => *duration,
+            Self::Each(all) => all.get(index).copied().unwrap_or_else(T::zero),
+        }
+    }
+}
+
+/// Gathers samples into a [`Block`].
+#[derive(Clone, Copy, Debug)]
+pub struct BlockBuilder<T: Scalar> {
+    count: u16,
+    duration: T,
+    /// Σ ω_i Δt_i · (2 · time before i + Δt_i), from which s1 follows at the end.
+    early: Vector3<T>,
+    s0: Vector3<T>,
+    c: Vector3<T>,
+}
+
+impl<T: Scalar> Default for BlockBuilder<T> {
+    fn default() -> Self {
+        Self {
+            count: 0,
+            duration: T::zero(),
+            early: Vector3::zeros(),
+            s0: Vector3::zeros(),
+            c: Vector3::zeros(),
+        }
+    }
+}
+
+impl<T: Scalar> BlockBuilder<T> {
+    /// Takes in a rate `w_ns_s`, rad/s, that held for `duration`, s.
+    pub fn push(&mut self, rate: &Vector3<T>, duration: T) {
+        let angle = rate * duration;
+        self.c += self.s0.cross(&angle);
+        self.early += angle * (self.duration + self.duration + duration);
+        self.s0 += angle;
+        self.duration += duration;
+        self.count = self.count.saturating_add(1);
+    }
+
+    /// Samples taken in since the last block.
+    pub fn count(&self) -> u16 {
+        self.count
+    }
+
+    /// The block and its duration, s; the builder is empty afterwards.
+    pub fn finish(&mut self) -> (Block<T>, T) {
+        let done = core::mem::take(self);
+        let s1 = done.s0 * done.duration - done.early;
+        (
+            Block {
+                s0: done.s0,
+                s1,
+                c: done.c,
+            },
+            done.duration,
+        )
+    }
+}
+
+/// A motion from inside one rest to inside the next.
+#[derive(Clone, Copy, Debug)]
+pub struct Turn<'a, T: Scalar> {
+    /// Gyroscope blocks in time order.
+    pub blocks: &'a [Block<T>],
+    /// Their durations, s.
+    pub durations: Durations<'a, T>,
+    /// Direction of the specific force in the rest before, unit vector, calibrated axes.
+    pub before: Vector3<T>,
+    /// The same in the rest after.
+    pub after: Vector3<T>,
+}
+
+/// A point that ought to lie on a sphere once calibrated: a rest of an accelerometer, a sample of a magnetometer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShellPoint<T: Scalar> {
+    /// Sensor output, nominal SI, frame `s`.
+    pub value: Vector3<T>,
+    /// Expected distance outside the shell, same unit: noise on a curved surface lies outside on average
+    /// ([`crate::model::norm::curvature_excess`]); zero for means of many samples.
+    pub excess: T,
+}
+
+impl<T: Scalar> ShellPoint<T> {
+    /// A point without correction for curvature.
+    pub fn new(value: Vector3<T>) -> Self {
+        Self {
+            value,
+            excess: T::zero(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_of_a_constant_have_no_spread() {
+        let mut m = Moments::<f32>::default();
+        for _ in 0..1000 {
+            m.push(&Vector3::new(33_123.8, -1.0, 0.25));
+        }
+        assert_eq!((m.count(), m.variance()), (1000, Vector3::zeros()));
+        assert_eq!(m.mean(), Vector3::new(33_123.8, -1.0, 0.25));
+    }
+
+    #[test]
+    fn moments_agree_with_two_passes() {
+        let samples: std::vec::Vec<_> = (0..50)
+            .map(|i| Vector3::new(f64::from(i), f64::from(i * i % 7), 1e6 + f64::from(i % 3)))
+            .collect();
+        let mut m = Moments::default();
+        samples.iter().for_each(|s| m.push(s));
+        let mean = samples.iter().sum::<Vector3<f64>>() / 50.0;
+        let variance = samples
+            .iter()
+            .map(|s| (s - mean).component_mul(&(s - mean)))
+            .sum::<Vector3<f64>>()
+            / 49.0;
+        assert!((m.mean() - mean).norm() < 1e-9);
+        assert!((m.variance() - variance).norm() < 1e-6);
+    }
+
+    #[test]
+    fn a_block_of_equal_intervals_has_the_sums_of_the_paper_s_reconstruction() {
+        let rates: [Vector3<f64>; 4] = [
+            Vector3::x(),
+            Vector3::new(0.0, 2.0, 0.5),
+            Vector3::new(-1.0, 0.3, 0.0),
+            Vector3::z(),
+        ];
+        let dt = 0.01;
+        let mut b = BlockBuilder::default();
+        rates.iter().for_each(|w| b.push(w, dt));
+        let (block, duration) = b.finish();
+        let m = 4.0;
+        let s0: Vector3<f64> = rates.iter().sum();
+        let s1: Vector3<f64> = rates
+            .iter()
+            .enumerate()
+            .map(|(i, w)| w * (m - 1.0 - 2.0 * i as f64))
+            .sum();
+        let mut c = Vector3::zeros();
+        for j in 0..4 {
+            for i in 0..j {
+                c += rates[i].cross(&rates[j]);
+            }
+        }
+        assert!((duration - m * dt).abs() < 1e-15);
+        assert!((block.s0 - s0 * dt).norm() < 1e-15);
+        assert!((block.s1 - s1 * dt * dt).norm() < 1e-15);
+        assert!((block.c - c * dt * dt).norm() < 1e-15);
+        assert_eq!(b.count(), 0);
+    }
+}

@@ -1,0 +1,190 @@
+//! Streamed triangularisation: the Jacobian and residual of any number of rows, in P×P memory.
+//!
+//! Each row is rotated into an upper triangular R and a vector q (Givens), so that at any time
+//! `|J δ + r|² = |R δ + q|² + rest²`. Nothing is squared: in `f32` JᵀJ would lose half of the digits.
+//! Source: Golub & Van Loan, *Matrix Computations*, 5.1.8 and 6.5.3. Indices run over the const size P, so no bounds
+//! check is left in an image (its link fails otherwise).
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::{model::RowSink, scalar::Scalar};
+
+/// The factor of the rows streamed so far.
+#[derive(Clone, Copy, Debug)]
+pub struct Triangular<T: Scalar, const P: usize> {
+    r: SMatrix<T, P, P>,
+    q: SVector<T, P>,
+    squared_sum: T,
+}
+
+impl<T: Scalar, const P: usize> Default for Triangular<T, P> {
+    fn default() -> Self {
+        Self {
+            r: SMatrix::zeros(),
+            q: SVector::zeros(),
+            squared_sum: T::zero(),
+        }
+    }
+}
+
+impl<T: Scalar, const P: usize> Triangular<T, P> {
+    /// Rotates one row into the factor.
+    pub fn push(&mut self, residual: T, jacobian: &SVector<T, P>) {
+        let mut row = *jacobian;
+        let mut rest = residual;
+        self.squared_sum += residual * residual;
+        for k in 0..P {
+            let (Some(d), Some(x)) = (self.r.get((k, k)).copied(), row.get(k).copied()) else {
+                return;
+            };
+            let length = (d * d + x * x).root();
+            // Nothing to rotate, or both squares underflowed: below every rounding here.
+            if x == T::zero() || length == T::zero() {
+                continue;
+            }
+            let (cos, sin) = (d / length, x / length);
+            for (above, below) in self.r.row_mut(k).iter_mut().zip(row.iter_mut()).skip(k) {
+                (*above, *below) = (cos * *above + sin * *below, cos * *below - sin * *above);
+            }
+            if let Some(above) = self.q.get_mut(k) {
+                (*above, rest) = (cos * *above + sin * rest, cos * rest - sin * *above);
+            }
+        }
+    }
+
+    /// Σ r² of the rows.
+    pub fn squared_sum(&self) -> T {
+        self.squared_sum
+    }
+
+    /// The upper triangular factor R.
+    pub fn r(&self) -> &SMatrix<T, P, P> {
+        &self.r
+    }
+
+    /// Jᵀr.
+    pub fn gradient(&self) -> SVector<T, P> {
+        self.r.tr_mul(&self.q)
+    }
+
+    /// Lengths of the Jacobian's columns.
+    pub fn column_norms(&self) -> SVector<T, P> {
+        let mut norms = SVector::<T, P>::zeros();
+        for (norm, column) in norms.iter_mut().zip(self.r.column_iter()) {
+            *norm = column.norm_squared().root();
+        }
+        norms
+    }
+
+    /// The δ that minimises `|J δ + r|² + μ Σ (d_k δ_k)²`; `None` where that is singular.
+    pub fn damped_step(&self, mu: T, scale: &SVector<T, P>) -> Option<SVector<T, P>> {
+        let mut damped = *self;
+        let root = mu.root();
+        for (k, length) in scale.iter().enumerate() {
+            damped.push(T::zero(), &unit(k, root * *length));
+        }
+        back_substitute(&damped.r, &-damped.q)
+    }
+
+    /// R⁻¹; `None` where R is singular.
+    pub fn inverse(&self) -> Option<SMatrix<T, P, P>> {
+        let mut inverse = SMatrix::<T, P, P>::zeros();
+        for k in 0..P {
+            inverse.set_column(k, &back_substitute(&self.r, &unit(k, T::one()))?);
+        }
+        Some(inverse)
+    }
+
+    /// `variance · (JᵀJ)⁻¹`, from R alone; `None` where it is singular.
+    pub fn covariance(&self, variance: T) -> Option<SMatrix<T, P, P>> {
+        let inverse = self.inverse()?;
+        Some(inverse * inverse.transpose() * variance)
+    }
+}
+
+/// `size` in place `k`, zero elsewhere.
+fn unit<T: Scalar, const P: usize>(k: usize, size: T) -> SVector<T, P> {
+    let mut unit = SVector::<T, P>::zeros();
+    if let Some(entry) = unit.get_mut(k) {
+        *entry = size;
+    }
+    unit
+}
+
+/// x with R x = y, R upper triangular; `None` where a pivot vanishes or the answer is not finite.
+fn back_substitute<T: Scalar, const P: usize>(
+    r: &SMatrix<T, P, P>,
+    y: &SVector<T, P>,
+) -> Option<SVector<T, P>> {
+    let mut x = *y;
+    for k in (0..P).rev() {
+        let known: T = r
+            .row(k)
+            .iter()
+            .zip(x.iter())
+            .skip(k + 1)
+            .fold(T::zero(), |sum, (a, b)| sum + *a * *b);
+        let pivot = r.get((k, k)).copied().filter(|pivot| *pivot != T::zero())?;
+        let entry = x.get_mut(k)?;
+        *entry = (*entry - known) / pivot;
+    }
+    x.iter().all(|value| value.finite()).then_some(x)
+}
+
+impl<T: Scalar, const P: usize> RowSink<T, P> for Triangular<T, P> {
+    const JACOBIAN: bool = true;
+
+    #[inline]
+    fn row(&mut self, residual: T, jacobian: &SVector<T, P>) {
+        self.push(residual, jacobian);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix4, SMatrix, Vector4};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_factor_of_streamed_rows_is_the_normal_equations_root(
+            entries in prop::collection::vec(-5.0f64..5.0, 50),
+        ) {
+            let mut t = Triangular::<f64, 4>::default();
+            let (mut normal, mut image, mut sum) = (Matrix4::zeros(), Vector4::zeros(), 0.0);
+            for row in entries.chunks_exact(5) {
+                let jacobian = Vector4::from_column_slice(&row[..4]);
+                t.push(row[4], &jacobian);
+                normal += jacobian * jacobian.transpose();
+                image += jacobian * row[4];
+                sum += row[4] * row[4];
+            }
+            prop_assert!((t.r().transpose() * t.r() - normal).norm() < 1e-10);
+            prop_assert!((t.gradient() - image).norm() < 1e-10);
+            prop_assert!((t.squared_sum() - sum).abs() < 1e-10);
+        }
+
+        #[test]
+        fn the_damped_step_solves_the_damped_normal_equations(
+            entries in prop::collection::vec(-5.0f64..5.0, 40), mu in 1e-3f64..10.0,
+        ) {
+            let mut t = Triangular::<f64, 4>::default();
+            for row in entries.chunks_exact(5) {
+                t.push(row[4], &Vector4::from_column_slice(&row[..4]));
+            }
+            let scale = t.column_norms();
+            let step = t.damped_step(mu, &scale).unwrap();
+            let damping: SMatrix<f64, 4, 4> = Matrix4::from_diagonal(&scale.component_mul(&scale)) * mu;
+            let left = t.r().transpose() * t.r() + damping;
+            prop_assert!((left * step + t.gradient()).norm() < 1e-9 * left.norm());
+        }
+    }
+
+    #[test]
+    fn a_column_never_seen_leaves_the_factor_singular() {
+        let mut t = Triangular::<f32, 2>::default();
+        t.push(1.0, &SVector::from([1.0, 0.0]));
+        assert!(t.covariance(1.0).is_none());
+    }
+}
