@@ -14,9 +14,19 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod model;
-pub mod observation;
-pub mod rotation;
+// In the order of the flow: a module uses those above it, never those below.
 pub mod scalar;
-pub mod solver;
+
+pub mod rotation;
+
 pub mod triad;
+
+pub mod observation;
+
+pub mod model;
+
+pub mod solver;
+
+pub mod coverage;
+
+pub mod accept;

@@ -5,10 +5,13 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::triangular::{back_substitute, solve_transposed};
 use crate::scalar::Scalar;
 
 /// Sweeps over all pairs; nine parameters need five or six.
 const SWEEPS: usize = 12;
+/// Rounds of inverse iteration.
+const ROUNDS: usize = 12;
 
 /// Largest over smallest singular value of `a` once its columns have unit length; the largest number there is
 /// where `a` is singular.
@@ -32,6 +35,26 @@ pub fn normalised_condition<T: Scalar, const P: usize>(a: &SMatrix<T, P, P>) -> 
     } else {
         T::LARGEST
     }
+}
+
+/// The unit vector along which `|R x|` with columns at unit length is least: the combination of parameters that
+/// the rows tell worst, scaled back to the parameters; `None` where R is singular.
+///
+/// Inverse iteration: the other directions die out with the square of the singular values' ratio.
+pub fn weakest_direction<T: Scalar, const P: usize>(r: &SMatrix<T, P, P>) -> Option<SVector<T, P>> {
+    let mut unit = *r;
+    let mut lengths = SVector::<T, P>::zeros();
+    for (mut column, length) in unit.column_iter_mut().zip(lengths.iter_mut()) {
+        *length = column.norm_squared().root();
+        column /= *length;
+    }
+    let mut direction = SVector::<T, P>::repeat(T::one());
+    for _ in 0..ROUNDS {
+        let image = solve_transposed(&unit, &direction)?;
+        direction = back_substitute(&unit, &image)?;
+        direction /= direction.norm_squared().root();
+    }
+    Some(direction.component_div(&lengths))
 }
 
 /// Singular values of `w`, in no order.

@@ -112,7 +112,7 @@ fn unit<T: Scalar, const P: usize>(k: usize, size: T) -> SVector<T, P> {
 }
 
 /// x with R x = y, R upper triangular; `None` where a pivot vanishes or the answer is not finite.
-fn back_substitute<T: Scalar, const P: usize>(
+pub(super) fn back_substitute<T: Scalar, const P: usize>(
     r: &SMatrix<T, P, P>,
     y: &SVector<T, P>,
 ) -> Option<SVector<T, P>> {
@@ -123,6 +123,26 @@ fn back_substitute<T: Scalar, const P: usize>(
             .iter()
             .zip(x.iter())
             .skip(k + 1)
+            .fold(T::zero(), |sum, (a, b)| sum + *a * *b);
+        let pivot = r.get((k, k)).copied().filter(|pivot| *pivot != T::zero())?;
+        let entry = x.get_mut(k)?;
+        *entry = (*entry - known) / pivot;
+    }
+    x.iter().all(|value| value.finite()).then_some(x)
+}
+
+/// x with Rᵀ x = y, R upper triangular; `None` as above.
+pub(super) fn solve_transposed<T: Scalar, const P: usize>(
+    r: &SMatrix<T, P, P>,
+    y: &SVector<T, P>,
+) -> Option<SVector<T, P>> {
+    let mut x = *y;
+    for k in 0..P {
+        let known: T = r
+            .column(k)
+            .iter()
+            .zip(x.iter())
+            .take(k)
             .fold(T::zero(), |sum, (a, b)| sum + *a * *b);
         let pivot = r.get((k, k)).copied().filter(|pivot| *pivot != T::zero())?;
         let entry = x.get_mut(k)?;

@@ -1,0 +1,431 @@
+//! Whether a fit may become a calibration: apart from whether the solver converged.
+//!
+//! A small residual is not a good calibration: nine poses and nine parameters print an rms of nothing. What is
+//! asked here, in this order, is whether there were enough observations, in enough directions, more of them than
+//! parameters, whether the solver stopped at a minimum, whether that minimum is sharp, and whether the result can
+//! be a sensor at all. The first answer that is no is the refusal, with its figures.
+
+use core::fmt;
+
+use nalgebra::SVector;
+
+use crate::{
+    coverage::Coverage,
+    model::{Model, SquaredSum},
+    scalar::Scalar,
+    solver::{LevenbergMarquardt, SolveReport, Termination, condition::weakest_direction},
+    triad::Triad,
+};
+
+/// What is asked of a fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Observations at least.
+    pub observations: usize,
+    /// Distinct directions at least; one more than parameters, so that each is checked by another.
+    pub directions: usize,
+    /// Least share of the sphere, 0 to 1.
+    pub coverage: f64,
+    /// Least variance of the directions along any axis; 0.01 is a band of ±10°.
+    pub flatness: f64,
+    /// Largest condition number of the Jacobian with columns at unit length.
+    pub condition: f64,
+    /// Largest departure from a parabola one standard error along the weakest direction, relative. Above it the
+    /// standard errors do not describe the answer.
+    pub nonlinearity: f64,
+    /// Least and largest gain of an axis against nominal, and of one axis against another.
+    pub gain: (f64, f64),
+    /// Largest rms residual as a share of the calibrated norm.
+    pub rms: f64,
+}
+
+impl Limits {
+    /// For `parameters` of a norm fit with `directions` that determine them.
+    pub fn for_norm(parameters: usize, directions: usize) -> Self {
+        Self {
+            observations: parameters + 1,
+            directions,
+            coverage: 0.25,
+            flatness: 0.01,
+            condition: 200.0,
+            nonlinearity: 0.3,
+            gain: (0.5, 2.0),
+            rms: 0.05,
+        }
+    }
+}
+
+/// Why a fit was refused. The figures are those that led to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Refusal {
+    /// No stretch in which the sensor lay still.
+    NoRest,
+    /// The sensor was never turned.
+    NoMotion,
+    /// Fewer observations than needed.
+    TooFewObservations {
+        /// Observations there are.
+        have: usize,
+        /// Observations needed.
+        need: usize,
+    },
+    /// The directions leave too much of the sphere unseen.
+    PoorCoverage {
+        /// Share of the sphere within reach of an observation.
+        coverage: f64,
+        /// Least variance of the directions along any axis.
+        flatness: f64,
+        /// Share needed.
+        need_coverage: f64,
+        /// Variance needed.
+        need_flatness: f64,
+    },
+    /// No direction is left to check the parameters with.
+    NotRedundant {
+        /// Distinct directions.
+        directions: usize,
+        /// Directions needed.
+        need: usize,
+        /// Parameters estimated.
+        parameters: usize,
+    },
+    /// The observations hardly tell some combination of the parameters.
+    IllConditioned {
+        /// Condition number of the normalised Jacobian.
+        condition: f64,
+        /// Largest one allowed.
+        limit: f64,
+    },
+    /// One standard error along the weakest direction already leaves the parabola that standard errors assume.
+    TooNonlinear {
+        /// Relative departure.
+        nonlinearity: f64,
+        /// Largest one allowed.
+        limit: f64,
+    },
+    /// The solver stopped elsewhere than at a minimum.
+    DidNotConverge {
+        /// Why it stopped.
+        termination: Termination,
+    },
+    /// No sensor is like that.
+    Implausible {
+        /// What is implausible.
+        what: Quantity,
+        /// Its value.
+        value: f64,
+        /// The nearest value that would pass.
+        limit: f64,
+    },
+    /// A figure is infinite or NaN.
+    NotFinite,
+}
+
+/// A quantity that [`Refusal::Implausible`] speaks of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Quantity {
+    /// Gain of an axis against its nominal value.
+    Gain,
+    /// Gain of the strongest axis against the weakest.
+    AxisRatio,
+    /// Rms residual as a share of the norm.
+    Residual,
+}
+
+impl Refusal {
+    /// The reason's fixed name in files.
+    pub fn reason(&self) -> &'static str {
+        match self {
+            Self::NoRest => "no-rest",
+            Self::NoMotion => "no-motion",
+            Self::TooFewObservations { .. } => "too-few-observations",
+            Self::PoorCoverage { .. } => "poor-coverage",
+            Self::NotRedundant { .. } => "not-redundant",
+            Self::IllConditioned { .. } | Self::TooNonlinear { .. } => "ill-conditioned",
+            Self::DidNotConverge { .. } => "did-not-converge",
+            Self::Implausible { .. } => "implausible",
+            Self::NotFinite => "not-finite",
+        }
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoRest => write!(f, "no stretch in which the sensor lay still"),
+            Self::NoMotion => write!(f, "the sensor was never turned from one rest to another"),
+            Self::TooFewObservations { have, need } => write!(f, "{have} observations, {need} needed"),
+            Self::PoorCoverage {
+                coverage,
+                flatness,
+                need_coverage,
+                need_flatness,
+            } => write!(
+                f,
+                "directions cover {:.0} % of the sphere ({:.0} % needed), least variance along an axis \
+                 {flatness:.4} ({need_flatness} needed; 0 in a plane)",
+                100.0 * coverage,
+                100.0 * need_coverage
+            ),
+            Self::NotRedundant {
+                directions,
+                need,
+                parameters,
+            } => write!(
+                f,
+                "{directions} distinct directions for {parameters} parameters, {need} needed: nothing would check them"
+            ),
+            Self::IllConditioned { condition, limit } => write!(
+                f,
+                "condition {condition:.0}, at most {limit:.0}: the observations hardly tell some combination of \
+                 the parameters"
+            ),
+            Self::TooNonlinear { nonlinearity, limit } => write!(
+                f,
+                "the cost departs {:.0} % from a parabola within one standard error (at most {:.0} %): \
+                 too little of the sphere for this noise",
+                100.0 * nonlinearity,
+                100.0 * limit
+            ),
+            Self::DidNotConverge { termination } => write!(f, "the solver stopped by {}", termination.name()),
+            Self::Implausible {
+                what: Quantity::Gain,
+                value,
+                limit,
+            } => {
+                write!(
+                    f,
+                    "an axis has {value:.3} times its nominal gain, the limit is {limit}"
+                )
+            }
+            Self::Implausible {
+                what: Quantity::AxisRatio,
+                value,
+                limit,
+            } => {
+                write!(
+                    f,
+                    "one axis has {value:.2} times the gain of another, the limit is {limit}"
+                )
+            }
+            Self::Implausible {
+                what: Quantity::Residual,
+                value,
+                limit,
+            } => write!(
+                f,
+                "rms residual {:.1} % of the norm, the limit is {:.1} %",
+                100.0 * value,
+                100.0 * limit
+            ),
+            Self::NotFinite => write!(f, "a figure is infinite or NaN"),
+        }
+    }
+}
+
+impl core::error::Error for Refusal {}
+
+/// Enough observations, in enough directions, and more of them than parameters.
+///
+/// # Errors
+/// The first of too-few-observations, poor-coverage and not-redundant that holds.
+pub fn check_observations<T: Scalar>(
+    coverage: &Coverage<T>,
+    parameters: usize,
+    limits: &Limits,
+) -> Result<(), Refusal> {
+    if coverage.observations < limits.observations {
+        return Err(Refusal::TooFewObservations {
+            have: coverage.observations,
+            need: limits.observations,
+        });
+    }
+    let (share, flatness) = (coverage.share.wide(), coverage.flatness.wide());
+    if share < limits.coverage || flatness < limits.flatness {
+        return Err(Refusal::PoorCoverage {
+            coverage: share,
+            flatness,
+            need_coverage: limits.coverage,
+            need_flatness: limits.flatness,
+        });
+    }
+    if coverage.distinct < limits.directions {
+        let directions = coverage.distinct;
+        return Err(Refusal::NotRedundant {
+            directions,
+            need: limits.directions,
+            parameters,
+        });
+    }
+    Ok(())
+}
+
+/// The solver stopped at a minimum, and the minimum is sharp.
+///
+/// # Errors
+/// not-finite, did-not-converge or ill-conditioned.
+pub fn check_report<T: Scalar>(report: &SolveReport<T>, limits: &Limits) -> Result<(), Refusal> {
+    match report.termination {
+        Termination::NotFinite => return Err(Refusal::NotFinite),
+        termination if !termination.was_successful() => return Err(Refusal::DidNotConverge { termination }),
+        _ => {}
+    }
+    let condition = report.condition.wide();
+    if condition > limits.condition {
+        return Err(Refusal::IllConditioned {
+            condition,
+            limit: limits.condition,
+        });
+    }
+    Ok(())
+}
+
+/// How far the cost departs from its parabola one standard error along the weakest direction, relative to the
+/// parabola's own rise: 0 for a linear model. `inflation` multiplies the standard error (for residuals that are
+/// not independent). Infinite where there is no redundancy.
+///
+/// Two passes over the observations. On clouds over parts of a sphere this is what parts answers whose standard
+/// errors hold from those where they do not; the condition number alone does not know the noise.
+pub fn nonlinearity<T: Scalar, const P: usize>(
+    fit: &LevenbergMarquardt<T, P>,
+    model: &impl Model<T, P>,
+    inflation: T,
+) -> T {
+    let Some(variance) = fit.variance() else {
+        return T::LARGEST;
+    };
+    let here = fit.factor().squared_sum();
+    if variance <= T::EPSILON * T::EPSILON * here || here == T::zero() {
+        return T::zero();
+    }
+    let Some(unit) = weakest_direction(fit.factor().r()) else {
+        return T::LARGEST;
+    };
+    // Scaled so that the parabola rises by inflation² · variance.
+    let rise = (fit.factor().r() * unit).norm_squared().root();
+    let step: SVector<T, P> = unit * (variance.root() * inflation / rise);
+    let expected = variance * inflation * inflation;
+    let mut worst = T::zero();
+    for trial in [fit.theta() + step, fit.theta() - step] {
+        let mut sum = SquaredSum(T::zero());
+        model.rows(&trial, &mut sum);
+        let departure = ((sum.0 - here) / expected - T::one()).abs();
+        worst = if departure > worst || !departure.finite() {
+            departure
+        } else {
+            worst
+        };
+    }
+    if worst.finite() { worst } else { T::LARGEST }
+}
+
+/// The minimum is as round as standard errors assume.
+///
+/// # Errors
+/// ill-conditioned, with the departure.
+pub fn check_nonlinearity<T: Scalar>(nonlinearity: T, limits: &Limits) -> Result<(), Refusal> {
+    let nonlinearity = nonlinearity.wide();
+    if nonlinearity > limits.nonlinearity {
+        return Err(Refusal::TooNonlinear {
+            nonlinearity,
+            limit: limits.nonlinearity,
+        });
+    }
+    Ok(())
+}
+
+/// The result can be a sensor: axes near nominal (where `nominal` says that the input is in nominal SI) and near
+/// each other, and a residual that is small against the norm.
+///
+/// # Errors
+/// not-finite or implausible.
+pub fn check_plausibility<T: Scalar>(
+    triad: &Triad<T>,
+    nominal: bool,
+    relative_rms: T,
+    limits: &Limits,
+) -> Result<(), Refusal> {
+    if !triad.is_finite() || !relative_rms.finite() {
+        return Err(Refusal::NotFinite);
+    }
+    let (least, most) = limits.gain;
+    let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+    for column in triad.gain.column_iter() {
+        let gain = libm::sqrt(column.norm_squared().wide());
+        low = low.min(gain);
+        high = high.max(gain);
+        if nominal && !(least..=most).contains(&gain) {
+            let limit = if gain < least { least } else { most };
+            return Err(Refusal::Implausible {
+                what: Quantity::Gain,
+                value: gain,
+                limit,
+            });
+        }
+    }
+    if high > most / least * low {
+        return Err(Refusal::Implausible {
+            what: Quantity::AxisRatio,
+            value: high / low,
+            limit: most / least,
+        });
+    }
+    if relative_rms.wide() > limits.rms {
+        return Err(Refusal::Implausible {
+            what: Quantity::Residual,
+            value: relative_rms.wide(),
+            limit: limits.rms,
+        });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix3;
+
+    fn coverage(observations: usize, share: f64, flatness: f64, distinct: usize) -> Coverage<f64> {
+        Coverage {
+            observations,
+            share,
+            flatness,
+            distinct,
+        }
+    }
+
+    #[test]
+    fn thirteen_rests_on_six_faces_are_not_redundant_for_nine_parameters() {
+        let verdict = check_observations(&coverage(13, 0.4, 0.3, 6), 9, &Limits::for_norm(9, 10));
+        assert_eq!(
+            verdict,
+            Err(Refusal::NotRedundant {
+                directions: 6,
+                need: 10,
+                parameters: 9
+            })
+        );
+        assert!(check_observations(&coverage(13, 0.4, 0.3, 6), 6, &Limits::for_norm(6, 6)).is_ok());
+    }
+
+    #[test]
+    fn a_plane_is_refused_for_its_coverage_however_many_observations_it_has() {
+        let verdict = check_observations(&coverage(500, 0.5, 1e-4, 24), 9, &Limits::for_norm(9, 10));
+        assert_eq!(verdict.unwrap_err().reason(), "poor-coverage");
+    }
+
+    #[test]
+    fn a_gain_of_three_times_nominal_is_implausible() {
+        let triad = Triad {
+            gain: Matrix3::identity() * 3.0f32,
+            bias: nalgebra::Vector3::zeros(),
+        };
+        let verdict = check_plausibility(&triad, true, 0.0, &Limits::for_norm(9, 10));
+        assert_eq!(verdict.unwrap_err().reason(), "implausible");
+        assert!(check_plausibility(&triad, false, 0.0, &Limits::for_norm(9, 10)).is_ok());
+    }
+}

@@ -1,0 +1,170 @@
+//! Which directions a set of observations has seen.
+//!
+//! | figure | meaning |
+//! | --- | --- |
+//! | share | of [`CELLS`] equal-area cells of the sphere, those with an observation within [`REACH`] of their centre |
+//! | flatness | least variance of the unit vectors along any axis: ⅓ for the whole sphere, 0 in a plane |
+//! | distinct | observations further than [`APART`] from each other, counted up to [`MOST_DISTINCT`] |
+//!
+//! Not seen here: how precise an observation is. That is the condition's and the standard errors' part.
+
+use heapless::Vec;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::scalar::Scalar;
+
+/// Equal-area cells on the sphere (a Fibonacci spiral).
+pub const CELLS: u16 = 128;
+/// An observation covers the cells whose centre is this near, rad (30°).
+pub const REACH: f64 = core::f64::consts::FRAC_PI_6;
+/// Directions nearer than this count as one, rad (15°).
+pub const APART: f64 = core::f64::consts::FRAC_PI_6 / 2.0;
+/// Distinct directions are counted up to here.
+pub const MOST_DISTINCT: usize = 24;
+
+/// How well the sphere of directions is covered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coverage<T> {
+    /// Observations looked at.
+    pub observations: usize,
+    /// Share of the cells within reach, 0 to 1.
+    pub share: T,
+    /// Least variance of the unit vectors along any axis, 0 to ⅓.
+    pub flatness: T,
+    /// Distinct directions, up to [`MOST_DISTINCT`].
+    pub distinct: usize,
+}
+
+impl<T: Scalar> Coverage<T> {
+    /// Coverage of unit vectors.
+    pub fn of(directions: impl Iterator<Item = Vector3<T>> + Clone) -> Self {
+        Self {
+            observations: directions.clone().count(),
+            share: share(directions.clone()),
+            flatness: flatness(directions.clone()),
+            distinct: distinct(directions),
+        }
+    }
+}
+
+/// Centre of cell `index`, unit vector.
+fn cell<T: Scalar>(index: u16) -> Vector3<T> {
+    let golden = core::f64::consts::PI * (3.0 - 2.236_067_977_499_79);
+    let z = 1.0 - (2.0 * f64::from(index) + 1.0) / f64::from(CELLS);
+    let radius = libm::sqrt(1.0 - z * z);
+    let azimuth = golden * f64::from(index);
+    Vector3::new(
+        T::of(radius * libm::cos(azimuth)),
+        T::of(radius * libm::sin(azimuth)),
+        T::of(z),
+    )
+}
+
+fn share<T: Scalar>(directions: impl Iterator<Item = Vector3<T>> + Clone) -> T {
+    let near = T::of(libm::cos(REACH));
+    let reached = (0..CELLS).filter(|index| {
+        let centre = cell(*index);
+        directions.clone().any(|u| u.dot(&centre) >= near)
+    });
+    T::of(reached.count() as f64 / f64::from(CELLS))
+}
+
+fn flatness<T: Scalar>(directions: impl Iterator<Item = Vector3<T>>) -> T {
+    let (mut count, mut sum, mut squares) = (0u32, Vector3::zeros(), Matrix3::zeros());
+    for u in directions {
+        count = count.saturating_add(1);
+        sum += u;
+        squares += u * u.transpose();
+    }
+    if count == 0 {
+        return T::zero();
+    }
+    let per = T::one() / T::of(f64::from(count));
+    let mean = sum * per;
+    least_eigenvalue(&(squares * per - mean * mean.transpose()))
+}
+
+/// Least eigenvalue of a symmetric positive semi-definite 3×3 matrix, by the trigonometric closed form
+/// (Smith 1961).
+fn least_eigenvalue<T: Scalar>(m: &Matrix3<T>) -> T {
+    let third = T::of(1.0 / 3.0);
+    let mean = m.trace() * third;
+    let off = m - Matrix3::identity() * mean;
+    let p = (off.norm_squared() / T::of(6.0)).root();
+    if p <= T::EPSILON {
+        return mean;
+    }
+    let half_det = (off / p).determinant() * T::of(0.5);
+    let clamped = half_det.wide().clamp(-1.0, 1.0);
+    let angle = libm::acos(clamped) / 3.0 + 2.0 * core::f64::consts::FRAC_PI_3;
+    let least = mean + p * T::of(2.0 * libm::cos(angle));
+    if least > T::zero() { least } else { T::zero() }
+}
+
+fn distinct<T: Scalar>(directions: impl Iterator<Item = Vector3<T>>) -> usize {
+    let near = T::of(libm::cos(APART));
+    let mut found: Vec<Vector3<T>, MOST_DISTINCT> = Vec::new();
+    for u in directions {
+        if !found.iter().any(|other| other.dot(&u) > near) && found.push(u).is_err() {
+            break;
+        }
+    }
+    found.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec as List;
+
+    fn cap(share: f64, count: u16) -> List<Vector3<f64>> {
+        (0..count)
+            .map(|k| {
+                let z = 1.0 - 2.0 * share * (f64::from(k) + 0.5) / f64::from(count);
+                let r = (1.0 - z * z).sqrt();
+                let a = 2.4 * f64::from(k);
+                Vector3::new(r * a.cos(), r * a.sin(), z)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_full_sphere_is_covered_and_round() {
+        let c = Coverage::of(cap(1.0, 500).into_iter());
+        assert_eq!((c.share, c.distinct), (1.0, MOST_DISTINCT));
+        assert!((c.flatness - 1.0 / 3.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_cap_has_the_variance_of_its_height() {
+        let c = Coverage::of(cap(0.1, 500).into_iter());
+        assert!(
+            (c.flatness - 0.2f64.powi(2) / 12.0).abs() < 1e-4,
+            "{}",
+            c.flatness
+        );
+    }
+
+    #[test]
+    fn a_great_circle_is_flat_though_it_reaches_half_of_the_sphere() {
+        let circle = (0..100).map(|k| {
+            let a = f64::from(k) * 0.0628;
+            Vector3::new(a.cos(), a.sin(), 0.0)
+        });
+        let c = Coverage::of(circle);
+        assert!(c.flatness < 1e-12 && (c.share - 0.5).abs() < 0.05);
+    }
+
+    #[test]
+    fn six_faces_visited_twice_are_six_directions() {
+        let faces = [
+            Vector3::x(),
+            -Vector3::x(),
+            Vector3::y(),
+            -Vector3::y(),
+            Vector3::z(),
+            -Vector3::z(),
+        ];
+        assert_eq!(Coverage::<f32>::of(faces.into_iter().chain(faces)).distinct, 6);
+    }
+}
