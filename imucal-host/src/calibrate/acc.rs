@@ -1,0 +1,181 @@
+//! The accelerometer from its rests: T9 (upper triangular gain and bias) or T6 (diagonal), |gain · (raw − bias)| = g.
+
+use imucal_core::{
+    accept::{Limits, Refusal},
+    model::{
+        Parameterisation,
+        parameterisation::{DIAGONAL, UPPER_TRIANGULAR},
+    },
+    observation::{Rest, ShellPoint},
+    triad::Triad,
+};
+use nalgebra::Vector3;
+
+use super::{
+    norm_fit::{NormFit, NormProblem, raw_coverage},
+    outcome::{FitSummary, Refused, SensorOutcome},
+};
+use crate::recording::{SensorKind, Triple, Unit};
+
+/// Forms of the accelerometer's model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AccModel {
+    /// Bias, scale and non-orthogonality (9).
+    #[default]
+    T9,
+    /// Bias and scale (6): what six faces can tell.
+    T6,
+}
+
+impl AccModel {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::T9 => "T9",
+            Self::T6 => "T6",
+        }
+    }
+
+    /// Distinct directions that determine and check it. Six faces determine six parameters axis by axis, which is
+    /// the classic six-position test; nine need a tenth to be checked.
+    fn directions(self) -> usize {
+        match self {
+            Self::T9 => 10,
+            Self::T6 => 6,
+        }
+    }
+}
+
+/// An accelerometer's outcome, and the calibration for the sensors that lean on it.
+#[derive(Clone, Debug)]
+pub struct AccResult {
+    /// For the report.
+    pub outcome: SensorOutcome,
+    /// Indices of the rests that were used.
+    pub used: Vec<usize>,
+}
+
+fn points(rests: &[Rest<f64>]) -> Vec<ShellPoint<f64>> {
+    rests.iter().map(|rest| ShellPoint::new(rest.acc.mean())).collect()
+}
+
+/// Fit of T9 at one segmentation, for comparing segmentations; `None` where there is too little to fit.
+pub fn trial(rests: &[Rest<f64>], gravity: f64) -> Option<(Triad<f64>, f64)> {
+    let points = points(rests);
+    (points.len() > 9).then(|| {
+        let problem = NormProblem { points: &points, norm: gravity, form: UPPER_TRIANGULAR, serial: false };
+        let fit = problem.fit(&Triad::identity());
+        (UPPER_TRIANGULAR.triad(fit.solver.theta()), fit.rms())
+    })
+}
+
+/// Calibrates from rests; `gravity` is the local one, m/s².
+pub fn calibrate(rests: &[Rest<f64>], sensor: &Triple, gravity: f64, model: AccModel) -> AccResult {
+    match model {
+        AccModel::T9 => with_form(rests, sensor, gravity, model, UPPER_TRIANGULAR),
+        AccModel::T6 => with_form(rests, sensor, gravity, model, DIAGONAL),
+    }
+}
+
+fn with_form<const P: usize>(
+    rests: &[Rest<f64>],
+    sensor: &Triple,
+    gravity: f64,
+    model: AccModel,
+    form: Parameterisation<P>,
+) -> AccResult {
+    let points = points(rests);
+    let limits = Limits::for_norm(P, model.directions());
+    let refuse = |refusal: Refusal, fit: Option<FitSummary>| AccResult {
+        outcome: SensorOutcome {
+            kind: SensorKind::Acc,
+            model: model.name(),
+            verdict: Err(Refused { advice: advice(&refusal, model), refusal }),
+            fit,
+        },
+        used: Vec::new(),
+    };
+    if points.is_empty() {
+        return refuse(Refusal::NoRest, None);
+    }
+    if points.len() <= P {
+        let seen = raw_coverage(&points, &Vector3::zeros());
+        return refuse(Refusal::TooFewObservations { have: seen.observations, need: limits.observations }, None);
+    }
+    let problem = NormProblem { points: &points, norm: gravity, form, serial: false };
+    let fit = problem.fit(&Triad::identity());
+    let coverage = problem.coverage(&fit);
+    let inflation = problem.inflation(&fit);
+    let (bend, verdict) = problem.judge(&fit, &coverage, &inflation, true, &limits);
+    let summary = summary(&problem, &fit, sensor, coverage.share, bend, rests);
+    match verdict {
+        Err(refusal) => refuse(refusal, Some(summary)),
+        Ok(()) => AccResult {
+            outcome: SensorOutcome {
+                kind: SensorKind::Acc,
+                model: model.name(),
+                verdict: Ok(()),
+                fit: Some(summary),
+            },
+            used: fit.used,
+        },
+    }
+}
+
+fn summary<const P: usize>(
+    problem: &NormProblem<'_, P>,
+    fit: &NormFit<P>,
+    sensor: &Triple,
+    coverage: f64,
+    nonlinearity: f64,
+    rests: &[Rest<f64>],
+) -> FitSummary {
+    let covariance = fit.covariance(&nalgebra::SVector::repeat(1.0));
+    let std = problem.form.triad(&covariance.diagonal().map(f64::sqrt));
+    FitSummary {
+        triad: problem.form.triad(fit.solver.theta()),
+        gain_std: std.gain,
+        bias_std: std.bias,
+        unit_in: sensor.unit,
+        unit_out: Unit::MetrePerSecondSquared,
+        nominal: sensor.nominal,
+        rms: fit.rms(),
+        held_out_rms: problem.held_out_rms(fit, fit.points.len()),
+        observations: fit.points.len(),
+        parameters: P,
+        condition: fit.report.condition,
+        coverage,
+        nonlinearity,
+        inflation: 1.0,
+        iterations: fit.report.iterations,
+        termination: fit.report.termination,
+        field_norm: None,
+        left_out: fit
+            .left_out
+            .iter()
+            .map(|(k, size)| format!("rest {} at {:.1} s: {size:.1} robust standard deviations", k + 1, rests[*k].time))
+            .collect(),
+        gain_spread: None,
+        bias_wander: None,
+    }
+}
+
+fn advice(refusal: &Refusal, model: AccModel) -> String {
+    match refusal {
+        Refusal::NoRest => "begin with 10 s or more of rest, and lay the sensor still for 2 s in each pose".into(),
+        Refusal::NotRedundant { .. } if model == AccModel::T9 => {
+            "record at least ten poses that differ by 15° or more, oblique ones among them; six faces support the \
+             six parameters of --model acc=T6"
+                .into()
+        }
+        Refusal::TooFewObservations { .. } | Refusal::NotRedundant { .. } => {
+            "record more poses at rest, each turned by 15° or more from the others".into()
+        }
+        Refusal::PoorCoverage { .. } => "turn the sensor about all of its axes, face down as well as face up".into(),
+        Refusal::IllConditioned { .. } | Refusal::TooNonlinear { .. } => {
+            "add oblique poses between the faces, and poses upside down".into()
+        }
+        Refusal::Implausible { .. } => "check [units], [counts] and [site] gravity of the recording's TOML".into(),
+        _ => "check the recording for motion during rests, clipping and wrong units".into(),
+    }
+}

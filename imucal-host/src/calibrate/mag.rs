@@ -1,0 +1,155 @@
+//! The magnetometer from a cloud of its samples: an ellipsoid that calibration maps to a sphere.
+
+use imucal_core::{
+    accept::{Limits, Refusal},
+    model::parameterisation::UPPER_TRIANGULAR,
+    observation::ShellPoint,
+    triad::Triad,
+};
+use nalgebra::{SMatrix, SVector};
+
+use super::{
+    norm_fit::{NormFit, NormProblem},
+    outcome::{FitSummary, Refused, SensorOutcome},
+};
+use crate::{
+    ellipsoid::{adjusted, sphere},
+    observe::cloud::cloud,
+    recording::{SensorKind, Triple, Unit},
+};
+
+/// Name of the model in files: ellipsoid, nine parameters.
+pub const MODEL: &str = "E9";
+/// Contiguous parts that are held out in turn.
+const FOLDS: usize = 5;
+
+/// Calibrates a cloud; `field` is the length of Earth's field, µT, where it is known.
+pub fn calibrate(sensor: &Triple, usable: &[bool], field: Option<f64>) -> SensorOutcome {
+    let cloud = cloud(&sensor.values, usable);
+    match fit(&cloud.points, sensor, field) {
+        Ok((summary, Ok(()))) => outcome(Ok(()), Some(summary)),
+        Ok((summary, Err(refusal))) => outcome(Err(refusal), Some(summary)),
+        Err(refusal) => outcome(Err(refusal), None),
+    }
+}
+
+fn outcome(verdict: Result<(), Refusal>, fit: Option<FitSummary>) -> SensorOutcome {
+    let verdict = verdict.map_err(|refusal| Refused { advice: advice(&refusal), refusal });
+    SensorOutcome { kind: SensorKind::Mag, model: MODEL, verdict, fit }
+}
+
+/// Fits from the start with the lower cost: an algebraic ellipsoid can be far off on a small part of the sphere.
+fn best_fit(problem: &NormProblem<'_, 9>) -> Option<NormFit<9>> {
+    let starts = [adjusted::start(problem.points, problem.norm), sphere::start(problem.points, problem.norm)];
+    starts
+        .iter()
+        .flatten()
+        .map(|triad| problem.fit(triad))
+        .min_by(|a, b| a.rms().total_cmp(&b.rms()))
+}
+
+type Judged = (FitSummary, Result<(), Refusal>);
+
+fn fit(points: &[ShellPoint<f64>], sensor: &Triple, field: Option<f64>) -> Result<Judged, Refusal> {
+    let limits = Limits::for_norm(9, 10);
+    if points.len() < limits.observations {
+        return Err(Refusal::TooFewObservations { have: points.len(), need: limits.observations });
+    }
+    // Without a known field the radius is a gauge: that of a sphere through the cloud keeps gains near one.
+    let flat = Refusal::PoorCoverage {
+        coverage: 0.0,
+        flatness: 0.0,
+        need_coverage: limits.coverage,
+        need_flatness: limits.flatness,
+    };
+    let radius = sphere::start(points, 1.0).map(|t| 1.0 / t.gain.m11).ok_or(flat)?;
+    let norm = field.unwrap_or(radius);
+    let problem = NormProblem { points, norm, form: UPPER_TRIANGULAR, serial: true };
+    let fit = best_fit(&problem).ok_or(flat)?;
+    let coverage = problem.coverage(&fit);
+    let inflation = problem.inflation(&fit);
+    let (bend, verdict) = problem.judge(&fit, &coverage, &inflation, false, &limits);
+    let mut summary = summarise(&problem, &fit, sensor, &inflation);
+    summary.coverage = coverage.share;
+    summary.nonlinearity = bend;
+    if field.is_none() {
+        to_unit_determinant(&mut summary, &problem, &fit.covariance(&inflation), sensor);
+    }
+    Ok((summary, verdict))
+}
+
+fn summarise(
+    problem: &NormProblem<'_, 9>,
+    fit: &NormFit<9>,
+    sensor: &Triple,
+    inflation: &SVector<f64, 9>,
+) -> FitSummary {
+    let std = problem.form.triad(&fit.covariance(inflation).diagonal().map(f64::sqrt));
+    FitSummary {
+        triad: problem.form.triad(fit.solver.theta()),
+        gain_std: std.gain,
+        bias_std: std.bias,
+        unit_in: sensor.unit,
+        unit_out: Unit::MicroTesla,
+        nominal: sensor.nominal,
+        rms: fit.rms(),
+        held_out_rms: problem.held_out_rms(fit, FOLDS),
+        observations: fit.points.len(),
+        parameters: 9,
+        condition: fit.report.condition,
+        coverage: 0.0,
+        nonlinearity: 0.0,
+        inflation: inflation.max(),
+        iterations: fit.report.iterations,
+        termination: fit.report.termination,
+        field_norm: None,
+        left_out: fit
+            .left_out
+            .iter()
+            .map(|(k, size)| format!("point {}: {size:.1} robust standard deviations", k + 1))
+            .collect(),
+        gain_spread: None,
+        bias_wander: None,
+    }
+}
+
+/// Gauge of a magnetometer alone: gain of determinant 1, so that the field's length is what the cloud shows.
+///
+/// `A' = A / d`, d = det(A)^⅓; errors follow by `dA' = (dA − A · ⅓ tr(A⁻¹ dA)) / d`.
+fn to_unit_determinant(
+    summary: &mut FitSummary,
+    problem: &NormProblem<'_, 9>,
+    covariance: &SMatrix<f64, 9, 9>,
+    sensor: &Triple,
+) {
+    let gain = summary.triad.gain;
+    let d = gain.determinant().cbrt();
+    let Some(inverse) = gain.try_inverse() else { return };
+    let jacobian = SMatrix::<f64, 9, 9>::from_columns(&std::array::from_fn::<_, 9, _>(|k| {
+        let unit = SVector::<f64, 9>::from_fn(|row, _| f64::from(u8::from(row == k)));
+        let by = problem.form.triad(&unit);
+        let moved = (by.gain - gain * ((inverse * by.gain).trace() / 3.0)) / d;
+        problem.form.theta(&Triad { gain: moved, bias: by.bias })
+    }));
+    let std = problem.form.triad(&(jacobian * covariance * jacobian.transpose()).diagonal().map(f64::sqrt));
+    summary.triad.gain = gain / d;
+    (summary.gain_std, summary.bias_std) = (std.gain, std.bias);
+    summary.field_norm = Some(problem.norm / d * sensor.nominal.per_unit.abs());
+    summary.unit_out = sensor.unit;
+    summary.rms *= sensor.nominal.per_unit.abs();
+    summary.held_out_rms = summary.held_out_rms.map(|rms| rms * sensor.nominal.per_unit.abs());
+}
+
+fn advice(refusal: &Refusal) -> String {
+    match refusal {
+        Refusal::TooFewObservations { .. } | Refusal::PoorCoverage { .. } | Refusal::NotRedundant { .. } => {
+            "turn the sensor through all directions, upside down as well, slowly and away from iron"
+        }
+        Refusal::IllConditioned { .. } | Refusal::TooNonlinear { .. } => {
+            "cover the part of the sphere that is missing: its noise hides the far side's curvature"
+        }
+        Refusal::Implausible { .. } => "keep away from iron and currents while turning, and check the unit",
+        _ => "check the recording for clipping, and for iron that moved",
+    }
+    .into()
+}

@@ -1,0 +1,185 @@
+//! A recording to a calibration: observations, fits through the core, acceptance.
+
+use imucal_core::{accept::Refusal, triad::Triad};
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use crate::{
+    observe::rest::{RestDetector, Samples},
+    recording::{Integrity, Recording, STANDARD_GRAVITY, SensorKind},
+};
+
+pub mod acc;
+pub mod gyr;
+pub mod mag;
+pub mod norm_fit;
+pub mod outcome;
+pub mod outlier;
+pub mod rows;
+pub mod segmentation;
+pub mod serial;
+
+pub use acc::AccModel;
+pub use outcome::{Calibration, FitSummary, Refused, SegmentationReport, SensorOutcome};
+use segmentation::Cut;
+
+/// What to calibrate, and how.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The accelerometer's model.
+    pub acc: AccModel,
+    /// Sensors to leave alone.
+    pub skip: Vec<SensorKind>,
+    /// Multiples of the initial rest's variance to try.
+    pub multipliers: Vec<f64>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { acc: AccModel::T9, skip: Vec::new(), multipliers: segmentation::MULTIPLIERS.to_vec() }
+    }
+}
+
+/// Calibrates every sensor the recording allows. `progress` is told of each stage.
+pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&str) + Sync)) -> Calibration {
+    progress("checking the samples");
+    let integrity = Integrity::of(recording);
+    let mut calibration = Calibration {
+        recording: recording.name.clone(),
+        sensor_name: recording.manifest.sensor.name.clone().unwrap_or_default(),
+        serial: recording.manifest.sensor.serial.clone().unwrap_or_default(),
+        sensors: Vec::new(),
+        segmentation: None,
+        warnings: Vec::new(),
+    };
+    inertial(recording, &integrity, options, progress, &mut calibration);
+    if let Some(mag) = recording.mag.as_ref().filter(|_| !options.skip.contains(&SensorKind::Mag)) {
+        progress("fitting the magnetometer");
+        let field = recording.manifest.site.field_ned_ut.map(|f| Vector3::from(f).norm());
+        calibration.sensors.push(mag::calibrate(mag, integrity.usable(SensorKind::Mag), field));
+    }
+    calibration
+}
+
+/// Accelerometer and gyroscope, which share the rests.
+fn inertial(
+    recording: &Recording,
+    integrity: &Integrity,
+    options: &Options,
+    progress: &(dyn Fn(&str) + Sync),
+    calibration: &mut Calibration,
+) {
+    let Some(acc) = &recording.acc else {
+        if recording.gyr.is_some() && !options.skip.contains(&SensorKind::Gyr) {
+            calibration.sensors.push(gyr::without_accelerometer(Refusal::NoRest));
+        }
+        return;
+    };
+    let gravity = recording.manifest.site.gravity().unwrap_or_else(|| {
+        calibration.warnings.push(format!(
+            "no [site] gravity and no latitude: taken as {STANDARD_GRAVITY} m/s², which may be 0.3 % off"
+        ));
+        STANDARD_GRAVITY
+    });
+    progress("finding rests");
+    let usable = integrity.usable_together(recording);
+    let detector = RestDetector::new(
+        Samples {
+            time: &recording.time,
+            acc: &acc.values,
+            gyr: recording.gyr.as_ref().map(|gyr| gyr.values.as_slice()),
+            temperature: recording.temperature.as_deref(),
+            usable: &usable,
+        },
+        recording.median_interval(),
+    );
+    let cuts = segmentation::cuts(&detector, &options.multipliers, gravity);
+    let Some(chosen) = segmentation::choose(&cuts) else { return };
+
+    progress("fitting the accelerometer");
+    let result = acc::calibrate(&chosen.rests, acc, gravity, options.acc);
+    let mut trials: Vec<_> = cuts.iter().map(Cut::trial).collect();
+    let mut acc_outcome = result.outcome;
+    if let Some(fit) = &mut acc_outcome.fit {
+        let gains: Vec<_> =
+            segmentation::comparable(&cuts).filter_map(|cut| Some(cut.fit?.0.gain.diagonal())).collect();
+        fit.gain_spread = Some(outcome::gain_spread(gains.iter().copied()));
+    }
+    let gyr_outcome = recording.gyr.as_ref().filter(|_| !options.skip.contains(&SensorKind::Gyr)).map(|gyr| {
+        progress("fitting the gyroscope");
+        let shared = GyrShared { recording, gyr, usable: &usable };
+        match (&acc_outcome.verdict, acc_outcome.fit.as_ref()) {
+            (Ok(()), Some(fit)) => shared.outcome(chosen, &cuts, &fit.triad, &result.used, &mut trials),
+            (Err(refused), _) => gyr::without_accelerometer(refused.refusal),
+            (Ok(()), None) => gyr::without_accelerometer(Refusal::NoRest),
+        }
+    });
+    if !options.skip.contains(&SensorKind::Acc) {
+        calibration.sensors.push(acc_outcome);
+    }
+    calibration.sensors.extend(gyr_outcome);
+    let spreads = calibration.sensors.iter().filter_map(|s| s.fit.as_ref()?.gain_spread);
+    calibration.segmentation = Some(SegmentationReport {
+        rests: chosen.rows.clone(),
+        multiplier: chosen.multiplier,
+        threshold: chosen.threshold,
+        from_initial_rest: detector.noise().1,
+        gain_spread: spreads.fold(0.0, f64::max),
+        trials,
+    });
+}
+
+/// What all of a gyroscope's fits share.
+struct GyrShared<'a> {
+    recording: &'a Recording,
+    gyr: &'a crate::recording::Triple,
+    usable: &'a [bool],
+}
+
+impl GyrShared<'_> {
+    fn input<'b>(&'b self, cut: &'b Cut, acc: &'b Triad<f64>, used: &'b [usize]) -> gyr::GyrInput<'b> {
+        gyr::GyrInput {
+            time: &self.recording.time,
+            sensor: self.gyr,
+            usable: self.usable,
+            interval: self.recording.median_interval(),
+            rows: &cut.rows,
+            rests: &cut.rests,
+            used,
+            acc,
+        }
+    }
+
+    fn outcome(
+        &self,
+        chosen: &Cut,
+        cuts: &[Cut],
+        acc: &Triad<f64>,
+        used: &[usize],
+        trials: &mut [outcome::ThresholdTrial],
+    ) -> SensorOutcome {
+        let mut outcome = gyr::calibrate(&self.input(chosen, acc, used));
+        let Some(fit) = &mut outcome.fit else { return outcome };
+        let start = fit.triad.gain;
+        // Directions come from each cut's own accelerometer fit, as they would had it been chosen.
+        let gains: Vec<_> = cuts
+            .par_iter()
+            .map(|cut| {
+                let all: Vec<usize> = (0..cut.rows.len()).collect();
+                let own = cut.fit.map_or(*acc, |(triad, _)| triad);
+                gyr::trial(&self.input(cut, &own, &all), &start)
+            })
+            .collect();
+        for (trial, gain) in trials.iter_mut().zip(&gains) {
+            trial.gyr_gain = *gain;
+        }
+        let multipliers: Vec<f64> = segmentation::comparable(cuts).map(|cut| cut.multiplier).collect();
+        let compared: Vec<_> = trials
+            .iter()
+            .filter(|trial| multipliers.contains(&trial.multiplier))
+            .filter_map(|trial| trial.gyr_gain)
+            .collect();
+        fit.gain_spread = Some(outcome::gain_spread(compared.iter().copied()));
+        outcome
+    }
+}

@@ -1,0 +1,185 @@
+//! A norm fit with all that a demanding user asks of it: outliers, held-out error, acceptance.
+
+use imucal_core::{
+    accept::{self, Limits, Refusal},
+    coverage::Coverage,
+    model::{
+        Parameterisation,
+        norm::{NormModel, curvature_excess},
+    },
+    observation::ShellPoint,
+    solver::{LevenbergMarquardt, SolveReport, lm::Settings},
+    triad::Triad,
+};
+use nalgebra::{SMatrix, SVector, Vector3};
+use rayon::prelude::*;
+
+use super::{
+    outlier::outliers,
+    rows::{Residuals, Rows},
+    serial,
+};
+
+/// Rounds of leaving out gross outliers.
+const ROUNDS: usize = 4;
+
+/// What to fit.
+#[derive(Clone, Copy, Debug)]
+pub struct NormProblem<'a, const P: usize> {
+    /// Observations in time order, nominal SI.
+    pub points: &'a [ShellPoint<f64>],
+    /// Radius of the calibrated sphere.
+    pub norm: f64,
+    /// Estimated entries.
+    pub form: Parameterisation<P>,
+    /// Neighbouring residuals may be alike: a cloud, not rests.
+    pub serial: bool,
+}
+
+/// A fit, before anyone has accepted it.
+#[derive(Clone, Debug)]
+pub struct NormFit<const P: usize> {
+    /// The solver at its end.
+    pub solver: LevenbergMarquardt<f64, P>,
+    /// Its report.
+    pub report: SolveReport<f64>,
+    /// Observations used, in order: points with their expected excess.
+    pub points: Vec<ShellPoint<f64>>,
+    /// Index of each used point among the problem's.
+    pub used: Vec<usize>,
+    /// Indices left out, with their size in robust standard deviations.
+    pub left_out: Vec<(usize, f64)>,
+}
+
+impl<const P: usize> NormProblem<'_, P> {
+    fn model<'a>(&self, points: &'a [ShellPoint<f64>]) -> NormModel<'a, f64, P> {
+        NormModel { points, norm: self.norm, form: self.form }
+    }
+
+    fn solve(&self, points: &[ShellPoint<f64>], start: SVector<f64, P>) -> LevenbergMarquardt<f64, P> {
+        let mut solver = LevenbergMarquardt::new(start, Settings::default());
+        solver.run(&self.model(points));
+        solver
+    }
+
+    /// Fits from `start`, leaving out gross outliers.
+    pub fn fit(&self, start: &Triad<f64>) -> NormFit<P> {
+        let mut used: Vec<usize> = (0..self.points.len()).collect();
+        let mut points = self.points.to_vec();
+        let mut left_out = Vec::new();
+        let mut solver = self.solve(&points, self.form.theta(start));
+        for _ in 0..ROUNDS {
+            if self.serial {
+                self.expect_curvature(&mut points, &solver);
+                solver = self.solve(&points, *solver.theta());
+            }
+            let found = outliers(&Residuals::of(&self.model(&points), solver.theta()));
+            if found.is_empty() {
+                break;
+            }
+            for (index, size) in found.into_iter().rev() {
+                left_out.push((used.remove(index), size));
+                points.remove(index);
+            }
+            solver = self.solve(&points, *solver.theta());
+        }
+        left_out.sort_by_key(|(index, _)| *index);
+        NormFit { report: solver.report(), solver, points, used, left_out }
+    }
+
+    /// Sets the excess that the residuals' own noise makes on the curved shell.
+    fn expect_curvature(&self, points: &mut [ShellPoint<f64>], solver: &LevenbergMarquardt<f64, P>) {
+        let triad = self.form.triad(solver.theta());
+        let variance = solver.variance().unwrap_or(0.0);
+        for point in points {
+            point.excess = curvature_excess(&triad, self.norm, &point.value, variance);
+        }
+    }
+
+    /// Rms residual of observations left out of the fit, `folds` contiguous parts in turn; `None` where a part
+    /// cannot be fitted.
+    pub fn held_out_rms(&self, fit: &NormFit<P>, folds: usize) -> Option<f64> {
+        let count = fit.points.len();
+        let errors: Option<Vec<f64>> = (0..folds.min(count))
+            .into_par_iter()
+            .map(|fold| {
+                let (from, to) = (fold * count / folds.min(count), (fold + 1) * count / folds.min(count));
+                let kept: Vec<_> = fit.points[..from].iter().chain(&fit.points[to..]).copied().collect();
+                let solver = self.solve(&kept, *fit.solver.theta());
+                let residuals = Residuals::of(&self.model(&fit.points[from..to]), solver.theta());
+                solver.report().termination.was_successful().then(|| residuals.iter().map(|r| r * r).sum())
+            })
+            .collect();
+        Some((errors?.iter().sum::<f64>() / count as f64).sqrt())
+    }
+
+    /// Factor on each standard error for residuals alike in time; ones where they are independent.
+    pub fn inflation(&self, fit: &NormFit<P>) -> SVector<f64, P> {
+        match fit.solver.factor().covariance(1.0) {
+            Some(unscaled) if self.serial => {
+                serial::inflation(&Rows::of(&self.model(&fit.points), fit.solver.theta()), &unscaled)
+            }
+            _ => SVector::repeat(1.0),
+        }
+    }
+
+    /// Directions seen, as the fit sees them.
+    pub fn coverage(&self, fit: &NormFit<P>) -> Coverage<f64> {
+        let triad = self.form.triad(fit.solver.theta());
+        Coverage::of(fit.points.iter().map(|p| triad.correct(&p.value).normalize()))
+    }
+
+    /// Acceptance of the fit; the departure from a parabola is returned either way.
+    pub fn judge(
+        &self,
+        fit: &NormFit<P>,
+        coverage: &Coverage<f64>,
+        inflation: &SVector<f64, P>,
+        nominal: bool,
+        limits: &Limits,
+    ) -> (f64, Result<(), Refusal>) {
+        let bend = accept::nonlinearity(&fit.solver, &self.model(&fit.points), inflation.max());
+        let verdict = self.verdict(fit, coverage, bend, nominal, limits);
+        (bend, verdict)
+    }
+
+    fn verdict(
+        &self,
+        fit: &NormFit<P>,
+        coverage: &Coverage<f64>,
+        bend: f64,
+        nominal: bool,
+        limits: &Limits,
+    ) -> Result<(), Refusal> {
+        let triad = self.form.triad(fit.solver.theta());
+        accept::check_observations(coverage, P, limits)?;
+        accept::check_report(&fit.report, limits)?;
+        accept::check_nonlinearity(bend, limits)?;
+        accept::check_plausibility(&triad, nominal, fit.rms() / mean_radius(&triad, self.norm), limits)
+    }
+}
+
+/// Radius of the shell in raw units, on average over the axes.
+fn mean_radius(triad: &Triad<f64>, norm: f64) -> f64 {
+    norm / triad.gain.determinant().abs().cbrt()
+}
+
+impl<const P: usize> NormFit<P> {
+    /// Rms residual with the degrees of freedom left; NaN without any.
+    pub fn rms(&self) -> f64 {
+        self.solver.variance().map_or(f64::NAN, f64::sqrt)
+    }
+
+    /// Covariance of the parameters with inflated standard errors; infinite where the Jacobian is singular.
+    pub fn covariance(&self, inflation: &SVector<f64, P>) -> SMatrix<f64, P, P> {
+        let scale = SMatrix::from_diagonal(inflation);
+        self.solver
+            .covariance()
+            .map_or_else(|| SMatrix::repeat(f64::INFINITY), |classical| scale * classical * scale)
+    }
+}
+
+/// Directions before there is a fit: from the points' own middle, for a refusal of too little data.
+pub fn raw_coverage(points: &[ShellPoint<f64>], middle: &Vector3<f64>) -> Coverage<f64> {
+    Coverage::of(points.iter().map(|p| (p.value - middle).normalize()))
+}

@@ -1,0 +1,186 @@
+//! What a calibration came to: for each sensor a fit with its figures, accepted or refused with a reason.
+
+use imucal_core::{accept::Refusal, solver::Termination, triad::Triad};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::recording::{Nominal, SensorKind, Unit};
+
+/// A recording's calibration.
+#[derive(Clone, Debug)]
+pub struct Calibration {
+    /// File name of the recording.
+    pub recording: String,
+    /// Sensor's name, empty where the recording has none.
+    pub sensor_name: String,
+    /// Sensor's serial number, empty where the recording has none.
+    pub serial: String,
+    /// One outcome a sensor present, accelerometer first.
+    pub sensors: Vec<SensorOutcome>,
+    /// How the recording was cut into rests; `None` without an accelerometer.
+    pub segmentation: Option<SegmentationReport>,
+    /// What the user should know besides.
+    pub warnings: Vec<String>,
+}
+
+/// One sensor's outcome.
+#[derive(Clone, Debug)]
+pub struct SensorOutcome {
+    /// Which sensor.
+    pub kind: SensorKind,
+    /// Model's name: T9, T6, K9, E9.
+    pub model: &'static str,
+    /// Accepted, or refused with the reason.
+    pub verdict: Result<(), Refused>,
+    /// The fit, where there was enough to try one; of a refused sensor it is for information only.
+    pub fit: Option<FitSummary>,
+}
+
+/// A refusal and what to do about it.
+#[derive(Clone, Debug)]
+pub struct Refused {
+    /// The reason with its figures.
+    pub refusal: Refusal,
+    /// What to do.
+    pub advice: String,
+}
+
+/// A fit's figures. Input is in nominal SI; see [`FitSummary::raw_triad`] for the file's own unit.
+#[derive(Clone, Debug)]
+pub struct FitSummary {
+    /// The calibration, nominal SI in.
+    pub triad: Triad<f64>,
+    /// Standard errors of the gain's entries, zero where an entry is not estimated.
+    pub gain_std: Matrix3<f64>,
+    /// Standard errors of the bias, nominal SI.
+    pub bias_std: Vector3<f64>,
+    /// Unit of the recording and the raw input.
+    pub unit_in: Unit,
+    /// Unit of the calibrated output.
+    pub unit_out: Unit,
+    /// From the recording's unit to nominal SI.
+    pub nominal: Nominal,
+    /// Rms residual, calibrated unit (rad a turn for the gyroscope).
+    pub rms: f64,
+    /// The same for observations left out of the fit in turn.
+    pub held_out_rms: Option<f64>,
+    /// Observations used.
+    pub observations: usize,
+    /// Parameters estimated.
+    pub parameters: usize,
+    /// Condition of the Jacobian with columns at unit length.
+    pub condition: f64,
+    /// Share of the sphere of directions within reach of an observation.
+    pub coverage: f64,
+    /// Departure from a parabola within one standard error.
+    pub nonlinearity: f64,
+    /// Largest factor on a standard error for residuals alike in time; 1 where none was needed.
+    pub inflation: f64,
+    /// Solver steps.
+    pub iterations: u16,
+    /// Why the solver stopped.
+    pub termination: Termination,
+    /// Length of the calibrated field where it was not known beforehand, `unit_in`.
+    pub field_norm: Option<f64>,
+    /// Observations left out as gross outliers, in words.
+    pub left_out: Vec<String>,
+    /// Largest relative move of a diagonal gain over the thresholds of the rest test.
+    pub gain_spread: Option<f64>,
+    /// How the gyroscope's bias moved between rests.
+    pub bias_wander: Option<BiasWander>,
+}
+
+/// How a bias moved from rest to rest.
+#[derive(Clone, Copy, Debug)]
+pub struct BiasWander {
+    /// Standard deviation of the rests' means, rad/s.
+    pub spread: Vector3<f64>,
+    /// The same if only white noise moved them, rad/s.
+    pub expected: Vector3<f64>,
+    /// It wandered, so the bias was interpolated between neighbouring rests.
+    pub interpolated: bool,
+}
+
+impl FitSummary {
+    /// The calibration of raw values in the recording's own unit.
+    pub fn raw_triad(&self) -> Triad<f64> {
+        if self.in_raw_scale() {
+            Triad { gain: self.triad.gain, bias: self.raw_bias() }
+        } else {
+            self.triad.in_unit(self.nominal.offset, self.nominal.per_unit)
+        }
+    }
+
+    /// Standard errors of [`raw_triad`](Self::raw_triad): gain, bias.
+    pub fn raw_std(&self) -> (Matrix3<f64>, Vector3<f64>) {
+        let per = self.nominal.per_unit.abs();
+        let gain = if self.in_raw_scale() { self.gain_std } else { self.gain_std / per };
+        (gain, self.bias_std * per)
+    }
+
+    /// A magnetometer without a known field keeps the recording's unit: its gain has determinant 1.
+    fn in_raw_scale(&self) -> bool {
+        self.field_norm.is_some()
+    }
+
+    fn raw_bias(&self) -> Vector3<f64> {
+        self.triad.bias.map(|b| self.nominal.to_raw(b))
+    }
+}
+
+/// How the recording was cut into rests.
+#[derive(Clone, Debug)]
+pub struct SegmentationReport {
+    /// Rows of each rest, half-open.
+    pub rests: Vec<std::ops::Range<usize>>,
+    /// Chosen multiple of the initial rest's variance.
+    pub multiplier: f64,
+    /// The threshold it makes, (m/s²)².
+    pub threshold: f64,
+    /// The reference was the initial rest.
+    pub from_initial_rest: bool,
+    /// What each threshold tried came to.
+    pub trials: Vec<ThresholdTrial>,
+    /// Largest relative move of a diagonal gain, of any sensor, over the thresholds.
+    pub gain_spread: f64,
+}
+
+/// One threshold of the rest test.
+#[derive(Clone, Debug)]
+pub struct ThresholdTrial {
+    /// Multiple of the reference variance.
+    pub multiplier: f64,
+    /// Rests found.
+    pub rests: usize,
+    /// Accelerometer gain's diagonal, where it could be fitted.
+    pub acc_gain: Option<Vector3<f64>>,
+    /// Its rms residual, m/s².
+    pub acc_rms: Option<f64>,
+    /// Gyroscope gain's diagonal, where it could be fitted.
+    pub gyr_gain: Option<Vector3<f64>>,
+}
+
+impl Calibration {
+    /// The outcome of one sensor.
+    pub fn sensor(&self, kind: SensorKind) -> Option<&SensorOutcome> {
+        self.sensors.iter().find(|outcome| outcome.kind == kind)
+    }
+}
+
+impl SensorOutcome {
+    /// The fit of an accepted sensor.
+    pub fn accepted(&self) -> Option<&FitSummary> {
+        self.verdict.is_ok().then_some(self.fit.as_ref()).flatten()
+    }
+}
+
+/// Largest relative move of any diagonal gain among those given.
+pub fn gain_spread(gains: impl Iterator<Item = Vector3<f64>> + Clone) -> f64 {
+    (0..3)
+        .map(|axis| {
+            let (low, high) = gains.clone().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), g| {
+                (low.min(g[axis].abs()), high.max(g[axis].abs()))
+            });
+            if high > low { (high - low) / (0.5 * (high + low)) } else { 0.0 }
+        })
+        .fold(0.0, f64::max)
+}

@@ -1,0 +1,5 @@
+//! From samples to observations: rests, turns between them, and clouds.
+
+pub mod cloud;
+pub mod rest;
+pub mod turn;

@@ -1,0 +1,295 @@
+//! Rest detection: stretches in which the accelerometer shows its own noise and nothing else.
+//!
+//! A window's variance (sum over axes) is compared with a multiple of that of the initial rest; the multiple is
+//! swept, since no single one suits every hand and table. A rest is a run of window centres below the threshold,
+//! so it ends about half a window before the motion begins and holds none of it. Source: Tedaldi, Pretto &
+//! Menegatti 2014 (ICRA), section IV; the gyroscope's part and the fallback without an initial rest are ours.
+
+use std::ops::Range;
+
+use imucal_core::observation::{Moments, Rest};
+use nalgebra::Vector3;
+
+/// Window of the variance, s: long against vibration, short against a rest.
+pub const WINDOW: f64 = 1.0;
+/// The initial rest is looked for in this much of the recording, s.
+const INITIAL: f64 = 3.0;
+/// A rest lasts at least this long, s.
+pub const SHORTEST: f64 = 1.0;
+/// Above this mean rate against the bias the sensor turns, however smoothly, rad/s (3°/s).
+const TURNING: f64 = 0.052;
+/// The initial stretch counts as a rest unless it is this many times noisier than the quietest tenth.
+const INITIAL_EXCESS: f64 = 8.0;
+/// Rows further apart than this are single shots, each a rest of its own, s.
+const SHOT_INTERVAL: f64 = 0.2;
+/// A gap longer than this many usual intervals ends a rest.
+const GAP: f64 = 5.0;
+
+/// What rest detection looks at; all of equal length.
+#[derive(Clone, Copy, Debug)]
+pub struct Samples<'a> {
+    /// Time, s.
+    pub time: &'a [f64],
+    /// Accelerometer, nominal m/s².
+    pub acc: &'a [Vector3<f64>],
+    /// Gyroscope, nominal rad/s.
+    pub gyr: Option<&'a [Vector3<f64>]>,
+    /// Temperature, °C.
+    pub temperature: Option<&'a [f64]>,
+    /// Rows in which every sensor above is usable.
+    pub usable: &'a [bool],
+}
+
+/// Windowed variances of a recording and the noise of its initial rest: made once, cut at any threshold.
+#[derive(Clone, Debug)]
+pub struct RestDetector<'a> {
+    samples: Samples<'a>,
+    /// Variance of the window around each row, (m/s²)²; infinite where a row in it is not usable.
+    variance: Vec<f64>,
+    /// Mean rate of the window around each row, rad/s.
+    rate: Option<Vec<Vector3<f64>>>,
+    /// Variance of the reference rest, (m/s²)².
+    noise: f64,
+    /// The reference is the initial rest, not the quietest stretch.
+    from_initial: bool,
+    interval: f64,
+}
+
+/// Rests found at one threshold, as half-open row ranges in time order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segmentation {
+    /// Multiple of the reference variance.
+    pub multiplier: f64,
+    /// The threshold, (m/s²)².
+    pub threshold: f64,
+    /// Rows of each rest.
+    pub rests: Vec<Range<usize>>,
+}
+
+impl<'a> RestDetector<'a> {
+    /// Looks at a recording with the given usual interval, s.
+    pub fn new(samples: Samples<'a>, interval: f64) -> Self {
+        let half = ((WINDOW / 2.0 / interval).round() as usize).max(1);
+        let variance = windowed_variance(samples, half, GAP * interval);
+        let rate = samples.gyr.map(|gyr| windowed_mean(gyr, samples.usable, half));
+        let (noise, from_initial) = reference_noise(&variance, (INITIAL / interval).round() as usize, half);
+        Self { samples, variance, rate, noise, from_initial, interval }
+    }
+
+    /// Rows are single shots, seconds apart, each taken at rest.
+    pub fn is_shots(&self) -> bool {
+        self.interval > SHOT_INTERVAL
+    }
+
+    /// Variance of the reference rest, (m/s²)²; whether it is the initial rest rather than the quietest stretch.
+    pub fn noise(&self) -> (f64, bool) {
+        (self.noise, self.from_initial)
+    }
+
+    /// The rests at a multiple of the reference variance.
+    pub fn cut(&self, multiplier: f64) -> Segmentation {
+        let threshold = multiplier * self.noise;
+        let rests = if self.is_shots() { self.shots() } else { self.runs(threshold) };
+        Segmentation { multiplier, threshold, rests }
+    }
+
+    fn shots(&self) -> Vec<Range<usize>> {
+        (0..self.samples.time.len()).filter(|k| self.samples.usable[*k]).map(|k| k..k + 1).collect()
+    }
+
+    fn runs(&self, threshold: f64) -> Vec<Range<usize>> {
+        let quiet: Vec<bool> = self.variance.iter().map(|v| *v <= threshold).collect();
+        let quiet = match &self.rate {
+            Some(rate) => without_turning(quiet, rate),
+            None => quiet,
+        };
+        let mut rests = Vec::new();
+        let mut begin = None;
+        for k in 0..=quiet.len() {
+            let still = quiet.get(k).copied().unwrap_or(false);
+            match (still, begin) {
+                (true, None) => begin = Some(k),
+                (false, Some(first)) => {
+                    begin = None;
+                    if self.samples.time[k - 1] - self.samples.time[first] >= SHORTEST {
+                        rests.push(first..k);
+                    }
+                }
+                _ => {}
+            }
+        }
+        rests
+    }
+
+    /// Moments of a rest.
+    pub fn rest(&self, rows: &Range<usize>) -> Rest<f64> {
+        let mut rest = Rest {
+            time: 0.5 * (self.samples.time[rows.start] + self.samples.time[rows.end - 1]),
+            temperature: self.samples.temperature.map_or(f64::NAN, |t| mean_of_measured(&t[rows.clone()])),
+            ..Rest::default()
+        };
+        for k in rows.clone().filter(|k| self.samples.usable[*k]) {
+            rest.acc.push(&self.samples.acc[k]);
+            if let Some(gyr) = self.samples.gyr {
+                rest.gyr.push(&gyr[k]);
+            }
+        }
+        rest
+    }
+}
+
+fn mean_of_measured(values: &[f64]) -> f64 {
+    let (sum, count) =
+        values.iter().filter(|v| v.is_finite()).fold((0.0, 0u32), |(sum, count), v| (sum + v, count + 1));
+    sum / f64::from(count)
+}
+
+/// Cuts out what turns so smoothly that the accelerometer does not notice (about the vertical).
+fn without_turning(quiet: Vec<bool>, rate: &[Vector3<f64>]) -> Vec<bool> {
+    let bias = median_rate(&quiet, rate);
+    quiet.iter().zip(rate).map(|(still, w)| *still && (w - bias).norm() <= TURNING).collect()
+}
+
+fn median_rate(quiet: &[bool], rate: &[Vector3<f64>]) -> Vector3<f64> {
+    // Windows overlap, so every tenth tells as much as all.
+    let chosen: Vec<&Vector3<f64>> =
+        quiet.iter().zip(rate).filter(|(still, _)| **still).map(|(_, w)| w).step_by(10).collect();
+    Vector3::from_fn(|axis, _| median(chosen.iter().map(|w| w[axis]).collect()).unwrap_or(0.0))
+}
+
+/// Median of some values; `None` without any.
+pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let middle = values.len() / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Variance of the initial rest, or of the quietest tenth where the recording does not begin at rest.
+fn reference_noise(variance: &[f64], initial_rows: usize, half: usize) -> (f64, bool) {
+    let finite: Vec<f64> = variance.iter().copied().filter(|v| v.is_finite()).collect();
+    if finite.is_empty() {
+        return (0.0, false);
+    }
+    let initial = variance.get(half..initial_rows.max(half + 1).min(variance.len())).unwrap_or(&finite);
+    let initial = median(initial.to_vec()).unwrap_or(f64::INFINITY);
+    let mut sorted = finite;
+    let tenth = sorted.len() / 10;
+    let quietest = *sorted.select_nth_unstable_by(tenth, f64::total_cmp).1;
+    if initial <= INITIAL_EXCESS * quietest { (initial, true) } else { (quietest, false) }
+}
+
+/// Rows around each row that its window holds.
+fn window(k: usize, half: usize, rows: usize) -> Range<usize> {
+    k.saturating_sub(half)..(k + half + 1).min(rows)
+}
+
+fn windowed_variance(samples: Samples<'_>, half: usize, longest_gap: f64) -> Vec<f64> {
+    let rows = samples.acc.len();
+    let origin = samples.acc.iter().find(|v| v.iter().all(|x| x.is_finite())).copied().unwrap_or_default();
+    // Running sums from a value near the data: differences of sums then lose no digits that matter.
+    let mut sums = Vec::with_capacity(rows + 1);
+    let (mut sum, mut square, mut broken) = (Vector3::zeros(), 0.0, 0u32);
+    sums.push((sum, square, broken));
+    for k in 0..rows {
+        let gap = k > 0 && samples.time[k] - samples.time[k - 1] > longest_gap;
+        if samples.usable[k] && !gap {
+            let x = samples.acc[k] - origin;
+            sum += x;
+            square += x.norm_squared();
+        } else {
+            broken += 1;
+        }
+        sums.push((sum, square, broken));
+    }
+    (0..rows)
+        .map(|k| {
+            let w = window(k, half, rows);
+            let ((s1, q1, b1), (s0, q0, b0)) = (sums[w.end], sums[w.start]);
+            if b1 > b0 {
+                return f64::INFINITY;
+            }
+            let n = w.len() as f64;
+            ((q1 - q0) / n - ((s1 - s0) / n).norm_squared()).max(0.0)
+        })
+        .collect()
+}
+
+fn windowed_mean(values: &[Vector3<f64>], usable: &[bool], half: usize) -> Vec<Vector3<f64>> {
+    let rows = values.len();
+    let mut sums = Vec::with_capacity(rows + 1);
+    let mut sum = (Vector3::zeros(), 0u32);
+    sums.push(sum);
+    for (value, good) in values.iter().zip(usable) {
+        if *good {
+            sum = (sum.0 + value, sum.1 + 1);
+        }
+        sums.push(sum);
+    }
+    (0..rows)
+        .map(|k| {
+            let w = window(k, half, rows);
+            let ((s1, n1), (s0, n0)) = (sums[w.end], sums[w.start]);
+            (s1 - s0) / f64::from((n1 - n0).max(1))
+        })
+        .collect()
+}
+
+/// Spread of a rest's mean that its own samples explain, per axis.
+pub fn mean_std(moments: &Moments<f64>) -> Vector3<f64> {
+    moments.variance().map(|v| (v / f64::from(moments.count().max(1))).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT: f64 = 0.01;
+
+    /// 4 s at rest, 2 s of shaking, 4 s at rest.
+    fn shaken() -> (Vec<f64>, Vec<Vector3<f64>>) {
+        (0..1000)
+            .map(|k| {
+                let noise = if k % 2 == 0 { 0.01 } else { -0.01 };
+                let shake = if (400..600).contains(&k) { (k as f64 * 0.3).sin() } else { 0.0 };
+                (k as f64 * DT, Vector3::new(noise + shake, noise, 9.8 - noise))
+            })
+            .unzip()
+    }
+
+    #[test]
+    fn two_rests_around_a_motion_are_found_and_hold_none_of_it() {
+        let (time, acc) = shaken();
+        let usable = vec![true; time.len()];
+        let samples = Samples { time: &time, acc: &acc, gyr: None, temperature: None, usable: &usable };
+        let cut = RestDetector::new(samples, DT).cut(4.0);
+        assert_eq!(cut.rests.len(), 2, "{cut:?}");
+        assert!(cut.rests[0].end <= 400 && cut.rests[1].start >= 600);
+        assert!(cut.rests[0].len() > 300 && cut.rests[1].len() > 300);
+    }
+
+    #[test]
+    fn a_smooth_turn_about_the_vertical_is_no_rest() {
+        let (time, mut acc) = shaken();
+        acc.iter_mut().enumerate().for_each(|(k, a)| *a = Vector3::new(0.01 * f64::from(k as u8 % 2), 0.0, 9.8));
+        let gyr: Vec<_> = (0..1000)
+            .map(|k| if (400..600).contains(&k) { Vector3::new(0.1, 0.1, 1.0) } else { Vector3::new(0.1, 0.1, 0.1) })
+            .collect();
+        let usable = vec![true; time.len()];
+        let samples = Samples { time: &time, acc: &acc, gyr: Some(&gyr), temperature: None, usable: &usable };
+        let cut = RestDetector::new(samples, DT).cut(4.0);
+        assert_eq!(cut.rests.len(), 2, "{cut:?}");
+    }
+
+    #[test]
+    fn a_gap_or_an_unusable_row_ends_a_rest() {
+        let (mut time, acc) = shaken();
+        time.iter_mut().skip(200).for_each(|t| *t += 1.0);
+        let mut usable = vec![true; time.len()];
+        usable[800] = false;
+        let samples = Samples { time: &time, acc: &acc, gyr: None, temperature: None, usable: &usable };
+        let cut = RestDetector::new(samples, DT).cut(4.0);
+        assert!(cut.rests.iter().all(|r| !r.contains(&800) && !(r.contains(&199) && r.contains(&200))));
+    }
+}
