@@ -12,7 +12,7 @@
 //!
 //! Source: Secer & Barshan 2016, eq. (1) with h affine; the split of K is a reconstruction, since only the
 //! paper's first two pages were at hand. Not modelled: anything that is not affine in the input (quadratic
-//! scale, saturation, bandwidth), temperature (see [`crate::corrector`]).
+//! scale, saturation, bandwidth), temperature (see [`crate::temperature`]).
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -62,6 +62,20 @@ impl<T: Scalar> Triad<T> {
         }
     }
 
+    /// The rows of the gain are dependent, as far as `T` can tell: no raw sample could be told from another.
+    ///
+    /// The determinant is taken of rows scaled to a largest entry of one, so that the unit does not matter.
+    pub fn is_singular(&self) -> bool {
+        let mut rows = self.gain;
+        for mut row in rows.row_iter_mut() {
+            let largest = row.amax();
+            row.unscale_mut(largest);
+        }
+        // Below 64 ε the determinant is rounding error. A zero row makes it NaN, which is singular as well.
+        let independent = rows.determinant().abs() > T::EPSILON * T::of(64.0);
+        !independent
+    }
+
     /// Every entry is finite.
     pub fn is_finite(&self) -> bool {
         self.gain.iter().chain(self.bias.iter()).all(|x| x.finite())
@@ -99,6 +113,19 @@ mod tests {
             let counts = x * per_unit + Vector3::repeat(offset);
             let (a, b) = (t.correct(&x), t.in_unit(offset, per_unit).correct(&counts));
             prop_assert!((a - b).norm() < 1e-9 * (1.0 + a.norm()));
+        }
+    }
+
+    #[test]
+    fn singular_is_a_matter_of_direction_and_not_of_unit() {
+        let with = |gain: Matrix3<f32>| Triad {
+            gain,
+            bias: Vector3::zeros(),
+        };
+        for unit in [1e-20, 1.0, 1e15] {
+            assert!(!with(Matrix3::new(1.0, 0.1, 0.1, 0.0, 1.0, 0.1, 0.0, 0.0, 1.0) * unit).is_singular());
+            assert!(with(Matrix3::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0) * unit).is_singular());
+            assert!(with(Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) * unit).is_singular());
         }
     }
 
