@@ -16,3 +16,9 @@ extern crate std;
 
 pub mod scalar;
 pub mod triad;
+
+pub mod temperature;
+
+pub mod record;
+
+pub mod corrector;
