@@ -42,8 +42,9 @@ impl<T: Scalar> TemperatureTerms<T> {
     #[inline]
     pub fn correct(&self, triad: &Triad<T>, raw: &Vector3<T>, temperature: T) -> Vector3<T> {
         let change = self.change(temperature);
-        self.factor(change)
-            .component_mul(&triad.correct(&(raw - self.drift(change))))
+        let (drift, factor) = (self.drift(change), self.factor(change));
+        let value = triad.correct(&Vector3::new(raw.x - drift.x, raw.y - drift.y, raw.z - drift.z));
+        Vector3::new(value.x * factor.x, value.y * factor.y, value.z * factor.z)
     }
 
     /// What the sensor would put out at `temperature` °C for a calibrated value.
@@ -88,12 +89,18 @@ impl<T: Scalar> TemperatureTerms<T> {
 
     #[inline]
     fn drift(&self, change: T) -> Vector3<T> {
-        Vector3::from(self.bias_slope) * change
+        let [x, y, z] = self.bias_slope;
+        Vector3::new(x * change, y * change, z * change)
     }
 
     #[inline]
     fn factor(&self, change: T) -> Vector3<T> {
-        Vector3::repeat(T::one()) + Vector3::from(self.scale_slope) * change
+        let [x, y, z] = self.scale_slope;
+        Vector3::new(
+            T::one() + x * change,
+            T::one() + y * change,
+            T::one() + z * change,
+        )
     }
 }
 

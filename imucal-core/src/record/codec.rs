@@ -3,8 +3,8 @@
 use core::fmt;
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
-use postcard::ser_flavors::Size;
 
+use super::payload::serialize;
 use super::{CalibrationRecord, Defect};
 
 /// Major and minor version of the format this library writes.
@@ -116,18 +116,18 @@ pub enum DecodeError {
 pub fn encode<'b>(record: &CalibrationRecord, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError> {
     record.check().map_err(EncodeError::Unusable)?;
     let have = buffer.len();
-    // Size counts and cannot fail; MAX_LEN, should it ever, is true of every record.
-    let payload = postcard::serialize_with_flavor(record, Size::default()).unwrap_or(longest::RECORD);
+    // Serialising has no way to fail; were there one, the longest record asks for the largest buffer.
+    let room = buffer.get_mut(HEADER..).unwrap_or_default();
+    let payload = serialize(record, room).unwrap_or(longest::RECORD);
     let need = HEADER + payload + CHECKSUM;
     let short = EncodeError::BufferTooSmall { have, need };
 
     let whole = buffer.get_mut(..need).ok_or(short)?;
     let (checked, checksum) = whole.split_last_chunk_mut::<CHECKSUM>().ok_or(short)?;
-    let (header, body) = checked.split_first_chunk_mut::<HEADER>().ok_or(short)?;
+    let header = checked.first_chunk_mut::<HEADER>().ok_or(short)?;
     let [a, b] = (payload as u16).to_le_bytes();
     let [m, u, c, l] = MAGIC;
     *header = [m, u, c, l, VERSION.0, VERSION.1, a, b];
-    postcard::to_slice(record, body).map_err(|_| short)?;
     *checksum = CRC.checksum(checked).to_le_bytes();
     Ok(whole)
 }

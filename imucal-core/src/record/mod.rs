@@ -15,8 +15,8 @@
 //! * **major, minor** before the length: a reader knows whether the rest means what it thinks it means.
 //! * **n** frames the payload, so that an older reader can step over fields appended after its time.
 //! * **payload**: [`CalibrationRecord`] in postcard 1, fields in the order of declaration. `f32` is 4 bytes,
-//!   integers wider than a byte and lengths are LEB128 varints, an `Option` is a byte 0 or 1 and then the value, an
-//!   enum is its variant's position, text is a length and UTF-8. Arrays carry no length.
+//!   integers wider than a byte and lengths are LEB128 varints, an `Option` is a byte 0 or 1 and then the value, a
+//!   unit is a byte, text is a length and UTF-8. Arrays carry no length.
 //! * **CRC-32** (ISO-HDLC: polynomial 0x04C11DB7 reflected, initial value and final xor 0xFFFF_FFFF, as in zlib)
 //!   over everything before it. It finds damage, not forgery.
 //!
@@ -33,6 +33,7 @@
 mod codec;
 mod date;
 mod identity;
+mod payload;
 mod validity;
 
 pub use codec::{DecodeError, EncodeError, MAX_LEN, VERSION, decode, encode};
@@ -138,12 +139,11 @@ impl TriadRecord {
     /// Gain and bias to compute with, in either precision; `f64` holds the stored numbers exactly.
     #[inline]
     pub fn triad<T: Scalar>(&self) -> Triad<T> {
-        let [x, y, z] = self
-            .gain
-            .map(|row| Vector3::from(row.map(|entry| T::of(f64::from(entry)))).transpose());
+        let of = |entry: f32| T::of(f64::from(entry));
+        let [[a, b, c], [d, e, f], [g, h, i]] = self.gain.map(|row| row.map(of));
         Triad {
-            gain: Matrix3::from_rows(&[x, y, z]),
-            bias: Vector3::from(self.bias.map(|entry| T::of(f64::from(entry)))),
+            gain: Matrix3::new(a, b, c, d, e, f, g, h, i),
+            bias: Vector3::from(self.bias.map(of)),
         }
     }
 }
@@ -176,6 +176,7 @@ pub struct FitQuality {
 ///
 /// The order of the variants is the record's format: append only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(into = "u8", try_from = "u8")]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RawUnit {
@@ -242,14 +243,33 @@ impl RawUnit {
     }
 }
 
+impl From<RawUnit> for u8 {
+    /// The position in [`RawUnit::ALL`], as the record has it.
+    fn from(unit: RawUnit) -> Self {
+        unit as Self
+    }
+}
+
+impl TryFrom<u8> for RawUnit {
+    type Error = &'static str;
+
+    fn try_from(position: u8) -> Result<Self, Self::Error> {
+        Self::ALL
+            .get(usize::from(position))
+            .copied()
+            .ok_or("no unit of this version")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn every_unit_is_found_by_its_symbol_and_by_no_other_case() {
+    fn every_unit_is_found_by_its_symbol_and_its_position() {
         for unit in RawUnit::ALL {
             assert_eq!(RawUnit::from_symbol(unit.symbol()), Some(unit));
+            assert_eq!(RawUnit::try_from(u8::from(unit)), Ok(unit));
         }
         assert_eq!(RawUnit::from_symbol("MG"), None);
     }

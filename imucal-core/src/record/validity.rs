@@ -31,7 +31,7 @@ pub enum Defect {
         /// Where.
         figures: Figures,
     },
-    /// A gain whose rows are dependent: see [`is_singular`](crate::triad::Triad::is_singular).
+    /// a gain whose columns are dependent: see [`is_singular`](crate::triad::Triad::is_singular).
     Singular {
         /// Whose.
         sensor: Sensor,
@@ -66,34 +66,34 @@ impl CalibrationRecord {
     ///
     /// The first [`Defect`], in the order of [`Sensor::ALL`].
     pub fn check(&self) -> Result<(), Defect> {
-        self.triads().try_for_each(|(sensor, triad)| triad.check(sensor))
+        let check = |sensor| self.triad(sensor).map_or(Ok(()), |triad| triad.check(sensor));
+        check(Sensor::Accelerometer)?;
+        check(Sensor::Gyroscope)?;
+        check(Sensor::Magnetometer)
     }
 }
 
 impl TriadRecord {
+    #[inline(never)]
     fn check(&self, sensor: Sensor) -> Result<(), Defect> {
+        let not_finite = |figures| Err(Defect::NotFinite { sensor, figures });
+        if !finite(self.gain.as_flattened()) {
+            return not_finite(Figures::Gain);
+        }
+        if !finite(&self.bias) {
+            return not_finite(Figures::Bias);
+        }
+        if self.temperature.as_ref().is_some_and(|terms| !terms.is_finite()) {
+            return not_finite(Figures::Temperature);
+        }
         let quality = &self.quality;
-        let marks = [
-            quality.rms,
-            quality.held_out_rms.unwrap_or(0.0),
-            quality.condition,
-            quality.coverage,
-            quality.field_norm.unwrap_or(0.0),
-        ];
-        let groups = [
-            (Figures::Gain, finite(self.gain.as_flattened())),
-            (Figures::Bias, finite(&self.bias)),
-            (
-                Figures::Temperature,
-                self.temperature.is_none_or(|terms| terms.is_finite()),
-            ),
-            (
-                Figures::Quality,
-                finite(quality.gain_std.as_flattened()) && finite(&quality.bias_std) && finite(&marks),
-            ),
-        ];
-        if let Some((figures, _)) = groups.into_iter().find(|(_, finite)| !finite) {
-            return Err(Defect::NotFinite { sensor, figures });
+        if !finite(quality.gain_std.as_flattened())
+            || !finite(&quality.bias_std)
+            || !finite(&[quality.rms, quality.condition, quality.coverage])
+            || !finite(quality.held_out_rms.as_slice())
+            || !finite(quality.field_norm.as_slice())
+        {
+            return not_finite(Figures::Quality);
         }
         if self.triad::<f32>().is_singular() {
             return Err(Defect::Singular { sensor });
@@ -102,6 +102,7 @@ impl TriadRecord {
     }
 }
 
+#[inline(never)]
 fn finite(figures: &[f32]) -> bool {
     figures.iter().all(|figure| figure.is_finite())
 }

@@ -18,7 +18,7 @@ fn figure() -> impl Strategy<Value = f32> {
 /// Any record that can be used: gains with a dominant diagonal, every other figure whatever is finite.
 fn triad() -> impl Strategy<Value = TriadRecord> {
     let gain = (uniform9(-0.3f32..0.3), -6i32..6).prop_map(|(skew, decade)| {
-        let entry = |i: usize| (skew[i] + if i % 4 == 0 { 1.0 } else { 0.0 }) * 10f32.powi(decade);
+        let entry = |i: usize| (skew[i] + if i.is_multiple_of(4) { 1.0 } else { 0.0 }) * 10f32.powi(decade);
         [
             [entry(0), entry(1), entry(2)],
             [entry(3), entry(4), entry(5)],
