@@ -21,6 +21,8 @@ pub mod rotation;
 
 pub mod triad;
 
+pub mod temperature;
+
 pub mod observation;
 
 pub mod model;
@@ -30,3 +32,7 @@ pub mod solver;
 pub mod coverage;
 
 pub mod accept;
+
+pub mod record;
+
+pub mod corrector;

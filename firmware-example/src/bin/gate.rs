@@ -1,0 +1,35 @@
+//! Calls everything a device may want of the core, so that the link proves it free of panics and of an allocator.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let status = if runs() { 0 } else { firmware_example::FAILED };
+    semihosting::process::exit(status)
+}
+
+/// `black_box` keeps the compiler from computing the answer itself.
+#[cfg(target_os = "none")]
+fn runs() -> bool {
+    use core::hint::black_box;
+    use firmware_example::{RECORD, correct};
+    use imucal_core::record;
+    use nalgebra::Vector3;
+
+    #[cfg(feature = "control-panic")]
+    let _ = black_box(RECORD[black_box(7)]);
+
+    let Some(corrector) = correct::accelerometer(black_box(RECORD), black_box("00300017")) else {
+        return false;
+    };
+    let raw = black_box(Vector3::repeat(32_768.0));
+    black_box(correct::apply(&corrector, &raw));
+    black_box(correct::apply_at(&corrector, &raw, black_box(31.0)));
+
+    let mut page = [0xFF; record::MAX_LEN];
+    record::decode(black_box(RECORD))
+        .is_ok_and(|record| record::encode(black_box(&record), &mut page) == Ok(RECORD))
+}
+
+#[cfg(not(target_os = "none"))]
+fn main() {}

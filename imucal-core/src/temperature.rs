@@ -1,0 +1,183 @@
+//! What warmth does to a triad: to first order, a bias that drifts and a scale that drifts.
+//!
+//! ```text
+//! Δ          = θ − θ₀
+//! calibrated = (1 + s·Δ) ∘ gain · (raw − bias − β·Δ)            correct, on the device
+//! raw        = gain⁻¹ · (calibrated ⊘ (1 + s·Δ)) + bias + β·Δ    predict, in the simulator
+//! ```
+//!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | θ, θ₀ | the sensor's temperature, and that at which `gain` and `bias` hold, °C |
+//! | β | [`bias_slope`](TemperatureTerms::bias_slope) |
+//! | s | [`scale_slope`](TemperatureTerms::scale_slope) |
+//! | ∘, ⊘ | product and quotient axis by axis |
+//!
+//! Source: the temperature terms of IEEE Std 1293, cut after the first order. Not modelled: second order, drift of
+//! the axes' directions, hysteresis, and the lag between the thermometer and the sensing element.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::scalar::Scalar;
+use crate::triad::Triad;
+
+/// First-order temperature dependence of a [`Triad`]. Plain arrays, since a record stores them as they stand.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct TemperatureTerms<T> {
+    /// θ₀, °C: where the triad holds as it is. Usually the mean temperature of the calibration.
+    pub reference: T,
+    /// β, raw unit per kelvin, sensor axes: growth of the bias.
+    pub bias_slope: [T; 3],
+    /// s, per kelvin, calibrated axes: relative growth of the corrected value. Well below 0.01 on real sensors.
+    pub scale_slope: [T; 3],
+}
+
+impl<T: Scalar> TemperatureTerms<T> {
+    /// A raw sample, sensor axes and raw unit, taken at `temperature` °C, to calibrated axes and unit.
+    ///
+    /// A temperature that is not finite counts as the reference: a dead thermometer costs the temperature
+    /// correction and not the sample.
+    #[inline]
+    pub fn correct(&self, triad: &Triad<T>, raw: &Vector3<T>, temperature: T) -> Vector3<T> {
+        let change = self.change(temperature);
+        let (drift, factor) = (self.drift(change), self.factor(change));
+        let value = triad.correct(&Vector3::new(raw.x - drift.x, raw.y - drift.y, raw.z - drift.z));
+        Vector3::new(value.x * factor.x, value.y * factor.y, value.z * factor.z)
+    }
+
+    /// What the sensor would put out at `temperature` °C for a calibrated value.
+    ///
+    /// `None` where the gain is singular or the scale has drifted to zero, which nothing can undo.
+    pub fn predict(&self, triad: &Triad<T>, calibrated: &Vector3<T>, temperature: T) -> Option<Vector3<T>> {
+        let change = self.change(temperature);
+        let factor = self.factor(change);
+        if factor.iter().any(|f| *f == T::zero()) {
+            return None;
+        }
+        Some(triad.predict(&calibrated.component_div(&factor))? + self.drift(change))
+    }
+
+    /// Every term is finite.
+    pub fn is_finite(&self) -> bool {
+        self.reference.finite()
+            && self
+                .bias_slope
+                .iter()
+                .chain(&self.scale_slope)
+                .all(|x| x.finite())
+    }
+
+    /// The same terms in another precision.
+    pub fn cast<U: Scalar>(&self) -> TemperatureTerms<U> {
+        TemperatureTerms {
+            reference: U::of(self.reference.wide()),
+            bias_slope: self.bias_slope.map(|x| U::of(x.wide())),
+            scale_slope: self.scale_slope.map(|x| U::of(x.wide())),
+        }
+    }
+
+    #[inline]
+    fn change(&self, temperature: T) -> T {
+        if temperature.finite() {
+            temperature - self.reference
+        } else {
+            T::zero()
+        }
+    }
+
+    #[inline]
+    fn drift(&self, change: T) -> Vector3<T> {
+        let [x, y, z] = self.bias_slope;
+        Vector3::new(x * change, y * change, z * change)
+    }
+
+    #[inline]
+    fn factor(&self, change: T) -> Vector3<T> {
+        let [x, y, z] = self.scale_slope;
+        Vector3::new(
+            T::one() + x * change,
+            T::one() + y * change,
+            T::one() + z * change,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix3;
+    use proptest::array::{uniform3, uniform6};
+    use proptest::prelude::*;
+
+    fn triad() -> impl Strategy<Value = Triad<f64>> {
+        (
+            uniform3(0.8f64..1.2),
+            uniform6(-0.1f64..0.1),
+            uniform3(-50.0f64..50.0),
+        )
+            .prop_map(|(s, k, b)| Triad {
+                gain: Matrix3::new(s[0], k[0], k[1], k[2], s[1], k[3], k[4], k[5], s[2]),
+                bias: Vector3::from(b),
+            })
+    }
+
+    /// Terms some ten times worse than sensors have them.
+    fn terms() -> impl Strategy<Value = TemperatureTerms<f64>> {
+        (0.0f64..50.0, uniform3(-0.5f64..0.5), uniform3(-0.003f64..0.003)).prop_map(
+            |(reference, bias_slope, scale_slope)| TemperatureTerms {
+                reference,
+                bias_slope,
+                scale_slope,
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn correct_undoes_predict_at_every_temperature(t in triad(), w in terms(),
+                x in uniform3(-100.0f64..100.0), temperature in -40.0f64..85.0) {
+            let x = Vector3::from(x);
+            let raw = w.predict(&t, &x, temperature).unwrap();
+            prop_assert!((w.correct(&t, &raw, temperature) - x).norm() < 1e-11 * (1.0 + x.norm()));
+        }
+
+        #[test]
+        fn at_the_reference_the_terms_change_nothing(t in triad(), w in terms(), raw in uniform3(-100.0f64..100.0)) {
+            let raw = Vector3::from(raw);
+            prop_assert_eq!(w.correct(&t, &raw, w.reference), t.correct(&raw));
+        }
+    }
+
+    fn example() -> TemperatureTerms<f32> {
+        TemperatureTerms {
+            reference: 25.0,
+            bias_slope: [0.5, 0.0, -0.25],
+            scale_slope: [0.0, 1e-3, -0.1],
+        }
+    }
+
+    #[test]
+    fn bias_and_scale_drift_with_their_own_signs() {
+        let got = example().correct(&Triad::identity(), &Vector3::new(10.0, 10.0, 10.0), 29.0);
+        assert!((got - Vector3::new(8.0, 10.04, 6.6)).norm() < 1e-5, "{got}");
+    }
+
+    #[test]
+    fn a_dead_thermometer_counts_as_the_reference() {
+        let raw = Vector3::new(1.0, 2.0, 3.0);
+        for dead in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            assert_eq!(example().correct(&Triad::identity(), &raw, dead), raw);
+        }
+    }
+
+    #[test]
+    fn a_scale_that_has_drifted_to_zero_has_no_prediction() {
+        assert!(
+            example()
+                .predict(&Triad::identity(), &Vector3::x(), 35.0)
+                .is_none()
+        );
+    }
+}

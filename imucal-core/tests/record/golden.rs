@@ -1,0 +1,144 @@
+//! A record and its bytes, put together without the encoder.
+
+use imucal_core::record::{CalibrationRecord, Date, FitQuality, RawUnit, SensorIdentity, TriadRecord};
+use imucal_core::temperature::TemperatureTerms;
+
+pub const GOLDEN: &[u8] = include_bytes!("../golden/record-1.0.bin");
+
+/// Figures of a real unit, one sensor with temperature terms and one without.
+pub fn golden_record() -> CalibrationRecord {
+    let quality = FitQuality {
+        gain_std: [
+            [1.5e-7, 3.1e-7, 1.1e-6],
+            [0.0, 8.2e-8, 2.9e-7],
+            [0.0, 0.0, 9.2e-8],
+        ],
+        bias_std: [0.24, 0.14, 0.15],
+        rms: 0.00112,
+        held_out_rms: Some(0.00125),
+        observations: 300,
+        parameters: 9,
+        condition: 17.3,
+        coverage: 0.91,
+        field_norm: None,
+    };
+    CalibrationRecord {
+        sensor: SensorIdentity {
+            name: "Xsens MTi".parse().unwrap(),
+            serial: "00300017".parse().unwrap(),
+        },
+        date: Date::from_days(20_000),
+        acc: Some(TriadRecord {
+            gain: [
+                [0.0024130, -8.23e-6, -2.242e-5],
+                [0.0, 0.0024270, -5.153e-5],
+                [0.0, 0.0, 0.0024118],
+            ],
+            bias: [33123.838, 33275.163, 32364.494],
+            unit_in: RawUnit::Counts,
+            unit_out: RawUnit::MetrePerSecondSquared,
+            model: "T9".parse().unwrap(),
+            temperature: Some(TemperatureTerms {
+                reference: 25.0,
+                bias_slope: [1.5, -0.75, 0.25],
+                scale_slope: [1e-4, -2e-4, 5e-5],
+            }),
+            quality,
+        }),
+        gyr: None,
+        mag: Some(TriadRecord {
+            gain: [[1.1, 0.01, 0.02], [0.01, 0.9, -0.03], [0.02, -0.03, 1.0123]],
+            bias: [12.5, -40.0, 7.25],
+            unit_in: RawUnit::MilliGauss,
+            unit_out: RawUnit::Arbitrary,
+            model: "E9".parse().unwrap(),
+            temperature: None,
+            quality: FitQuality {
+                held_out_rms: None,
+                field_norm: Some(475.0),
+                ..quality
+            },
+        }),
+    }
+}
+
+/// The same bytes, put together from the layout drawing without the library's encoder or serde.
+pub fn by_hand() -> Vec<u8> {
+    let floats = |out: &mut Vec<u8>, figures: &[f32]| {
+        figures.iter().for_each(|f| out.extend(f.to_le_bytes()));
+    };
+    let text = |out: &mut Vec<u8>, text: &str| {
+        out.push(text.len() as u8);
+        out.extend(text.as_bytes());
+    };
+    let gain_std = [1.5e-7, 3.1e-7, 1.1e-6, 0.0, 8.2e-8, 2.9e-7, 0.0, 0.0, 9.2e-8];
+
+    let mut payload = Vec::new();
+    text(&mut payload, "Xsens MTi");
+    text(&mut payload, "00300017");
+    payload.extend([0xA0, 0x9C, 0x01]); // 20 000 days
+
+    payload.push(1); // accelerometer
+    floats(
+        &mut payload,
+        &[
+            0.0024130, -8.23e-6, -2.242e-5, 0.0, 0.0024270, -5.153e-5, 0.0, 0.0, 0.0024118,
+        ],
+    );
+    floats(&mut payload, &[33123.838, 33275.163, 32364.494]);
+    payload.extend([3, 0]); // counts to m/s^2
+    text(&mut payload, "T9");
+    payload.push(1);
+    floats(&mut payload, &[25.0, 1.5, -0.75, 0.25, 1e-4, -2e-4, 5e-5]);
+    floats(&mut payload, &gain_std);
+    floats(&mut payload, &[0.24, 0.14, 0.15, 0.00112]);
+    payload.push(1);
+    floats(&mut payload, &[0.00125]);
+    payload.extend([0xAC, 0x02, 9]); // 300 observations, 9 parameters
+    floats(&mut payload, &[17.3, 0.91]);
+    payload.push(0);
+
+    payload.push(0); // no gyroscope
+
+    payload.push(1); // magnetometer
+    floats(
+        &mut payload,
+        &[1.1, 0.01, 0.02, 0.01, 0.9, -0.03, 0.02, -0.03, 1.0123],
+    );
+    floats(&mut payload, &[12.5, -40.0, 7.25]);
+    payload.extend([7, 10]); // mG to a.u.
+    text(&mut payload, "E9");
+    payload.push(0);
+    floats(&mut payload, &gain_std);
+    floats(&mut payload, &[0.24, 0.14, 0.15, 0.00112]);
+    payload.push(0);
+    payload.extend([0xAC, 0x02, 9]);
+    floats(&mut payload, &[17.3, 0.91]);
+    payload.push(1);
+    floats(&mut payload, &[475.0]);
+
+    framed(1, 0, &payload)
+}
+
+pub fn framed(major: u8, minor: u8, payload: &[u8]) -> Vec<u8> {
+    let mut bytes = b"IMUC".to_vec();
+    bytes.extend([major, minor]);
+    bytes.extend((payload.len() as u16).to_le_bytes());
+    bytes.extend(payload);
+    let checksum = crc32(&bytes);
+    bytes.extend(checksum.to_le_bytes());
+    bytes
+}
+
+/// CRC-32 as its definition has it, bit by bit.
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
+            (crc >> 1) ^ (0xEDB8_8320 & (crc & 1).wrapping_neg())
+        })
+    })
+}
+
+pub fn golden_payload() -> &'static [u8] {
+    &GOLDEN[8..GOLDEN.len() - 4]
+}

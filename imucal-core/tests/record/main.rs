@@ -1,0 +1,242 @@
+//! The record's format, from outside: its bytes, its versions, and what becomes of damaged ones.
+//!
+//! The golden bytes were assembled by [`golden::by_hand`] from the layout drawing in `imucal_core::record`, not by the
+//! encoder. Each version keeps its file for ever; `cargo test -p imucal-core --test record -- --ignored`
+//! writes that of a new one, and refuses to touch one that exists.
+
+mod golden;
+mod properties;
+
+use golden::{GOLDEN, by_hand, framed, golden_payload, golden_record};
+use imucal_core::record::{
+    CalibrationRecord, Date, DecodeError, Defect, EncodeError, Figures, FitQuality, MAX_LEN, RawUnit, Sensor,
+    SensorIdentity, TriadRecord, VERSION, decode, encode,
+};
+
+#[test]
+#[ignore = "writes the golden bytes of a new version"]
+fn write_golden_bytes() {
+    use std::io::Write;
+    let path = format!(
+        "{}/tests/golden/record-{}.{}.bin",
+        env!("CARGO_MANIFEST_DIR"),
+        VERSION.0,
+        VERSION.1
+    );
+    let mut file = std::fs::File::create_new(path).expect("golden bytes exist and are never written again");
+    file.write_all(&by_hand()).unwrap();
+}
+
+#[test]
+fn the_golden_bytes_are_those_of_the_layout_drawing() {
+    assert_eq!(GOLDEN, by_hand());
+}
+
+#[test]
+fn the_golden_bytes_are_read_and_written_unchanged() {
+    assert_eq!(decode(GOLDEN), Ok(golden_record()));
+    assert_eq!(encode(&golden_record(), &mut [0; MAX_LEN]), Ok(GOLDEN));
+}
+
+#[test]
+fn every_truncation_says_how_much_is_missing() {
+    for have in 0..GOLDEN.len() {
+        let need = if have < 8 { 12 } else { GOLDEN.len() };
+        assert_eq!(
+            decode(&GOLDEN[..have]),
+            Err(DecodeError::Truncated { have, need })
+        );
+    }
+}
+
+#[test]
+fn every_single_bit_flip_is_found() {
+    for bit in 0..GOLDEN.len() * 8 {
+        let mut bytes = GOLDEN.to_vec();
+        bytes[bit / 8] ^= 1 << (bit % 8);
+        let refusal = decode(&bytes).unwrap_err();
+        match bit / 8 {
+            0..4 => assert_eq!(refusal, DecodeError::BadMagic),
+            4 => assert!(matches!(
+                refusal,
+                DecodeError::UnsupportedVersion { supported: 1, .. }
+            )),
+            6..8 => assert!(matches!(
+                refusal,
+                DecodeError::Truncated { .. } | DecodeError::BadCrc { .. }
+            )),
+            _ => assert!(
+                matches!(refusal, DecodeError::BadCrc { .. }),
+                "bit {bit}: {refusal}"
+            ),
+        }
+    }
+}
+
+#[test]
+fn what_follows_the_record_is_not_looked_at() {
+    let mut page = GOLDEN.to_vec();
+    page.resize(2048, 0xFF);
+    assert_eq!(decode(&page), Ok(golden_record()));
+}
+
+#[test]
+fn foreign_bytes_are_no_record() {
+    for foreign in [
+        &[0xFF; 600][..],
+        &[0; 600],
+        b"# time,acc_x,acc_y,acc_z",
+        b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0",
+    ] {
+        assert_eq!(decode(foreign), Err(DecodeError::BadMagic));
+    }
+}
+
+#[test]
+fn another_major_is_refused_even_if_intact() {
+    for found in [0, 2, 255] {
+        let refusal = DecodeError::UnsupportedVersion { found, supported: 1 };
+        assert_eq!(decode(&framed(found, 0, golden_payload())), Err(refusal));
+    }
+}
+
+#[test]
+fn a_newer_minor_with_appended_fields_is_read() {
+    let mut payload = golden_payload().to_vec();
+    payload.extend([1, 2, 3, 4, 5]);
+    payload.resize(3000, 0x55);
+    assert_eq!(decode(&framed(1, VERSION.1 + 1, &payload)), Ok(golden_record()));
+    assert_eq!(decode(&framed(1, 255, golden_payload())), Ok(golden_record()));
+}
+
+#[test]
+fn bytes_after_the_last_field_of_this_minor_are_a_faulty_writer() {
+    let mut payload = golden_payload().to_vec();
+    payload.push(0);
+    assert_eq!(
+        decode(&framed(1, VERSION.1, &payload)),
+        Err(DecodeError::Malformed)
+    );
+}
+
+#[test]
+fn an_unknown_unit_is_malformed() {
+    let unit_in = 9 + 1 + 8 + 1 + 3 + 1 + 48;
+    let mut payload = golden_payload().to_vec();
+    assert_eq!(payload[unit_in], 3);
+    payload[unit_in] = RawUnit::ALL.len() as u8;
+    assert_eq!(decode(&framed(1, 0, &payload)), Err(DecodeError::Malformed));
+}
+
+/// Refused by the encoder, and by the decoder when a faulty writer let it pass.
+fn refused_both_ways(
+    spoil: impl FnOnce(&mut TriadRecord),
+    payload_at: usize,
+    figures: &[f32],
+    defect: Defect,
+) {
+    let mut record = golden_record();
+    spoil(record.acc.as_mut().unwrap());
+    assert_eq!(
+        encode(&record, &mut [0; MAX_LEN]),
+        Err(EncodeError::Unusable(defect))
+    );
+
+    let mut payload = golden_payload().to_vec();
+    for (slot, figure) in payload[payload_at..].chunks_exact_mut(4).zip(figures) {
+        slot.copy_from_slice(&figure.to_le_bytes());
+    }
+    assert_eq!(
+        decode(&framed(1, 0, &payload)),
+        Err(DecodeError::Unusable(defect))
+    );
+}
+
+#[test]
+fn figures_that_are_not_finite_are_refused_both_ways() {
+    let sensor = Sensor::Accelerometer;
+    let at = |figures| Defect::NotFinite { sensor, figures };
+    let gain = 9 + 1 + 8 + 1 + 3 + 1;
+    let temperature = gain + 48 + 2 + 3 + 1;
+    refused_both_ways(
+        |acc| acc.gain[0][0] = f32::NAN,
+        gain,
+        &[f32::NAN],
+        at(Figures::Gain),
+    );
+    refused_both_ways(
+        |acc| acc.bias[0] = f32::INFINITY,
+        gain + 36,
+        &[f32::INFINITY],
+        at(Figures::Bias),
+    );
+    refused_both_ways(
+        |acc| acc.temperature.as_mut().unwrap().reference = f32::NAN,
+        temperature,
+        &[f32::NAN],
+        at(Figures::Temperature),
+    );
+    refused_both_ways(
+        |acc| acc.quality.gain_std[0][0] = f32::NEG_INFINITY,
+        temperature + 28,
+        &[f32::NEG_INFINITY],
+        at(Figures::Quality),
+    );
+}
+
+#[test]
+fn a_singular_gain_is_refused_both_ways() {
+    let gain = 9 + 1 + 8 + 1 + 3 + 1;
+    let defect = Defect::Singular {
+        sensor: Sensor::Accelerometer,
+    };
+    refused_both_ways(|acc| acc.gain = [[0.0; 3]; 3], gain, &[0.0; 9], defect);
+    let flat = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0];
+    refused_both_ways(
+        |acc| acc.gain = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]],
+        gain,
+        &flat,
+        defect,
+    );
+}
+
+/// No field could be longer.
+fn longest_record() -> CalibrationRecord {
+    let golden = golden_record();
+    let triad = Some(TriadRecord {
+        model: "12345678".parse().unwrap(),
+        quality: FitQuality {
+            observations: u32::MAX,
+            held_out_rms: Some(1.0),
+            field_norm: Some(1.0),
+            ..golden.acc.as_ref().unwrap().quality
+        },
+        ..golden.acc.unwrap()
+    });
+    CalibrationRecord {
+        sensor: SensorIdentity {
+            name: "n".repeat(32).parse().unwrap(),
+            serial: "s".repeat(32).parse().unwrap(),
+        },
+        date: Date::from_days(u32::MAX),
+        acc: triad.clone(),
+        gyr: triad.clone(),
+        mag: triad,
+    }
+}
+
+#[test]
+fn max_len_is_the_length_of_the_longest_record() {
+    let mut buffer = [0; MAX_LEN];
+    assert_eq!(encode(&longest_record(), &mut buffer).unwrap().len(), MAX_LEN);
+    assert_eq!(decode(&buffer), Ok(longest_record()));
+}
+
+#[test]
+fn a_buffer_too_small_is_told_the_exact_need() {
+    let need = GOLDEN.len();
+    for have in 0..need {
+        let refusal = EncodeError::BufferTooSmall { have, need };
+        assert_eq!(encode(&golden_record(), &mut vec![0; have]), Err(refusal));
+    }
+}

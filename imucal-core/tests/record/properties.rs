@@ -1,0 +1,130 @@
+//! What holds for every record and for any bytes.
+
+use imucal_core::record::{
+    CalibrationRecord, Date, FitQuality, MAX_LEN, RawUnit, SensorIdentity, TriadRecord, decode, encode,
+};
+use imucal_core::temperature::TemperatureTerms;
+use proptest::array::{uniform3, uniform9};
+use proptest::collection::vec;
+use proptest::option;
+use proptest::prelude::*;
+
+use super::golden::{GOLDEN, framed, golden_payload};
+
+fn figure() -> impl Strategy<Value = f32> {
+    prop::num::f32::NORMAL | prop::num::f32::ZERO | prop::num::f32::SUBNORMAL
+}
+
+/// Any record that can be used: gains with a dominant diagonal, every other figure whatever is finite.
+fn triad() -> impl Strategy<Value = TriadRecord> {
+    let gain = (uniform9(-0.3f32..0.3), -6i32..6).prop_map(|(skew, decade)| {
+        let entry = |i: usize| (skew[i] + if i.is_multiple_of(4) { 1.0 } else { 0.0 }) * 10f32.powi(decade);
+        [
+            [entry(0), entry(1), entry(2)],
+            [entry(3), entry(4), entry(5)],
+            [entry(6), entry(7), entry(8)],
+        ]
+    });
+    let temperature = (figure(), uniform3(figure()), uniform3(figure())).prop_map(
+        |(reference, bias_slope, scale_slope)| TemperatureTerms {
+            reference,
+            bias_slope,
+            scale_slope,
+        },
+    );
+    let quality = (
+        (
+            uniform3(uniform3(figure())),
+            uniform3(figure()),
+            figure(),
+            option::of(figure()),
+        ),
+        (
+            any::<u32>(),
+            any::<u8>(),
+            figure(),
+            figure(),
+            option::of(figure()),
+        ),
+    )
+        .prop_map(
+            |(
+                (gain_std, bias_std, rms, held_out_rms),
+                (observations, parameters, condition, coverage, field_norm),
+            )| {
+                FitQuality {
+                    gain_std,
+                    bias_std,
+                    rms,
+                    held_out_rms,
+                    observations,
+                    parameters,
+                    condition,
+                    coverage,
+                    field_norm,
+                }
+            },
+        );
+    let unit = || prop::sample::select(RawUnit::ALL.to_vec());
+    (
+        gain,
+        uniform3(figure()),
+        unit(),
+        unit(),
+        "[A-Z0-9+]{0,8}",
+        option::of(temperature),
+        quality,
+    )
+        .prop_map(
+            |(gain, bias, unit_in, unit_out, model, temperature, quality)| TriadRecord {
+                gain,
+                bias,
+                unit_in,
+                unit_out,
+                model: model.parse().unwrap(),
+                temperature,
+                quality,
+            },
+        )
+}
+
+prop_compose! {
+    fn record()(name in "[ -~]{0,32}|[µΩé]{0,16}", serial in "[ -~]{0,32}", days in any::<u32>(),
+                acc in option::of(triad()), gyr in option::of(triad()), mag in option::of(triad())) -> CalibrationRecord {
+        let sensor = SensorIdentity { name: name.parse().unwrap(), serial: serial.parse().unwrap() };
+        CalibrationRecord { sensor, date: Date::from_days(days), acc, gyr, mag }
+    }
+}
+
+proptest! {
+    #[test]
+    fn every_usable_record_comes_back_as_it_was(record in record()) {
+        let mut buffer = [0; MAX_LEN];
+        let bytes = encode(&record, &mut buffer).unwrap();
+        prop_assert_eq!(decode(bytes), Ok(record));
+    }
+
+    #[test]
+    fn arbitrary_bytes_are_refused(bytes in vec(any::<u8>(), 0..1024)) {
+        prop_assert!(decode(&bytes).is_err());
+    }
+
+    /// With magic, version and checksum in order, so that the payload is really parsed.
+    #[test]
+    fn an_arbitrary_payload_never_panics_and_what_is_read_can_be_written(payload in vec(any::<u8>(), 0..1024)) {
+        if let Ok(record) = decode(&framed(1, 1, &payload)) {
+            prop_assert!(encode(&record, &mut [0; MAX_LEN]).is_ok());
+        }
+    }
+
+    /// Nearly right payloads reach further into the parser than arbitrary ones.
+    #[test]
+    fn a_damaged_payload_with_a_valid_checksum_never_panics(at in 0..GOLDEN.len() - 12, byte in any::<u8>(), cut in 0..GOLDEN.len()) {
+        let mut payload = golden_payload().to_vec();
+        payload[at] = byte;
+        payload.truncate(cut);
+        if let Ok(record) = decode(&framed(1, 0, &payload)) {
+            prop_assert!(encode(&record, &mut [0; MAX_LEN]).is_ok());
+        }
+    }
+}
