@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 use super::{
     norm_fit::{NormFit, NormProblem, raw_coverage},
-    outcome::{FitSummary, Refused, SensorOutcome},
+    outcome::{Evidence, FitSummary, Refused, SensorOutcome},
 };
 use crate::recording::{SensorKind, Triple, Unit};
 
@@ -92,6 +92,7 @@ fn with_form<const P: usize>(
             model: model.name(),
             verdict: Err(Refused { advice: advice(&refusal, model), refusal }),
             fit,
+            evidence: None,
         },
         used: Vec::new(),
     };
@@ -115,6 +116,12 @@ fn with_form<const P: usize>(
                 kind: SensorKind::Acc,
                 model: model.name(),
                 verdict: Ok(()),
+                evidence: Some(Evidence::Shell {
+                    points: fit.points,
+                    norm: gravity,
+                    diagonal: model == AccModel::T6,
+                    triad: summary.triad,
+                }),
                 fit: Some(summary),
             },
             used: fit.used,

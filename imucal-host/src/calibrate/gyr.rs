@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 use super::{
-    outcome::{BiasWander, FitSummary, Refused, SensorOutcome},
+    outcome::{BiasWander, Evidence, FitSummary, KnownTurn, Refused, SensorOutcome},
     outlier::outliers,
     rows::Residuals,
 };
@@ -144,6 +144,7 @@ pub fn without_accelerometer(refusal: Refusal) -> SensorOutcome {
         model: MODEL,
         verdict: Err(Refused { refusal, advice }),
         fit: None,
+        evidence: None,
     }
 }
 
@@ -172,6 +173,13 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
             model: MODEL,
             verdict: Ok(()),
             fit: Some(summary),
+            evidence: Some(Evidence::Turns(
+                known
+                    .iter()
+                    .zip(&turns.data)
+                    .map(|(turn, data)| KnownTurn { data: data.clone(), before: turn.before, after: turn.after })
+                    .collect(),
+            )),
         },
         Err(refusal) => refuse(refusal, Some(summary)),
     }
@@ -218,6 +226,7 @@ fn refuse(refusal: Refusal, fit: Option<FitSummary>) -> SensorOutcome {
         model: MODEL,
         verdict: Err(Refused { refusal, advice: advice.into() }),
         fit,
+        evidence: None,
     }
 }
 

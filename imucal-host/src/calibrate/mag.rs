@@ -10,7 +10,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::{
     norm_fit::{NormFit, NormProblem},
-    outcome::{FitSummary, Refused, SensorOutcome},
+    outcome::{Evidence, FitSummary, Refused, SensorOutcome},
 };
 use crate::{
     ellipsoid::{adjusted, sphere},
@@ -27,15 +27,15 @@ const FOLDS: usize = 5;
 pub fn calibrate(sensor: &Triple, usable: &[bool], field: Option<f64>) -> SensorOutcome {
     let cloud = cloud(&sensor.values, usable);
     match fit(&cloud.points, sensor, field) {
-        Ok((summary, Ok(()))) => outcome(Ok(()), Some(summary)),
-        Ok((summary, Err(refusal))) => outcome(Err(refusal), Some(summary)),
-        Err(refusal) => outcome(Err(refusal), None),
+        Ok((summary, Ok(evidence))) => outcome(Ok(()), Some(summary), Some(evidence)),
+        Ok((summary, Err(refusal))) => outcome(Err(refusal), Some(summary), None),
+        Err(refusal) => outcome(Err(refusal), None, None),
     }
 }
 
-fn outcome(verdict: Result<(), Refusal>, fit: Option<FitSummary>) -> SensorOutcome {
+fn outcome(verdict: Result<(), Refusal>, fit: Option<FitSummary>, evidence: Option<Evidence>) -> SensorOutcome {
     let verdict = verdict.map_err(|refusal| Refused { advice: advice(&refusal), refusal });
-    SensorOutcome { kind: SensorKind::Mag, model: MODEL, verdict, fit }
+    SensorOutcome { kind: SensorKind::Mag, model: MODEL, verdict, fit, evidence }
 }
 
 /// Fits from the start with the lower cost: an algebraic ellipsoid can be far off on a small part of the sphere.
@@ -48,7 +48,7 @@ fn best_fit(problem: &NormProblem<'_, 9>) -> Option<NormFit<9>> {
         .min_by(|a, b| a.rms().total_cmp(&b.rms()))
 }
 
-type Judged = (FitSummary, Result<(), Refusal>);
+type Judged = (FitSummary, Result<Evidence, Refusal>);
 
 fn fit(points: &[ShellPoint<f64>], sensor: &Triple, field: Option<f64>) -> Result<Judged, Refusal> {
     let limits = Limits::for_norm(9, 10);
@@ -75,7 +75,13 @@ fn fit(points: &[ShellPoint<f64>], sensor: &Triple, field: Option<f64>) -> Resul
     if field.is_none() {
         to_unit_determinant(&mut summary, &problem, &fit.covariance(&inflation), sensor);
     }
-    Ok((summary, verdict))
+    let evidence = Evidence::Shell {
+        norm,
+        diagonal: false,
+        triad: problem.form.triad(fit.solver.theta()),
+        points: fit.points,
+    };
+    Ok((summary, verdict.map(|()| evidence)))
 }
 
 fn summarise(

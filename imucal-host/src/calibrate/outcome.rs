@@ -1,9 +1,12 @@
 //! What a calibration came to: for each sensor a fit with its figures, accepted or refused with a reason.
 
-use imucal_core::{accept::Refusal, solver::Termination, triad::Triad};
+use imucal_core::{accept::Refusal, observation::ShellPoint, solver::Termination, triad::Triad};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::recording::{Nominal, SensorKind, Unit};
+use crate::{
+    observe::turn::TurnData,
+    recording::{Nominal, SensorKind, Unit},
+};
 
 /// A recording's calibration.
 #[derive(Clone, Debug)]
@@ -33,6 +36,37 @@ pub struct SensorOutcome {
     pub verdict: Result<(), Refused>,
     /// The fit, where there was enough to try one; of a refused sensor it is for information only.
     pub fit: Option<FitSummary>,
+    /// What the fit was made of.
+    pub evidence: Option<Evidence>,
+}
+
+/// The observations a fit was made of, for whoever wants to make it again.
+#[derive(Clone, Debug)]
+pub enum Evidence {
+    /// Points of a norm fit.
+    Shell {
+        /// Points used, nominal SI.
+        points: Vec<ShellPoint<f64>>,
+        /// Radius of the calibrated sphere.
+        norm: f64,
+        /// Only the gain's diagonal was estimated.
+        diagonal: bool,
+        /// Where the fit ended, before any change of gauge.
+        triad: Triad<f64>,
+    },
+    /// Turns of a gyroscope.
+    Turns(Vec<KnownTurn>),
+}
+
+/// A turn and the directions at its ends, calibrated axes.
+#[derive(Clone, Debug)]
+pub struct KnownTurn {
+    /// The turn.
+    pub data: TurnData,
+    /// Direction of the specific force before it.
+    pub before: Vector3<f64>,
+    /// And after it.
+    pub after: Vector3<f64>,
 }
 
 /// A refusal and what to do about it.

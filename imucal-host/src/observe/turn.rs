@@ -25,6 +25,8 @@ pub struct TurnData {
     pub rest_after: usize,
     /// Rows whose rates were integrated.
     pub rows: Range<usize>,
+    /// The bias they were taken less of.
+    pub bias: BiasPath,
     blocks: Vec<Block<f64>>,
     durations: Vec<f64>,
 }
@@ -33,6 +35,12 @@ impl TurnData {
     /// The turn between two known directions, calibrated axes.
     pub fn between(&self, before: Vector3<f64>, after: Vector3<f64>) -> Turn<'_, f64> {
         Turn { blocks: &self.blocks, durations: Durations::Each(&self.durations), before, after }
+    }
+
+    /// Blocks and durations as a device holds them.
+    pub fn narrow(&self) -> (Vec<Block<f32>>, Vec<f32>) {
+        let blocks = self.blocks.iter().map(|b| Block { s0: b.s0.cast(), s1: b.s1.cast(), c: b.c.cast() });
+        (blocks.collect(), self.durations.iter().map(|d| *d as f32).collect())
     }
 }
 
@@ -46,7 +54,8 @@ pub struct BiasPath {
 }
 
 impl BiasPath {
-    fn at(&self, time: f64) -> Vector3<f64> {
+    /// Bias at a time, rad/s.
+    pub fn at(&self, time: f64) -> Vector3<f64> {
         let share = (time - self.before.0) / (self.after.0 - self.before.0);
         self.before.1 + (self.after.1 - self.before.1) * share
     }
@@ -65,6 +74,15 @@ pub enum TurnGap {
         /// Row after the jump.
         row: usize,
     },
+}
+
+impl std::fmt::Display for TurnGap {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Unusable { row } => write!(f, "samples missing, clipped or stuck from row {row}"),
+            Self::Jump { row } => write!(f, "time jumps at row {row}"),
+        }
+    }
 }
 
 /// Rows of the turn between two rests.
@@ -116,7 +134,7 @@ pub fn compress(
     if builder.count() > 0 {
         keep(&mut builder);
     }
-    Ok(TurnData { rest_before, rest_after, rows, blocks, durations })
+    Ok(TurnData { rest_before, rest_after, rows, bias: *bias, blocks, durations })
 }
 
 #[cfg(test)]

@@ -1,0 +1,181 @@
+//! Fit by fit: the core's solver in `f32` against the reference's in `f64`, on the same observations.
+
+use imucal_core::{
+    model::{
+        Parameterisation,
+        norm::NormModel,
+        parameterisation::{DIAGONAL, FULL_GAIN, UPPER_TRIANGULAR},
+        turn::TurnModel,
+    },
+    observation::{Durations, ShellPoint, Turn},
+    solver::{LevenbergMarquardt, Termination},
+    triad::Triad,
+};
+use nalgebra::Vector3;
+
+use super::{
+    reference::{self, SampledTurn},
+    ulp,
+};
+use crate::{
+    calibrate::outcome::{Evidence, FitSummary, KnownTurn, SensorOutcome},
+    recording::{Recording, SensorKind},
+};
+
+/// A parameter of the device's fit may differ by this share of its standard error.
+pub const LIMIT: f64 = 0.1;
+/// Or by this share of the parameter's scale, which `f32` cannot better on any sensor.
+pub const FLOOR: f64 = 1e-5;
+
+/// One parameter, fitted twice.
+#[derive(Clone, Debug)]
+pub struct ParameterDifference {
+    /// Entry of gain or bias.
+    pub name: String,
+    /// The core's, in `f32`.
+    pub device: f64,
+    /// The reference's, in `f64`.
+    pub reference: f64,
+    /// The difference in units of the last place of `f32`.
+    pub ulp: f64,
+    /// Standard error.
+    pub std: f64,
+    /// Size the parameter is measured against: one for a gain, the calibrated norm for a bias.
+    pub scale: f64,
+}
+
+/// One sensor's fit, made twice; parameters in nominal SI.
+#[derive(Clone, Debug)]
+pub struct FitEquivalence {
+    /// Which sensor.
+    pub kind: SensorKind,
+    /// Why the device's solver stopped.
+    pub termination: Termination,
+    /// Parameters.
+    pub parameters: Vec<ParameterDifference>,
+}
+
+impl ParameterDifference {
+    fn passes(&self) -> bool {
+        (self.device - self.reference).abs() <= (LIMIT * self.std).max(FLOOR * self.scale)
+    }
+}
+
+impl FitEquivalence {
+    /// The device's fit ends where the reference's does.
+    pub fn passes(&self) -> bool {
+        self.termination.was_successful() && self.parameters.iter().all(ParameterDifference::passes)
+    }
+}
+
+/// Fits an accepted sensor again, on the device's path and by the reference; `None` where there is nothing to fit
+/// or the reference does not settle.
+pub fn compare(recording: &Recording, outcome: &SensorOutcome) -> Option<FitEquivalence> {
+    let summary = outcome.accepted()?;
+    match outcome.evidence.as_ref()? {
+        Evidence::Shell { points, norm, diagonal: false, triad } => {
+            shell(outcome.kind, points, *norm, triad, UPPER_TRIANGULAR, summary)
+        }
+        Evidence::Shell { points, norm, diagonal: true, triad } => {
+            shell(outcome.kind, points, *norm, triad, DIAGONAL, summary)
+        }
+        Evidence::Turns(turns) => gyroscope(recording, turns, summary),
+    }
+}
+
+fn shell<const P: usize>(
+    kind: SensorKind,
+    points: &[ShellPoint<f64>],
+    norm: f64,
+    near: &Triad<f64>,
+    form: Parameterisation<P>,
+    summary: &FitSummary,
+) -> Option<FitEquivalence> {
+    // Both start a few percent away from the answer, so that both have to find it.
+    let start = form.theta(&Triad { gain: near.gain * 1.02, bias: near.bias * 0.98 });
+    let narrow: Vec<ShellPoint<f32>> = points
+        .iter()
+        .map(|p| ShellPoint { value: p.value.cast(), excess: p.excess as f32 })
+        .collect();
+    let mut solver = LevenbergMarquardt::new(start.cast::<f32>(), Default::default());
+    let report = solver.run(&NormModel { points: &narrow, norm: norm as f32, form });
+    let plain: Vec<([f64; 3], f64)> = points.iter().map(|p| (p.value.into(), p.excess)).collect();
+    let reference = reference::fit_shell(&plain, norm, P == 6, start.as_slice())?;
+    let std = form.theta(&Triad { gain: summary.gain_std, bias: summary.bias_std });
+    let scales = form.theta(&Triad {
+        gain: nalgebra::Matrix3::repeat(near.gain.norm()),
+        bias: Vector3::repeat(norm / near.gain.norm()),
+    });
+    let parameters = differences(
+        form.entries(),
+        solver.theta().iter().map(|x| f64::from(*x)),
+        &reference,
+        std.as_slice(),
+        scales.as_slice(),
+    );
+    Some(FitEquivalence { kind, termination: report.termination, parameters })
+}
+
+fn gyroscope(recording: &Recording, turns: &[KnownTurn], summary: &FitSummary) -> Option<FitEquivalence> {
+    let start = FULL_GAIN.theta(&Triad::identity());
+    let narrow: Vec<_> = turns.iter().map(|turn| turn.data.narrow()).collect();
+    let known: Vec<Turn<'_, f32>> = turns
+        .iter()
+        .zip(&narrow)
+        .map(|(turn, (blocks, durations))| Turn {
+            blocks,
+            durations: Durations::Each(durations),
+            before: turn.before.cast(),
+            after: turn.after.cast(),
+        })
+        .collect();
+    let mut solver = LevenbergMarquardt::new(start.cast::<f32>(), Default::default());
+    let report = solver.run(&TurnModel { turns: &known, form: FULL_GAIN });
+    let sampled: Vec<SampledTurn> = turns
+        .iter()
+        .map(|turn| SampledTurn {
+            rows: turn.data.rows.clone(),
+            bias: turn.data.bias,
+            before: turn.before,
+            after: turn.after,
+        })
+        .collect();
+    let gyr = &recording.gyr.as_ref()?.values;
+    let reference = reference::fit_turns(&sampled, &recording.time, gyr, start.as_slice())?;
+    let std = FULL_GAIN.theta(&Triad { gain: summary.gain_std, bias: summary.bias_std });
+    let parameters = differences(
+        FULL_GAIN.entries(),
+        solver.theta().iter().map(|x| f64::from(*x)),
+        &reference,
+        std.as_slice(),
+        &[1.0; 9],
+    );
+    Some(FitEquivalence { kind: SensorKind::Gyr, termination: report.termination, parameters })
+}
+
+fn differences(
+    entries: &[u8],
+    device: impl Iterator<Item = f64>,
+    reference: &[f64],
+    std: &[f64],
+    scales: &[f64],
+) -> Vec<ParameterDifference> {
+    entries
+        .iter()
+        .zip(device.zip(reference))
+        .zip(std.iter().zip(scales))
+        .map(|((entry, (device, reference)), (std, scale))| ParameterDifference {
+            name: entry_name(*entry),
+            device,
+            reference: *reference,
+            ulp: ulp(device, *reference),
+            std: *std,
+            scale: *scale,
+        })
+        .collect()
+}
+
+fn entry_name(entry: u8) -> String {
+    let axis = |k: u8| ["x", "y", "z"][usize::from(k % 3)];
+    if entry < 9 { format!("gain {}{}", axis(entry / 3), axis(entry)) } else { format!("bias {}", axis(entry)) }
+}

@@ -1,0 +1,139 @@
+//! The reference: plain `f64` arrays, numerical derivatives, per-sample integration; nothing of the core's models.
+//!
+//! It is written from models.md, not from the core: a mistake shared by both would have to be made twice.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
+
+use crate::observe::turn::BiasPath;
+
+/// Rounds of Gauss–Newton at the most.
+const ROUNDS: usize = 60;
+/// Halvings of a step that does not lower the cost.
+const HALVINGS: usize = 30;
+
+/// `gain · (raw − bias)`, written out.
+pub fn correct(gain: &[[f64; 3]; 3], bias: &[f64; 3], raw: [f64; 3]) -> [f64; 3] {
+    let d = [raw[0] - bias[0], raw[1] - bias[1], raw[2] - bias[2]];
+    [0, 1, 2].map(|i| gain[i][0] * d[0] + gain[i][1] * d[1] + gain[i][2] * d[2])
+}
+
+/// Distance of `m` outside the shell |A(m − b)| = norm, to first order, less `excess`.
+/// `theta`: upper triangular A by rows (6) or its diagonal (3), then b.
+fn shell_distance(theta: &[f64], m: [f64; 3], norm: f64, excess: f64) -> f64 {
+    let (a, b) = split_upper(theta);
+    let y = correct(&a, &b, m);
+    let length = (y[0] * y[0] + y[1] * y[1] + y[2] * y[2]).sqrt();
+    let u = y.map(|v| v / length);
+    let pulled = [0, 1, 2].map(|j| a[0][j] * u[0] + a[1][j] * u[1] + a[2][j] * u[2]);
+    let slope = (pulled[0] * pulled[0] + pulled[1] * pulled[1] + pulled[2] * pulled[2]).sqrt();
+    (length - norm) / slope - excess
+}
+
+fn split_upper(theta: &[f64]) -> ([[f64; 3]; 3], [f64; 3]) {
+    match *theta {
+        [a, d, f, x, y, z] => ([[a, 0.0, 0.0], [0.0, d, 0.0], [0.0, 0.0, f]], [x, y, z]),
+        [a, b, c, d, e, f, x, y, z] => ([[a, b, c], [0.0, d, e], [0.0, 0.0, f]], [x, y, z]),
+        _ => ([[f64::NAN; 3]; 3], [f64::NAN; 3]),
+    }
+}
+
+/// Fits the shell through points; `diagonal` for six parameters instead of nine. Returns them as in `theta` above.
+pub fn fit_shell(points: &[([f64; 3], f64)], norm: f64, diagonal: bool, start: &[f64]) -> Option<Vec<f64>> {
+    debug_assert_eq!(start.len(), if diagonal { 6 } else { 9 });
+    gauss_newton(start, |theta| {
+        points.iter().map(|(m, excess)| shell_distance(theta, *m, norm, *excess)).collect()
+    })
+}
+
+/// One turn for the reference: the samples themselves.
+#[derive(Clone, Debug)]
+pub struct SampledTurn {
+    /// Rows integrated.
+    pub rows: Range<usize>,
+    /// Bias along the way.
+    pub bias: BiasPath,
+    /// Direction before, calibrated axes.
+    pub before: Vector3<f64>,
+    /// Direction after.
+    pub after: Vector3<f64>,
+}
+
+/// Carries a direction through a turn sample by sample under a full gain by rows.
+fn carry(theta: &[f64], turn: &SampledTurn, time: &[f64], gyr: &[Vector3<f64>]) -> Vector3<f64> {
+    let gain: [[f64; 3]; 3] = [0, 1, 2].map(|i| [theta[3 * i], theta[3 * i + 1], theta[3 * i + 2]]);
+    let mut attitude = UnitQuaternion::identity();
+    for k in turn.rows.clone() {
+        let since = if k > turn.rows.start { time[k] - time[k - 1] } else { 0.0 };
+        let until = if k + 1 < turn.rows.end { time[k + 1] - time[k] } else { 0.0 };
+        let rate = correct(&gain, &turn.bias.at(time[k]).into(), gyr[k].into());
+        attitude *= UnitQuaternion::from_scaled_axis(Vector3::from(rate) * (0.5 * (since + until)));
+    }
+    attitude.inverse_transform_vector(&turn.before)
+}
+
+/// Fits a full gyroscope gain (by rows) to turns.
+pub fn fit_turns(turns: &[SampledTurn], time: &[f64], gyr: &[Vector3<f64>], start: &[f64]) -> Option<Vec<f64>> {
+    gauss_newton(start, |theta| {
+        turns
+            .iter()
+            .flat_map(|turn| {
+                let r = carry(theta, turn, time, gyr) - turn.after;
+                [r.x, r.y, r.z]
+            })
+            .collect()
+    })
+}
+
+/// Gauss–Newton with central differences and an SVD; `None` where it does not settle.
+fn gauss_newton(start: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64> + Sync) -> Option<Vec<f64>> {
+    let mut theta = start.to_vec();
+    let mut here = DVector::from_vec(residuals(&theta));
+    for _ in 0..ROUNDS {
+        let jacobian = differences(&theta, &residuals, here.len());
+        let scale: Vec<f64> = jacobian.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();
+        let mut scaled = jacobian;
+        for (mut column, s) in scaled.column_iter_mut().zip(&scale) {
+            column /= *s;
+        }
+        let step = scaled.svd(true, true).solve(&-&here, 1e-14).ok()?;
+        let mut share = 1.0;
+        let mut moved = None;
+        for _ in 0..HALVINGS {
+            let trial: Vec<f64> =
+                theta.iter().zip(step.iter().zip(&scale)).map(|(t, (d, s))| t + share * d / s).collect();
+            let there = DVector::from_vec(residuals(&trial));
+            if there.norm_squared() <= here.norm_squared() {
+                moved = Some((trial, there));
+                break;
+            }
+            share *= 0.5;
+        }
+        let Some((trial, there)) = moved else { return Some(theta) };
+        let settled = step.norm() <= 1e-10 * here.norm().max(f64::MIN_POSITIVE)
+            || there.norm_squared() >= here.norm_squared() * (1.0 - 1e-15);
+        (theta, here) = (trial, there);
+        if settled {
+            return Some(theta);
+        }
+    }
+    None
+}
+
+fn differences(theta: &[f64], residuals: &(impl Fn(&[f64]) -> Vec<f64> + Sync), rows: usize) -> DMatrix<f64> {
+    use rayon::prelude::*;
+    let columns: Vec<DVector<f64>> = (0..theta.len())
+        .into_par_iter()
+        .map(|k| {
+            let step = 6e-6 * (1.0 + theta[k].abs());
+            let at = |value: f64| {
+                let mut moved = theta.to_vec();
+                moved[k] = value;
+                DVector::from_vec(residuals(&moved))
+            };
+            (at(theta[k] + step) - at(theta[k] - step)) / (2.0 * step)
+        })
+        .collect();
+    if columns.is_empty() { DMatrix::zeros(rows, 0) } else { DMatrix::from_columns(&columns) }
+}

@@ -1,0 +1,298 @@
+//! The calibration as it is kept: TOML for people, the record for the device. One content, two forms.
+
+use std::path::{Path, PathBuf};
+
+use imucal_core::record::{self, DecodeError, EncodeError};
+use serde::{Deserialize, Serialize};
+
+pub mod record_form;
+
+use crate::{
+    calibrate::{Calibration, FitSummary},
+    recording::{SensorKind, Unit, atomic_file},
+};
+
+/// What the first line of the TOML says.
+pub const FORMAT: &str = "imucal-calibration/1";
+
+/// A stored calibration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StoredCalibration {
+    /// [`FORMAT`].
+    pub format: String,
+    /// File name of the recording it was made from.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub recording: String,
+    /// Day it was made, days since 1970-01-01 UTC; in TOML as YYYY-MM-DD.
+    #[serde(with = "record_form::date_text")]
+    pub date: record::Date,
+    /// The sensor it was made for.
+    #[serde(default)]
+    pub sensor: StoredSensor,
+    /// Accelerometer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub acc: Option<StoredTriad>,
+    /// Gyroscope.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gyr: Option<StoredTriad>,
+    /// Magnetometer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mag: Option<StoredTriad>,
+}
+
+/// Whose calibration it is.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredSensor {
+    /// Make and model, empty where unknown.
+    #[serde(default)]
+    pub name: String,
+    /// Serial number, empty where unknown.
+    #[serde(default)]
+    pub serial: String,
+}
+
+/// One sensor's calibration: `calibrated = gain · (raw − bias)` and how good it was.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StoredTriad {
+    /// Model's name.
+    pub model: String,
+    /// Unit of raw values.
+    pub unit_in: Unit,
+    /// Unit of calibrated values.
+    pub unit_out: Unit,
+    /// `unit_out` per `unit_in`, by rows.
+    pub gain: [[f64; 3]; 3],
+    /// `unit_in`.
+    pub bias: [f64; 3],
+    /// Standard errors of the gain; 0 for an entry that is not estimated.
+    pub gain_std: [[f64; 3]; 3],
+    /// Standard errors of the bias.
+    pub bias_std: [f64; 3],
+    /// Rms residual, `unit_out`; rad a turn for the gyroscope.
+    pub rms: f64,
+    /// The same for observations left out of the fit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out_rms: Option<f64>,
+    /// Observations used.
+    pub observations: u32,
+    /// Parameters estimated.
+    pub parameters: u8,
+    /// Condition of the normalised Jacobian.
+    pub condition: f64,
+    /// Share of the sphere of directions seen.
+    pub coverage: f64,
+    /// Length of the field where it was not known beforehand, `unit_in`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field_norm: Option<f64>,
+    /// Linear temperature terms, where they were calibrated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<StoredTemperature>,
+}
+
+/// Linear temperature terms; see [`imucal_core::temperature`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StoredTemperature {
+    /// °C.
+    pub reference: f64,
+    /// `unit_in` per kelvin.
+    pub bias_slope: [f64; 3],
+    /// Per kelvin.
+    pub scale_slope: [f64; 3],
+}
+
+/// Why a calibration could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// The file cannot be read.
+    #[error("{path}: cannot be read: {source}; check the path")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The TOML is not a calibration.
+    #[error("{path}: not a calibration: {reason}; expected what `imucal calibrate --out` writes")]
+    Toml {
+        /// The file.
+        path: PathBuf,
+        /// Line and reason.
+        reason: String,
+    },
+    /// The TOML is of another format.
+    #[error("{path}: format is `{found}`, expected `{FORMAT}`")]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// Format found.
+        found: String,
+    },
+    /// A stored figure cannot be used.
+    #[error("{path}: {sensor}: {what} must be finite and the gain not singular; calibrate again")]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// Which sensor.
+        sensor: SensorKind,
+        /// Which figure.
+        what: &'static str,
+    },
+    /// The record is damaged, foreign or newer.
+    #[error("{path}: {}; copy it again from its source, or calibrate again", .source)]
+    Record {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: DecodeError,
+    },
+}
+
+/// Why a calibration could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum SaveError {
+    /// The file cannot be written.
+    #[error(transparent)]
+    File(#[from] atomic_file::WriteFileError),
+    /// A field does not fit the record.
+    #[error("{path}: {field} `{text}` is longer than the record's {limit} bytes; shorten it in the recording's TOML")]
+    TooLong {
+        /// The file.
+        path: PathBuf,
+        /// Which field.
+        field: &'static str,
+        /// Its text.
+        text: String,
+        /// Bytes allowed.
+        limit: usize,
+    },
+    /// The record refuses a figure.
+    #[error("{path}: {source}")]
+    Encode {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: EncodeError,
+    },
+}
+
+impl StoredCalibration {
+    /// The accepted sensors of a calibration.
+    pub fn of(calibration: &Calibration, date: record::Date) -> Self {
+        let triad = |kind| {
+            let outcome = calibration.sensor(kind)?;
+            Some(StoredTriad::of(outcome.model, outcome.accepted()?))
+        };
+        Self {
+            format: FORMAT.into(),
+            recording: calibration.recording.clone(),
+            date,
+            sensor: StoredSensor {
+                name: calibration.sensor_name.clone(),
+                serial: calibration.serial.clone(),
+            },
+            acc: triad(SensorKind::Acc),
+            gyr: triad(SensorKind::Gyr),
+            mag: triad(SensorKind::Mag),
+        }
+    }
+
+    /// One sensor's calibration.
+    pub fn triad(&self, kind: SensorKind) -> Option<&StoredTriad> {
+        match kind {
+            SensorKind::Acc => self.acc.as_ref(),
+            SensorKind::Gyr => self.gyr.as_ref(),
+            SensorKind::Mag => self.mag.as_ref(),
+        }
+    }
+
+    /// Reads TOML or a record, whichever the file holds.
+    ///
+    /// # Errors
+    /// [`LoadError`] names the file and what is wrong with it.
+    pub fn load(path: &Path) -> Result<Self, LoadError> {
+        let bytes = std::fs::read(path).map_err(|source| LoadError::Io { path: path.into(), source })?;
+        if is_toml(path, &bytes) {
+            Self::from_toml(path, &bytes)
+        } else {
+            let record = record::decode(&bytes)
+                .map_err(|source| LoadError::Record { path: path.into(), source })?;
+            Ok(Self::from_record(&record))
+        }
+    }
+
+    fn from_toml(path: &Path, bytes: &[u8]) -> Result<Self, LoadError> {
+        let wrong = |reason: String| LoadError::Toml { path: path.into(), reason };
+        let text = std::str::from_utf8(bytes).map_err(|e| wrong(e.to_string()))?;
+        let stored: Self = toml::from_str(text).map_err(|e| wrong(e.to_string().trim().replace('\n', " ")))?;
+        if stored.format != FORMAT {
+            return Err(LoadError::Format { path: path.into(), found: stored.format });
+        }
+        for kind in SensorKind::ALL {
+            if let Some(what) = stored.triad(kind).and_then(StoredTriad::defect) {
+                return Err(LoadError::Unusable { path: path.into(), sensor: kind, what });
+            }
+        }
+        Ok(stored)
+    }
+
+    /// Writes the TOML, whole or not at all.
+    ///
+    /// # Errors
+    /// [`SaveError`] names the file and why it cannot be written.
+    pub fn save_toml(&self, path: &Path) -> Result<(), SaveError> {
+        // Serialising plain numbers and text into a string cannot fail.
+        let text = toml::to_string(self).unwrap_or_default();
+        Ok(atomic_file::write(path, text.as_bytes())?)
+    }
+
+    /// Writes the record, whole or not at all.
+    ///
+    /// # Errors
+    /// [`SaveError`] names the file and why it cannot be written.
+    pub fn save_record(&self, path: &Path) -> Result<(), SaveError> {
+        let record = self.to_record(path)?;
+        let mut buffer = [0; record::MAX_LEN];
+        let bytes = record::encode(&record, &mut buffer)
+            .map_err(|source| SaveError::Encode { path: path.into(), source })?;
+        Ok(atomic_file::write(path, bytes)?)
+    }
+}
+
+/// A file is TOML by its name, or because it is text.
+fn is_toml(path: &Path, bytes: &[u8]) -> bool {
+    path.extension().is_some_and(|ext| ext.eq_ignore_ascii_case("toml")) || bytes.starts_with(b"format")
+}
+
+impl StoredTriad {
+    fn of(model: &str, fit: &FitSummary) -> Self {
+        let triad = fit.raw_triad();
+        let (gain_std, bias_std) = fit.raw_std();
+        let rows = |m: &nalgebra::Matrix3<f64>| std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]));
+        Self {
+            model: model.into(),
+            unit_in: fit.unit_in,
+            unit_out: fit.unit_out,
+            gain: rows(&triad.gain),
+            bias: triad.bias.into(),
+            gain_std: rows(&gain_std),
+            bias_std: bias_std.into(),
+            rms: fit.rms,
+            held_out_rms: fit.held_out_rms,
+            observations: u32::try_from(fit.observations).unwrap_or(u32::MAX),
+            parameters: u8::try_from(fit.parameters).unwrap_or(u8::MAX),
+            condition: fit.condition,
+            coverage: fit.coverage,
+            field_norm: fit.field_norm,
+            temperature: None,
+        }
+    }
+
+    /// What makes the triad unusable, if anything.
+    fn defect(&self) -> Option<&'static str> {
+        let gain = nalgebra::Matrix3::from_fn(|i, j| self.gain[i][j]);
+        if !gain.iter().all(|g| g.is_finite()) || gain.try_inverse().is_none() {
+            return Some("the gain");
+        }
+        (!self.bias.iter().all(|b| b.is_finite())).then_some("the bias")
+    }
+}
