@@ -220,7 +220,7 @@ def footpoints(p, x, F):
         h = (m * z * z / k**2).sum(1) - F * F
         dl = h / (2 * (m * m * z * z / k**3).sum(1))
         l = l + dl
-        if np.all(np.abs(dl) <= 1e-16 * (np.abs(l) + 1 / m.max())):
+        if np.all(np.abs(dl) <= 1e-12 * (np.abs(l) + 1 / m.max())):
             break
     return b + (z / (1 + l[:, None] * m)) @ V.T, l
 
@@ -291,3 +291,41 @@ def clean(o):
     if isinstance(o, np.generic):
         return o.item()
     return o
+
+
+def gauge_jacobian(p, F):
+    """d gauge_vector / d theta by complex step (F fixed)."""
+    def f(q):
+        k = (q[0] * q[3] * q[5]) ** (1 / 3)
+        return np.r_[q[:6] / k, F / k, q[6:9]]
+    return np.stack([f(p + 1e-30j * e).imag / 1e-30 for e in np.eye(9)], axis=1)
+
+
+def algebraic(p, F, m):
+    """The quadric z'Mz - 2 (Mc)'z = q of z = x - m, M = A'A, c = b - m, q = F^2 - c'Mc, as its nine numbers (M, Mc) / q.
+
+    In this chart the norm fit is nearly linear, so that the classical covariance holds even where coverage is poor. m: the centroid.
+    """
+    A, b = unpack(p)
+    M, c = A.T @ A, b - m
+    q = F * F - c @ M @ c
+    return np.r_[np.array([M[i, j] for i, j in UT]), M @ c] / q
+
+
+def mahalanobis2(q, p, J, s2, F=None, m=None):
+    """Squared distance of p from the estimate q under s2 (J'J)^-1: in theta, or in the algebraic chart if m is given."""
+    d = q - p
+    if m is not None:
+        D = np.stack([algebraic(q + 1e-30j * e, F, m).imag / 1e-30 for e in np.eye(9)], axis=1)
+        d = np.linalg.solve(D, algebraic(q, F, m) - algebraic(p, F, m))
+    d = J @ d
+    return d @ d / s2
+
+
+def nonlinearity(p, J, s2, fun):
+    """|(Q(p + d) - Q(p)) / s2 - 1| for d = one standard deviation along the weakest direction of the column-normalised J; larger sign."""
+    nrm = np.linalg.norm(J, axis=0)
+    _, s, vt = np.linalg.svd(J / nrm, full_matrices=False)
+    d = np.sqrt(s2) * vt[-1] / s[-1] / nrm
+    q0 = (fun(p) ** 2).sum()
+    return max(abs(((fun(p + k * d) ** 2).sum() - q0) / s2 - 1) for k in (-1, 1))
