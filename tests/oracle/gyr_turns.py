@@ -11,6 +11,7 @@ from row start = end_i - m_i to row stop = begin_j + m_j, both included, m = flo
 
 Standard errors: s^2 (J'J)^-1 with s^2 = 2 cost / (2 turns - 9). Jacobian by complex step. Counts per (rad/s): K = (A_g / per_unit)^-1, its
 column norms and diagonal; and per_unit / diag(A_g), which is what T K (raw - b) with a unit diagonal of T gives.
+"constant_bias_no_margin" holds b at the first rest's mean and sets m = 0, as other tools do, for comparison with data/README.md.
 "sensitivity" moves the margin m and the rest detector's threshold: how far the segmentation moves the result.
 
     python3 tests/oracle/gyr_turns.py     # IMUCAL_DATA, default ../shared/data; writes tests/golden/gyr_turns_NAME.json
@@ -47,10 +48,12 @@ def quaternion(theta):
     return np.concatenate([np.where(zero, 1 - h2 / 2, np.cos(h)), 0.5 * theta * np.where(zero, 1 - h2 / 6, np.sin(h) / h)], axis=-1)
 
 
-def build(t, w, iv, u, margin_s):
+def build(t, w, iv, u, margin_s, constant_bias=False):
     dt = float(np.median(np.diff(t)))
     turns = [(end - margin(begin, end, dt, margin_s), nb + margin(nb, ne, dt, margin_s)) for (begin, end), (nb, ne) in zip(iv, iv[1:])]
     mean = np.array([w[a:b].mean(0) for a, b in iv])
+    if constant_bias:
+        mean[:] = mean[0]
     mid = np.array([(t[a] + t[b - 1]) / 2 for a, b in iv])
     n = max(b - a + 1 for a, b in turns)
     d, h = np.zeros((len(turns), n, 3)), np.zeros((len(turns), n))
@@ -143,6 +146,10 @@ def run(name):
         moved.append({"margin_s": margin_s, "multiple": multiple, "turns": len(k["turns"]), "per_unit_over_diagonal": per_unit / np.diag(q.reshape(3, 3)),
                       "max_change_in_standard_errors": np.abs((q - p) / se.ravel()).max(), "rms_angle_deg": np.degrees(np.sqrt(rq @ rq / len(k["turns"])))})
     rests.MULTIPLE = 6.0
+    k = build(t, w, iv, s["u"], 0.0, constant_bias=True)
+    q = solve(k, p)
+    rq = residual(q, k)
+    peer = {"A": q.reshape(3, 3), "per_unit_over_diagonal": per_unit / np.diag(q.reshape(3, 3)), "cost": 0.5 * rq @ rq, "rms_angle_deg": np.degrees(np.sqrt(rq @ rq / turns))}
 
     out = {
         "generator": "tests/oracle/gyr_turns.py", "recording": name, "offset": offset, "per_unit": per_unit, "margin_s": MARGIN_S, "intervals": iv,
@@ -151,7 +158,7 @@ def run(name):
         "per_unit_over_diagonal": per_unit / np.diag(A), "bias_first_rest_raw": offset + per_unit * s["mean"][0],
         "cost": 0.5 * r @ r, "s2": s2, "dof": 2 * turns - 9, "rms_angle_rad": np.sqrt((angle**2).mean()), "rms_angle_deg": np.degrees(np.sqrt((angle**2).mean())),
         "rms_angle_nominal_deg": np.degrees(np.sqrt(nominal @ nominal / turns)), "condition": condition(J), "start_disagreement": disagreement,
-        "angle_per_turn_rad": angle, "turned_deg": turned, "sensitivity": moved,
+        "angle_per_turn_rad": angle, "turned_deg": turned, "sensitivity": moved, "constant_bias_no_margin": peer,
     }
     write(f"gyr_turns_{name}.json", out)
     np.set_printoptions(precision=6, suppress=True, linewidth=140)
@@ -160,6 +167,7 @@ def run(name):
     print("  per_unit/diag(A)", out["per_unit_over_diagonal"], "+-", out["per_unit_over_diagonal"] * np.diag(se) / np.diag(A))
     print("  K diagonal", out["diagonal"], "column norms", out["column_norms"], "bias of the first rest", out["bias_first_rest_raw"])
     print("  turned, deg:", turned.round(0), "worst angles, deg:", np.sort(np.degrees(angle))[-4:])
+    print("  constant bias, no margin:", peer["per_unit_over_diagonal"], f"rms {peer['rms_angle_deg']:.4f} deg")
     for k in moved:
         print("  ", k)
 
