@@ -19,8 +19,12 @@ use crate::scalar::Scalar;
 
 /// Series are used below this squared angle, rad².
 const SERIES_LIMIT: f64 = 1.0;
-/// Terms of each series.
+/// Terms of each series there.
 const TERMS: u32 = 9;
+/// Below this squared angle, rad², a few terms leave the same remainder.
+const SHORT_LIMIT: f64 = 0.02;
+/// Terms of each series there.
+const SHORT_TERMS: u32 = 6;
 
 /// `[v]×`: the matrix that takes x to v × x.
 #[inline]
@@ -37,26 +41,38 @@ struct Coefficients<T> {
     c: T,
 }
 
-/// `Σ_k (−x)^k · n! / (2k + n)!` by Horner's rule, that is 1 − x/((n+1)(n+2)) · (1 − …).
+/// The first `TERMS` of `Σ_k (−x)^k · N! / (2k + N)!` by Horner's rule, that is 1 − x/((N+1)(N+2)) · (1 − …).
 #[inline]
-fn series<T: Scalar>(x: T, n: u32) -> T {
+fn series<T: Scalar, const N: u32, const TERMS: u32>(x: T) -> T {
     let mut sum = T::one();
     for k in (1..TERMS).rev() {
-        let low = f64::from(2 * k + n - 1);
-        let high = f64::from(2 * k + n);
-        sum = T::one() - x * sum * T::of(1.0 / (low * high));
+        let factor = const_reciprocal(2 * k + N - 1, 2 * k + N);
+        sum = T::one() - x * sum * T::of(factor);
     }
     sum
 }
 
+/// 1 / (a b), folded at compile time once the loop above is unrolled.
+#[inline]
+fn const_reciprocal(a: u32, b: u32) -> f64 {
+    1.0 / (f64::from(a) * f64::from(b))
+}
+
+#[inline]
+fn series_coefficients<T: Scalar, const TERMS: u32>(x: T) -> Coefficients<T> {
+    Coefficients {
+        a: series::<T, 1, TERMS>(x),
+        b: series::<T, 2, TERMS>(x) * T::of(0.5),
+        c: series::<T, 3, TERMS>(x) * T::of(1.0 / 6.0),
+    }
+}
+
 #[inline]
 fn coefficients<T: Scalar>(x: T) -> Coefficients<T> {
-    if x < T::of(SERIES_LIMIT) {
-        Coefficients {
-            a: series(x, 1),
-            b: series(x, 2) * T::of(0.5),
-            c: series(x, 3) * T::of(1.0 / 6.0),
-        }
+    if x < T::of(SHORT_LIMIT) {
+        series_coefficients::<T, SHORT_TERMS>(x)
+    } else if x < T::of(SERIES_LIMIT) {
+        series_coefficients::<T, TERMS>(x)
     } else {
         let angle = x.root();
         let (sin, cos) = (angle.sin(), angle.cos());
@@ -68,22 +84,39 @@ fn coefficients<T: Scalar>(x: T) -> Coefficients<T> {
     }
 }
 
+/// `I + first · [φ]× + second · [φ]×²`, the square as φφᵀ − φ² I.
+#[inline]
+fn polynomial<T: Scalar>(phi: &Vector3<T>, x: T, first: T, second: T) -> Matrix3<T> {
+    let v = phi * first;
+    let w = phi * second;
+    let d = T::one() - second * x;
+    Matrix3::new(
+        d + w.x * phi.x,
+        w.x * phi.y - v.z,
+        w.x * phi.z + v.y,
+        w.y * phi.x + v.z,
+        d + w.y * phi.y,
+        w.y * phi.z - v.x,
+        w.z * phi.x - v.y,
+        w.z * phi.y + v.x,
+        d + w.z * phi.z,
+    )
+}
+
 /// `C = exp([φ]×)` and the left Jacobian `J_l(φ)`, φ in rad.
 #[inline]
 pub fn exp_with_jacobian<T: Scalar>(phi: &Vector3<T>) -> (Matrix3<T>, Matrix3<T>) {
-    let k = coefficients(phi.dot(phi));
-    let cross = cross_matrix(phi);
-    let square = cross * cross;
-    let one = Matrix3::identity();
-    (one + cross * k.a + square * k.b, one + cross * k.b + square * k.c)
+    let x = phi.dot(phi);
+    let k = coefficients(x);
+    (polynomial(phi, x, k.a, k.b), polynomial(phi, x, k.b, k.c))
 }
 
 /// `C = exp([φ]×)`: the rotation matrix of a rotation vector φ, rad.
 #[inline]
 pub fn exp<T: Scalar>(phi: &Vector3<T>) -> Matrix3<T> {
-    let k = coefficients(phi.dot(phi));
-    let cross = cross_matrix(phi);
-    Matrix3::identity() + cross * k.a + cross * cross * k.b
+    let x = phi.dot(phi);
+    let k = coefficients(x);
+    polynomial(phi, x, k.a, k.b)
 }
 
 #[cfg(test)]
@@ -119,5 +152,10 @@ mod tests {
         assert!((series.a - angle.sin() / angle).abs() < 1e-15);
         assert!((series.b - (1.0 - angle.cos()) / x).abs() < 1e-15);
         assert!((series.c - (angle - angle.sin()) / (x * angle)).abs() < 1e-15);
+        let (short, long) = (
+            coefficients(0.019_999f64),
+            series_coefficients::<f64, TERMS>(0.019_999),
+        );
+        assert!((short.a - long.a).abs() + (short.b - long.b).abs() + (short.c - long.c).abs() < 1e-15);
     }
 }

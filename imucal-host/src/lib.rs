@@ -1,1 +1,26 @@
-//! Calibrate IMU recordings through `imucal-core`.
+//! Calibrate IMU recordings through `imucal-core`, the code that runs beside the sensor, and compare it with a
+//! floating-point reference.
+//!
+//! Modules stand in the order of the flow; each uses what stands above it and nothing below.
+
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod recording;
+
+pub mod simulator;
+
+pub mod observe;
+
+pub mod ellipsoid;
+
+pub mod calibrate;
+
+pub mod store;
+
+pub mod apply;
+
+pub mod equivalence;
+
+pub mod report;
+
+pub mod cli;

@@ -40,13 +40,6 @@ pub struct TurnModel<'a, T: Scalar, const P: usize> {
     pub form: Parameterisation<P>,
 }
 
-/// cof(A) w, whose columns are the cross products of A's.
-#[inline]
-fn cofactor_times<T: Scalar>(a: &[Vector3<T>; 3], w: &Vector3<T>) -> Vector3<T> {
-    let [x, y, z] = a;
-    y.cross(z) * w.x + z.cross(x) * w.y + x.cross(y) * w.z
-}
-
 #[inline]
 fn columns<T: Scalar>(a: &Matrix3<T>) -> [Vector3<T>; 3] {
     [
@@ -56,63 +49,137 @@ fn columns<T: Scalar>(a: &Matrix3<T>) -> [Vector3<T>; 3] {
     ]
 }
 
-/// Rotation vector of a block under a triad, rad: the module's first equation.
-#[inline]
-pub fn rotation_vector<T: Scalar>(triad: &Triad<T>, block: &Block<T>, duration: T) -> Vector3<T> {
-    let angle = block.s0 - triad.bias * duration;
-    let coning = block.c - block.s1.cross(&triad.bias);
-    triad.gain * angle + cofactor_times(&columns(&triad.gain), &coning) * T::of(0.5)
+/// What a triad does to every block of a turn.
+struct BlockRotation<T: Scalar> {
+    gain: Matrix3<T>,
+    /// cof(A), whose columns are the cross products of A's.
+    cofactor: Matrix3<T>,
 }
 
-/// The rotation vector and its derivative by the gain's nine entries (rows) and the bias.
-#[inline]
-fn rotation_vector_with_derivative<T: Scalar>(
-    triad: &Triad<T>,
-    block: &Block<T>,
-    duration: T,
-) -> (Vector3<T>, ByEntries<T>) {
-    let half = T::of(0.5);
-    let angle = block.s0 - triad.bias * duration;
-    let w = (block.c - block.s1.cross(&triad.bias)) * half;
-    let cols = columns(&triad.gain);
-    let phi = triad.gain * angle + cofactor_times(&cols, &w);
-
-    let [cx, cy, cz] = cols.map(|c| cross_matrix(&c));
-    let by_column = [cz * w.y - cy * w.z, cx * w.z - cz * w.x, cy * w.x - cx * w.y];
-    let mut by = ByEntries::zeros();
-    for (column, (cofactor_part, reach)) in by_column.iter().zip(angle.iter()).enumerate() {
-        let block = cofactor_part + Matrix3::identity() * *reach;
-        for row in 0..3 {
-            by.set_column(3 * row + column, &block.column(row));
+impl<T: Scalar> BlockRotation<T> {
+    fn new(triad: &Triad<T>) -> Self {
+        Self {
+            gain: triad.gain,
+            cofactor: Self::cofactor(&triad.gain),
         }
     }
-    let [x, y, z] = cols;
-    let cofactor = Matrix3::from_columns(&[y.cross(&z), z.cross(&x), x.cross(&y)]);
-    let by_bias = -(triad.gain * duration) - cofactor * cross_matrix(&block.s1) * half;
-    by.fixed_columns_mut::<3>(9).copy_from(&by_bias);
-    (phi, by)
+
+    fn cofactor(gain: &Matrix3<T>) -> Matrix3<T> {
+        let [x, y, z] = columns(gain);
+        Matrix3::from_columns(&[y.cross(&z), z.cross(&x), x.cross(&y)])
+    }
+
+    /// φ of the module's first equation, from what [`reduce`] leaves of a block.
+    #[inline]
+    fn vector(&self, angle: &Vector3<T>, coning: &Vector3<T>) -> Vector3<T> {
+        self.gain * angle + self.cofactor * coning
+    }
+}
+
+/// A block less its bias: s0 − T b and ½ (c − s1 × b).
+#[inline]
+fn reduce<T: Scalar>(bias: &Vector3<T>, block: &Block<T>, duration: T) -> (Vector3<T>, Vector3<T>) {
+    (
+        block.s0 - bias * duration,
+        (block.c - block.s1.cross(bias)) * T::of(0.5),
+    )
 }
 
 /// `C_after_before`: the attitude after the turn, as the product of its blocks.
 pub fn attitude<T: Scalar>(triad: &Triad<T>, turn: &Turn<'_, T>) -> Matrix3<T> {
     let mut c = Matrix3::identity();
+    let rotation = BlockRotation::new(triad);
     for (index, block) in turn.blocks.iter().enumerate() {
-        c *= exp(&rotation_vector(triad, block, turn.durations.get(index)));
+        let (angle, coning) = reduce(&triad.bias, block, turn.durations.get(index));
+        c *= exp(&rotation.vector(&angle, &coning));
     }
     c
+}
+
+/// Sums over a turn's blocks from which the derivative by all twelve entries follows at its end.
+///
+/// A block adds M φ' to the derivative, M = C J_l(φ), and φ' is linear in the block's few numbers: so M is summed
+/// against each of them, and the gain's and bias's part is multiplied on once a turn instead of once a block.
+struct DerivativeSums<T: Scalar> {
+    /// Σ M a_i, a = s0 − T b.
+    angle: [Matrix3<T>; 3],
+    /// Σ M w_i, w = ½ (c − s1 × b).
+    coning: [Matrix3<T>; 3],
+    /// Σ M s1_i.
+    moment: [Matrix3<T>; 3],
+    /// Σ M T.
+    time: Matrix3<T>,
+}
+
+impl<T: Scalar> DerivativeSums<T> {
+    fn new() -> Self {
+        let none = [Matrix3::zeros(); 3];
+        Self {
+            angle: none,
+            coning: none,
+            moment: none,
+            time: Matrix3::zeros(),
+        }
+    }
+
+    #[inline]
+    fn add(
+        &mut self,
+        m: &Matrix3<T>,
+        angle: &Vector3<T>,
+        coning: &Vector3<T>,
+        block: &Block<T>,
+        duration: T,
+    ) {
+        for (sums, factors) in [
+            (&mut self.angle, angle),
+            (&mut self.coning, coning),
+            (&mut self.moment, &block.s1),
+        ] {
+            for (sum, factor) in sums.iter_mut().zip(factors.iter()) {
+                *sum += m * *factor;
+            }
+        }
+        self.time += m * duration;
+    }
+
+    /// Derivative by the gain's nine entries (rows) and the bias.
+    fn by_entries(&self, gain: &Matrix3<T>) -> ByEntries<T> {
+        let [x, y, z] = columns(gain);
+        let [cx, cy, cz] = [x, y, z].map(|c| cross_matrix(&c));
+        let [kx, ky, kz] = self.coning;
+        let by_cofactor = [ky * cz - kz * cy, kz * cx - kx * cz, kx * cy - ky * cx];
+        let mut by = ByEntries::zeros();
+        for (column, (angle, cofactor)) in self.angle.iter().zip(by_cofactor.iter()).enumerate() {
+            let part = angle + cofactor;
+            for row in 0..3 {
+                by.set_column(3 * row + column, &part.column(row));
+            }
+        }
+        let cofactor = BlockRotation::cofactor(gain);
+        let [mx, my, mz] = self.moment;
+        let moment = mx * cofactor * cross_matrix(&Vector3::x())
+            + my * cofactor * cross_matrix(&Vector3::y())
+            + mz * cofactor * cross_matrix(&Vector3::z());
+        by.fixed_columns_mut::<3>(9)
+            .copy_from(&(-(self.time * gain) - moment * T::of(0.5)));
+        by
+    }
 }
 
 /// The attitude and the derivative of its rotation, in the frame before the turn.
 fn attitude_with_derivative<T: Scalar>(triad: &Triad<T>, turn: &Turn<'_, T>) -> (Matrix3<T>, ByEntries<T>) {
     let mut c = Matrix3::identity();
-    let mut by = ByEntries::zeros();
+    let mut sums = DerivativeSums::new();
+    let rotation = BlockRotation::new(triad);
     for (index, block) in turn.blocks.iter().enumerate() {
-        let (phi, by_phi) = rotation_vector_with_derivative(triad, block, turn.durations.get(index));
-        let (step, jacobian) = exp_with_jacobian(&phi);
-        by += c * jacobian * by_phi;
+        let duration = turn.durations.get(index);
+        let (angle, coning) = reduce(&triad.bias, block, duration);
+        let (step, jacobian) = exp_with_jacobian(&rotation.vector(&angle, &coning));
+        sums.add(&(c * jacobian), &angle, &coning, block, duration);
         c *= step;
     }
-    (c, by)
+    (c, sums.by_entries(&triad.gain))
 }
 
 impl<T: Scalar, const P: usize> Model<T, P> for TurnModel<'_, T, P> {

@@ -66,15 +66,39 @@ struct Turns {
 impl GyrInput<'_> {
     fn turns(&self) -> Turns {
         let (bias, bias_std, wander) = rest_bias(self.rests);
-        let mut turns = Turns { data: Vec::new(), bias, bias_std, wander, left_out: Vec::new() };
+        let mut turns = Turns {
+            data: Vec::new(),
+            bias,
+            bias_std,
+            wander,
+            left_out: Vec::new(),
+        };
         for pair in self.used.windows(2) {
             let (i, j) = (pair[0], pair[1]);
-            let mean = |k: usize| if wander.interpolated { self.rests[k].gyr.mean() } else { bias };
-            let path = BiasPath { before: (self.rests[i].time, mean(i)), after: (self.rests[j].time, mean(j)) };
+            let mean = |k: usize| {
+                if wander.interpolated {
+                    self.rests[k].gyr.mean()
+                } else {
+                    bias
+                }
+            };
+            let path = BiasPath {
+                before: (self.rests[i].time, mean(i)),
+                after: (self.rests[j].time, mean(j)),
+            };
             let ends = (i, &self.rows[i], j, &self.rows[j]);
-            match compress(self.time, &self.sensor.values, self.usable, self.interval, ends, &path) {
+            match compress(
+                self.time,
+                &self.sensor.values,
+                self.usable,
+                self.interval,
+                ends,
+                &path,
+            ) {
                 Ok(data) => turns.data.push(data),
-                Err(gap) => turns.left_out.push(format!("turn from rest {} to {}: {gap}", i + 1, j + 1)),
+                Err(gap) => turns
+                    .left_out
+                    .push(format!("turn from rest {} to {}: {gap}", i + 1, j + 1)),
             }
         }
         turns
@@ -94,19 +118,41 @@ impl GyrInput<'_> {
 /// Mean rate at rest, its standard error, and how it moved from rest to rest.
 fn rest_bias(rests: &[Rest<f64>]) -> (Vector3<f64>, Vector3<f64>, BiasWander) {
     let total: f64 = rests.iter().map(|r| f64::from(r.gyr.count())).sum();
-    let bias = rests.iter().map(|r| r.gyr.mean() * f64::from(r.gyr.count())).sum::<Vector3<f64>>() / total;
+    let bias = rests
+        .iter()
+        .map(|r| r.gyr.mean() * f64::from(r.gyr.count()))
+        .sum::<Vector3<f64>>()
+        / total;
     let count = rests.len().max(2) as f64;
-    let spread = rests.iter().map(|r| (r.gyr.mean() - bias).map(|d| d * d)).sum::<Vector3<f64>>() / (count - 1.0);
-    let noise =
-        rests.iter().map(|r| r.gyr.variance() / f64::from(r.gyr.count().max(1))).sum::<Vector3<f64>>() / count;
+    let spread = rests
+        .iter()
+        .map(|r| (r.gyr.mean() - bias).map(|d| d * d))
+        .sum::<Vector3<f64>>()
+        / (count - 1.0);
+    let noise = rests
+        .iter()
+        .map(|r| r.gyr.variance() / f64::from(r.gyr.count().max(1)))
+        .sum::<Vector3<f64>>()
+        / count;
     let (spread, expected) = (spread.map(f64::sqrt), noise.map(f64::sqrt));
     let interpolated = (0..3).any(|axis| spread[axis] > WANDER * expected[axis]);
-    (bias, spread / count.sqrt(), BiasWander { spread, expected, interpolated })
+    (
+        bias,
+        spread / count.sqrt(),
+        BiasWander {
+            spread,
+            expected,
+            interpolated,
+        },
+    )
 }
 
 fn solve(turns: &[Turn<'_, f64>], start: SVector<f64, 9>) -> LevenbergMarquardt<f64, 9> {
     let mut solver = LevenbergMarquardt::new(start, Settings::default());
-    solver.run(&TurnModel { turns, form: FULL_GAIN });
+    solver.run(&TurnModel {
+        turns,
+        form: FULL_GAIN,
+    });
     solver
 }
 
@@ -116,10 +162,16 @@ fn identity() -> SVector<f64, 9> {
 
 /// Chord between the carried and the measured direction of each turn, rad.
 fn turn_errors(turns: &[Turn<'_, f64>], theta: &SVector<f64, 9>) -> Vec<f64> {
-    Residuals::of(&TurnModel { turns, form: FULL_GAIN }, theta)
-        .chunks_exact(3)
-        .map(|r| r.iter().map(|x| x * x).sum::<f64>().sqrt())
-        .collect()
+    Residuals::of(
+        &TurnModel {
+            turns,
+            form: FULL_GAIN,
+        },
+        theta,
+    )
+    .chunks_exact(3)
+    .map(|r| r.iter().map(|x| x * x).sum::<f64>().sqrt())
+    .collect()
 }
 
 fn rms(errors: &[f64]) -> f64 {
@@ -129,16 +181,25 @@ fn rms(errors: &[f64]) -> f64 {
 /// Gain's diagonal at one segmentation, for comparing segmentations; `None` where there are too few turns.
 pub fn trial(input: &GyrInput<'_>, start: &Matrix3<f64>) -> Option<Vector3<f64>> {
     let turns = input.turns();
-    let start = FULL_GAIN.theta(&Triad { gain: *start, bias: Vector3::zeros() });
-    let solver = (turns.data.len() >= LEAST_TURNS).then(|| solve(&input.with_directions(&turns.data), start))?;
-    solver.report().termination.was_successful().then(|| FULL_GAIN.triad(solver.theta()).gain.diagonal())
+    let start = FULL_GAIN.theta(&Triad {
+        gain: *start,
+        bias: Vector3::zeros(),
+    });
+    let solver =
+        (turns.data.len() >= LEAST_TURNS).then(|| solve(&input.with_directions(&turns.data), start))?;
+    solver
+        .report()
+        .termination
+        .was_successful()
+        .then(|| FULL_GAIN.triad(solver.theta()).gain.diagonal())
 }
 
 /// The outcome of a gyroscope whose accelerometer gives no directions.
 pub fn without_accelerometer(refusal: Refusal) -> SensorOutcome {
-    let advice = "a gyroscope without a rig is calibrated from the directions that an accepted accelerometer gives \
+    let advice =
+        "a gyroscope without a rig is calibrated from the directions that an accepted accelerometer gives \
                   at rest; see the accelerometer's reason"
-        .into();
+            .into();
     SensorOutcome {
         kind: SensorKind::Gyr,
         model: MODEL,
@@ -165,7 +226,11 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
         ));
     }
     let known = input.with_directions(&turns.data);
-    solver = if known.len() < input.used.len() { solve(&known, *solver.theta()) } else { solver };
+    solver = if known.len() < input.used.len() {
+        solve(&known, *solver.theta())
+    } else {
+        solver
+    };
     let summary = summarise(input, &turns, &known, &solver);
     match judge(&solver, &summary, &known) {
         Ok(()) => SensorOutcome {
@@ -177,7 +242,11 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
                 known
                     .iter()
                     .zip(&turns.data)
-                    .map(|(turn, data)| KnownTurn { data: data.clone(), before: turn.before, after: turn.after })
+                    .map(|(turn, data)| KnownTurn {
+                        data: data.clone(),
+                        before: turn.before,
+                        after: turn.after,
+                    })
                     .collect(),
             )),
         },
@@ -189,11 +258,19 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
 fn check_turns(input: &GyrInput<'_>, data: &[TurnData]) -> Result<(), Refusal> {
     let telling = data
         .iter()
-        .filter(|t| input.direction(t.rest_before).angle(&input.direction(t.rest_after)) > LEAST_ANGLE)
+        .filter(|t| {
+            input
+                .direction(t.rest_before)
+                .angle(&input.direction(t.rest_after))
+                > LEAST_ANGLE
+        })
         .count();
     match telling {
         0 => Err(Refusal::NoMotion),
-        have if have < LEAST_TURNS => Err(Refusal::TooFewObservations { have, need: LEAST_TURNS }),
+        have if have < LEAST_TURNS => Err(Refusal::TooFewObservations {
+            have,
+            need: LEAST_TURNS,
+        }),
         _ => Ok(()),
     }
 }
@@ -203,9 +280,19 @@ fn judge(
     summary: &FitSummary,
     known: &[Turn<'_, f64>],
 ) -> Result<(), Refusal> {
-    let limits = Limits { rms: LARGEST_RMS, ..Limits::for_norm(9, LEAST_TURNS) };
+    let limits = Limits {
+        rms: LARGEST_RMS,
+        ..Limits::for_norm(9, LEAST_TURNS)
+    };
     accept::check_report(&solver.report(), &limits)?;
-    let bend = accept::nonlinearity(solver, &TurnModel { turns: known, form: FULL_GAIN }, 1.0);
+    let bend = accept::nonlinearity(
+        solver,
+        &TurnModel {
+            turns: known,
+            form: FULL_GAIN,
+        },
+        1.0,
+    );
     accept::check_nonlinearity(bend, &limits)?;
     accept::check_plausibility(&summary.triad, true, summary.rms, &limits)
 }
@@ -218,13 +305,18 @@ fn refuse(refusal: Refusal, fit: Option<FitSummary>) -> SensorOutcome {
         Refusal::IllConditioned { .. } | Refusal::TooNonlinear { .. } => {
             "turn the sensor about all three of its axes between rests, by large angles and in both senses"
         }
-        Refusal::Implausible { .. } => "check the gyroscope's unit, axes and signs against the accelerometer's",
+        Refusal::Implausible { .. } => {
+            "check the gyroscope's unit, axes and signs against the accelerometer's"
+        }
         _ => "check the recording for clipping and wrong units",
     };
     SensorOutcome {
         kind: SensorKind::Gyr,
         model: MODEL,
-        verdict: Err(Refused { refusal, advice: advice.into() }),
+        verdict: Err(Refused {
+            refusal,
+            advice: advice.into(),
+        }),
         fit,
         evidence: None,
     }
@@ -252,10 +344,15 @@ fn summarise(
 ) -> FitSummary {
     let report = solver.report();
     let gain = FULL_GAIN.triad(solver.theta()).gain;
-    let covariance = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
+    let covariance = solver
+        .covariance()
+        .unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
     let gain_std = FULL_GAIN.triad(&covariance.diagonal().map(f64::sqrt)).gain;
     FitSummary {
-        triad: Triad { gain, bias: turns.bias },
+        triad: Triad {
+            gain,
+            bias: turns.bias,
+        },
         gain_std,
         bias_std: turns.bias_std,
         unit_in: input.sensor.unit,
@@ -267,7 +364,14 @@ fn summarise(
         parameters: 9,
         condition: report.condition,
         coverage: Coverage::of(known.iter().flat_map(|t| turn_axis(t))).share,
-        nonlinearity: accept::nonlinearity(solver, &TurnModel { turns: known, form: FULL_GAIN }, 1.0),
+        nonlinearity: accept::nonlinearity(
+            solver,
+            &TurnModel {
+                turns: known,
+                form: FULL_GAIN,
+            },
+            1.0,
+        ),
         inflation: 1.0,
         iterations: report.iterations,
         termination: report.termination,

@@ -6,7 +6,11 @@ use rayon::prelude::*;
 
 use crate::{
     observe::rest::{RestDetector, Samples},
-    recording::{Integrity, Recording, STANDARD_GRAVITY, SensorKind},
+    recording::{
+        Recording, SensorKind,
+        integrity::{self, Integrity},
+        unit::STANDARD_GRAVITY,
+    },
 };
 
 pub mod acc;
@@ -36,14 +40,18 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { acc: AccModel::T9, skip: Vec::new(), multipliers: segmentation::MULTIPLIERS.to_vec() }
+        Self {
+            acc: AccModel::T9,
+            skip: Vec::new(),
+            multipliers: segmentation::MULTIPLIERS.to_vec(),
+        }
     }
 }
 
 /// Calibrates every sensor the recording allows. `progress` is told of each stage.
 pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&str) + Sync)) -> Calibration {
     progress("checking the samples");
-    let integrity = Integrity::of(recording);
+    let integrity = integrity::inspect(recording);
     let mut calibration = Calibration {
         recording: recording.name.clone(),
         sensor_name: recording.manifest.sensor.name.clone().unwrap_or_default(),
@@ -52,13 +60,59 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         segmentation: None,
         warnings: Vec::new(),
     };
+    integrity_warnings(&integrity, &mut calibration.warnings);
     inertial(recording, &integrity, options, progress, &mut calibration);
-    if let Some(mag) = recording.mag.as_ref().filter(|_| !options.skip.contains(&SensorKind::Mag)) {
+    if let Some(mag) = recording
+        .mag
+        .as_ref()
+        .filter(|_| !options.skip.contains(&SensorKind::Mag))
+    {
         progress("fitting the magnetometer");
-        let field = recording.manifest.site.field_ned_ut.map(|f| Vector3::from(f).norm());
-        calibration.sensors.push(mag::calibrate(mag, integrity.usable(SensorKind::Mag), field));
+        let field = recording
+            .manifest
+            .site
+            .field_ned_ut
+            .map(|f| Vector3::from(f).norm());
+        let usable = usable(&integrity, SensorKind::Mag, recording.rows());
+        calibration.sensors.push(mag::calibrate(mag, &usable, field));
     }
     calibration
+}
+
+/// What was found wrong with the samples and left out, in words.
+fn integrity_warnings(integrity: &Integrity, warnings: &mut Vec<String>) {
+    for gap in &integrity.gaps {
+        warnings.push(format!(
+            "gap of {:.3} s before row {} (after t = {:.3} s)",
+            gap.duration, gap.row, gap.start
+        ));
+    }
+    for sensor in &integrity.sensors {
+        let prefix = sensor.sensor.prefix();
+        if sensor.missing > 0 {
+            warnings.push(format!("{prefix}: {} rows not measured", sensor.missing));
+        }
+        for stretch in &sensor.saturated {
+            let axis = ["x", "y", "z"][stretch.axis % 3];
+            let (from, to) = (stretch.rows.start, stretch.rows.end);
+            warnings.push(format!(
+                "{prefix}_{axis}: clipped in rows {from} to {to}; left out"
+            ));
+        }
+        for rows in &sensor.stuck {
+            warnings.push(format!(
+                "{prefix}: stuck in rows {} to {}; left out",
+                rows.start, rows.end
+            ));
+        }
+    }
+}
+
+/// Rows in which a sensor is measured, not clipped and not stuck; all rows where there is no such sensor.
+fn usable(integrity: &Integrity, kind: SensorKind, rows: usize) -> Vec<bool> {
+    integrity
+        .sensor(kind)
+        .map_or_else(|| vec![true; rows], |sensor| sensor.usable.clone())
 }
 
 /// Accelerometer and gyroscope, which share the rests.
@@ -71,7 +125,9 @@ fn inertial(
 ) {
     let Some(acc) = &recording.acc else {
         if recording.gyr.is_some() && !options.skip.contains(&SensorKind::Gyr) {
-            calibration.sensors.push(gyr::without_accelerometer(Refusal::NoRest));
+            calibration
+                .sensors
+                .push(gyr::without_accelerometer(Refusal::NoRest));
         }
         return;
     };
@@ -82,7 +138,12 @@ fn inertial(
         STANDARD_GRAVITY
     });
     progress("finding rests");
-    let usable = integrity.usable_together(recording);
+    let usable: Vec<bool> = usable(integrity, SensorKind::Acc, recording.rows())
+        .into_iter()
+        .zip(usable(integrity, SensorKind::Gyr, recording.rows()))
+        .map(|(acc, gyr)| acc && gyr)
+        .collect();
+    let interval = recording.median_interval().unwrap_or(1.0);
     let detector = RestDetector::new(
         Samples {
             time: &recording.time,
@@ -91,34 +152,49 @@ fn inertial(
             temperature: recording.temperature.as_deref(),
             usable: &usable,
         },
-        recording.median_interval(),
+        interval,
     );
     let cuts = segmentation::cuts(&detector, &options.multipliers, gravity);
-    let Some(chosen) = segmentation::choose(&cuts) else { return };
+    let Some(chosen) = segmentation::choose(&cuts) else {
+        return;
+    };
 
     progress("fitting the accelerometer");
     let result = acc::calibrate(&chosen.rests, acc, gravity, options.acc);
     let mut trials: Vec<_> = cuts.iter().map(Cut::trial).collect();
     let mut acc_outcome = result.outcome;
     if let Some(fit) = &mut acc_outcome.fit {
-        let gains: Vec<_> =
-            segmentation::comparable(&cuts).filter_map(|cut| Some(cut.fit?.0.gain.diagonal())).collect();
+        let gains: Vec<_> = segmentation::comparable(&cuts)
+            .filter_map(|cut| Some(cut.fit?.0.gain.diagonal()))
+            .collect();
         fit.gain_spread = Some(outcome::gain_spread(gains.iter().copied()));
     }
-    let gyr_outcome = recording.gyr.as_ref().filter(|_| !options.skip.contains(&SensorKind::Gyr)).map(|gyr| {
-        progress("fitting the gyroscope");
-        let shared = GyrShared { recording, gyr, usable: &usable };
-        match (&acc_outcome.verdict, acc_outcome.fit.as_ref()) {
-            (Ok(()), Some(fit)) => shared.outcome(chosen, &cuts, &fit.triad, &result.used, &mut trials),
-            (Err(refused), _) => gyr::without_accelerometer(refused.refusal),
-            (Ok(()), None) => gyr::without_accelerometer(Refusal::NoRest),
-        }
-    });
+    let gyr_outcome = recording
+        .gyr
+        .as_ref()
+        .filter(|_| !options.skip.contains(&SensorKind::Gyr))
+        .map(|gyr| {
+            progress("fitting the gyroscope");
+            let shared = GyrShared {
+                recording,
+                gyr,
+                usable: &usable,
+                interval,
+            };
+            match (&acc_outcome.verdict, acc_outcome.fit.as_ref()) {
+                (Ok(()), Some(fit)) => shared.outcome(chosen, &cuts, &fit.triad, &result.used, &mut trials),
+                (Err(refused), _) => gyr::without_accelerometer(refused.refusal),
+                (Ok(()), None) => gyr::without_accelerometer(Refusal::NoRest),
+            }
+        });
     if !options.skip.contains(&SensorKind::Acc) {
         calibration.sensors.push(acc_outcome);
     }
     calibration.sensors.extend(gyr_outcome);
-    let spreads = calibration.sensors.iter().filter_map(|s| s.fit.as_ref()?.gain_spread);
+    let spreads = calibration
+        .sensors
+        .iter()
+        .filter_map(|s| s.fit.as_ref()?.gain_spread);
     calibration.segmentation = Some(SegmentationReport {
         rests: chosen.rows.clone(),
         multiplier: chosen.multiplier,
@@ -134,6 +210,7 @@ struct GyrShared<'a> {
     recording: &'a Recording,
     gyr: &'a crate::recording::Triple,
     usable: &'a [bool],
+    interval: f64,
 }
 
 impl GyrShared<'_> {
@@ -142,7 +219,7 @@ impl GyrShared<'_> {
             time: &self.recording.time,
             sensor: self.gyr,
             usable: self.usable,
-            interval: self.recording.median_interval(),
+            interval: self.interval,
             rows: &cut.rows,
             rests: &cut.rests,
             used,
@@ -159,7 +236,9 @@ impl GyrShared<'_> {
         trials: &mut [outcome::ThresholdTrial],
     ) -> SensorOutcome {
         let mut outcome = gyr::calibrate(&self.input(chosen, acc, used));
-        let Some(fit) = &mut outcome.fit else { return outcome };
+        let Some(fit) = &mut outcome.fit else {
+            return outcome;
+        };
         let start = fit.triad.gain;
         // Directions come from each cut's own accelerometer fit, as they would had it been chosen.
         let gains: Vec<_> = cuts

@@ -4,7 +4,7 @@
 //! absolute values). Ordinary noise does not reach that in a lifetime; a knock on the table or a magnet does. Where
 //! more than [`MOST`] would go, none goes: then the model is wrong, not the data.
 
-use crate::observe::rest::median;
+use crate::recording::median;
 
 /// Robust standard deviations beyond which an observation is left out.
 pub const GROSS: f64 = 7.0;
@@ -23,14 +23,20 @@ pub fn outliers(residuals: &[f64]) -> Vec<(usize, f64)> {
     if residuals.len() < LEAST {
         return Vec::new();
     }
-    let Some(std) = robust_std(residuals).filter(|s| *s > 0.0) else { return Vec::new() };
+    let Some(std) = robust_std(residuals).filter(|s| *s > 0.0) else {
+        return Vec::new();
+    };
     let found: Vec<(usize, f64)> = residuals
         .iter()
         .enumerate()
         .map(|(k, r)| (k, r.abs() / std))
         .filter(|(_, size)| !(*size <= GROSS))
         .collect();
-    if found.len() as f64 > MOST * residuals.len() as f64 { Vec::new() } else { found }
+    if found.len() as f64 > MOST * residuals.len() as f64 {
+        Vec::new()
+    } else {
+        found
+    }
 }
 
 #[cfg(test)]

@@ -15,7 +15,10 @@ pub struct Rows<const P: usize> {
 impl<const P: usize> Rows<P> {
     /// All rows of a model.
     pub fn of(model: &impl Model<f64, P>, theta: &SVector<f64, P>) -> Self {
-        let mut rows = Self { residuals: Vec::new(), jacobian: Vec::new() };
+        let mut rows = Self {
+            residuals: Vec::new(),
+            jacobian: Vec::new(),
+        };
         model.rows(theta, &mut rows);
         rows
     }

@@ -14,9 +14,17 @@ const LONGEST_SHARE: f64 = 0.1;
 
 /// Factor on each parameter's standard error, at least 1. `unscaled` is (JᵀJ)⁻¹; rows are in time order.
 pub fn inflation<const P: usize>(rows: &Rows<P>, unscaled: &SMatrix<f64, P, P>) -> SVector<f64, P> {
-    let influence: Vec<SVector<f64, P>> =
-        rows.residuals.iter().zip(&rows.jacobian).map(|(r, j)| unscaled * j * *r).collect();
-    SVector::from_fn(|k, _| long_run_ratio(&influence.iter().map(|v| v[k]).collect::<Vec<_>>()).max(1.0).sqrt())
+    let influence: Vec<SVector<f64, P>> = rows
+        .residuals
+        .iter()
+        .zip(&rows.jacobian)
+        .map(|(r, j)| unscaled * j * *r)
+        .collect();
+    SVector::from_fn(|k, _| {
+        long_run_ratio(&influence.iter().map(|v| v[k]).collect::<Vec<_>>())
+            .max(1.0)
+            .sqrt()
+    })
 }
 
 /// Long-run variance of a series over its variance.
@@ -33,7 +41,11 @@ fn long_run_ratio(series: &[f64]) -> f64 {
 }
 
 fn autocovariance(series: &[f64], lag: usize) -> f64 {
-    series.iter().zip(series.iter().skip(lag)).map(|(a, b)| a * b).sum()
+    series
+        .iter()
+        .zip(series.iter().skip(lag))
+        .map(|(a, b)| a * b)
+        .sum()
 }
 
 /// Andrews' bandwidth for Bartlett's weights, from the first autocorrelation.

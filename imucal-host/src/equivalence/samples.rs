@@ -41,7 +41,12 @@ impl SampleEquivalence {
 
 /// Compares one sensor's corrections over a recording. `stored` is what was asked for, `record` what the device
 /// holds of it.
-pub fn compare(kind: SensorKind, triple: &Triple, stored: &StoredTriad, record: &TriadRecord) -> SampleEquivalence {
+pub fn compare(
+    kind: SensorKind,
+    triple: &Triple,
+    stored: &StoredTriad,
+    record: &TriadRecord,
+) -> SampleEquivalence {
     let corrector = Corrector::<f32>::from(record);
     let (mut samples, mut max, mut sum, mut max_ulp, mut largest) = (0usize, 0.0f64, 0.0f64, 0.0f64, 0.0f64);
     for value in triple.values.iter().filter(|v| v.iter().all(|x| x.is_finite())) {

@@ -10,6 +10,8 @@ use std::ops::Range;
 use imucal_core::observation::{Moments, Rest};
 use nalgebra::Vector3;
 
+use crate::recording::median;
+
 /// Window of the variance, s: long against vibration, short against a rest.
 pub const WINDOW: f64 = 1.0;
 /// The initial rest is looked for in this much of the recording, s.
@@ -73,7 +75,14 @@ impl<'a> RestDetector<'a> {
         let variance = windowed_variance(samples, half, GAP * interval);
         let rate = samples.gyr.map(|gyr| windowed_mean(gyr, samples.usable, half));
         let (noise, from_initial) = reference_noise(&variance, (INITIAL / interval).round() as usize, half);
-        Self { samples, variance, rate, noise, from_initial, interval }
+        Self {
+            samples,
+            variance,
+            rate,
+            noise,
+            from_initial,
+            interval,
+        }
     }
 
     /// Rows are single shots, seconds apart, each taken at rest.
@@ -89,12 +98,23 @@ impl<'a> RestDetector<'a> {
     /// The rests at a multiple of the reference variance.
     pub fn cut(&self, multiplier: f64) -> Segmentation {
         let threshold = multiplier * self.noise;
-        let rests = if self.is_shots() { self.shots() } else { self.runs(threshold) };
-        Segmentation { multiplier, threshold, rests }
+        let rests = if self.is_shots() {
+            self.shots()
+        } else {
+            self.runs(threshold)
+        };
+        Segmentation {
+            multiplier,
+            threshold,
+            rests,
+        }
     }
 
     fn shots(&self) -> Vec<Range<usize>> {
-        (0..self.samples.time.len()).filter(|k| self.samples.usable[*k]).map(|k| k..k + 1).collect()
+        (0..self.samples.time.len())
+            .filter(|k| self.samples.usable[*k])
+            .map(|k| k..k + 1)
+            .collect()
     }
 
     fn runs(&self, threshold: f64) -> Vec<Range<usize>> {
@@ -125,7 +145,10 @@ impl<'a> RestDetector<'a> {
     pub fn rest(&self, rows: &Range<usize>) -> Rest<f64> {
         let mut rest = Rest {
             time: 0.5 * (self.samples.time[rows.start] + self.samples.time[rows.end - 1]),
-            temperature: self.samples.temperature.map_or(f64::NAN, |t| mean_of_measured(&t[rows.clone()])),
+            temperature: self
+                .samples
+                .temperature
+                .map_or(f64::NAN, |t| mean_of_measured(&t[rows.clone()])),
             ..Rest::default()
         };
         for k in rows.clone().filter(|k| self.samples.usable[*k]) {
@@ -139,31 +162,33 @@ impl<'a> RestDetector<'a> {
 }
 
 fn mean_of_measured(values: &[f64]) -> f64 {
-    let (sum, count) =
-        values.iter().filter(|v| v.is_finite()).fold((0.0, 0u32), |(sum, count), v| (sum + v, count + 1));
+    let (sum, count) = values
+        .iter()
+        .filter(|v| v.is_finite())
+        .fold((0.0, 0u32), |(sum, count), v| (sum + v, count + 1));
     sum / f64::from(count)
 }
 
 /// Cuts out what turns so smoothly that the accelerometer does not notice (about the vertical).
 fn without_turning(quiet: Vec<bool>, rate: &[Vector3<f64>]) -> Vec<bool> {
     let bias = median_rate(&quiet, rate);
-    quiet.iter().zip(rate).map(|(still, w)| *still && (w - bias).norm() <= TURNING).collect()
+    quiet
+        .iter()
+        .zip(rate)
+        .map(|(still, w)| *still && (w - bias).norm() <= TURNING)
+        .collect()
 }
 
 fn median_rate(quiet: &[bool], rate: &[Vector3<f64>]) -> Vector3<f64> {
     // Windows overlap, so every tenth tells as much as all.
-    let chosen: Vec<&Vector3<f64>> =
-        quiet.iter().zip(rate).filter(|(still, _)| **still).map(|(_, w)| w).step_by(10).collect();
+    let chosen: Vec<&Vector3<f64>> = quiet
+        .iter()
+        .zip(rate)
+        .filter(|(still, _)| **still)
+        .map(|(_, w)| w)
+        .step_by(10)
+        .collect();
     Vector3::from_fn(|axis, _| median(chosen.iter().map(|w| w[axis]).collect()).unwrap_or(0.0))
-}
-
-/// Median of some values; `None` without any.
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = values.len() / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// Variance of the initial rest, or of the quietest tenth where the recording does not begin at rest.
@@ -172,12 +197,18 @@ fn reference_noise(variance: &[f64], initial_rows: usize, half: usize) -> (f64, 
     if finite.is_empty() {
         return (0.0, false);
     }
-    let initial = variance.get(half..initial_rows.max(half + 1).min(variance.len())).unwrap_or(&finite);
+    let initial = variance
+        .get(half..initial_rows.max(half + 1).min(variance.len()))
+        .unwrap_or(&finite);
     let initial = median(initial.to_vec()).unwrap_or(f64::INFINITY);
     let mut sorted = finite;
     let tenth = sorted.len() / 10;
     let quietest = *sorted.select_nth_unstable_by(tenth, f64::total_cmp).1;
-    if initial <= INITIAL_EXCESS * quietest { (initial, true) } else { (quietest, false) }
+    if initial <= INITIAL_EXCESS * quietest {
+        (initial, true)
+    } else {
+        (quietest, false)
+    }
 }
 
 /// Rows around each row that its window holds.
@@ -187,7 +218,12 @@ fn window(k: usize, half: usize, rows: usize) -> Range<usize> {
 
 fn windowed_variance(samples: Samples<'_>, half: usize, longest_gap: f64) -> Vec<f64> {
     let rows = samples.acc.len();
-    let origin = samples.acc.iter().find(|v| v.iter().all(|x| x.is_finite())).copied().unwrap_or_default();
+    let origin = samples
+        .acc
+        .iter()
+        .find(|v| v.iter().all(|x| x.is_finite()))
+        .copied()
+        .unwrap_or_default();
     // Running sums from a value near the data: differences of sums then lose no digits that matter.
     let mut sums = Vec::with_capacity(rows + 1);
     let (mut sum, mut square, mut broken) = (Vector3::zeros(), 0.0, 0u32);
@@ -238,7 +274,9 @@ fn windowed_mean(values: &[Vector3<f64>], usable: &[bool], half: usize) -> Vec<V
 
 /// Spread of a rest's mean that its own samples explain, per axis.
 pub fn mean_std(moments: &Moments<f64>) -> Vector3<f64> {
-    moments.variance().map(|v| (v / f64::from(moments.count().max(1))).sqrt())
+    moments
+        .variance()
+        .map(|v| (v / f64::from(moments.count().max(1))).sqrt())
 }
 
 #[cfg(test)]
@@ -252,7 +290,11 @@ mod tests {
         (0..1000)
             .map(|k| {
                 let noise = if k % 2 == 0 { 0.01 } else { -0.01 };
-                let shake = if (400..600).contains(&k) { (k as f64 * 0.3).sin() } else { 0.0 };
+                let shake = if (400..600).contains(&k) {
+                    (k as f64 * 0.3).sin()
+                } else {
+                    0.0
+                };
                 (k as f64 * DT, Vector3::new(noise + shake, noise, 9.8 - noise))
             })
             .unzip()
@@ -262,7 +304,13 @@ mod tests {
     fn two_rests_around_a_motion_are_found_and_hold_none_of_it() {
         let (time, acc) = shaken();
         let usable = vec![true; time.len()];
-        let samples = Samples { time: &time, acc: &acc, gyr: None, temperature: None, usable: &usable };
+        let samples = Samples {
+            time: &time,
+            acc: &acc,
+            gyr: None,
+            temperature: None,
+            usable: &usable,
+        };
         let cut = RestDetector::new(samples, DT).cut(4.0);
         assert_eq!(cut.rests.len(), 2, "{cut:?}");
         assert!(cut.rests[0].end <= 400 && cut.rests[1].start >= 600);
@@ -272,12 +320,26 @@ mod tests {
     #[test]
     fn a_smooth_turn_about_the_vertical_is_no_rest() {
         let (time, mut acc) = shaken();
-        acc.iter_mut().enumerate().for_each(|(k, a)| *a = Vector3::new(0.01 * f64::from(k as u8 % 2), 0.0, 9.8));
+        acc.iter_mut()
+            .enumerate()
+            .for_each(|(k, a)| *a = Vector3::new(0.01 * f64::from(k as u8 % 2), 0.0, 9.8));
         let gyr: Vec<_> = (0..1000)
-            .map(|k| if (400..600).contains(&k) { Vector3::new(0.1, 0.1, 1.0) } else { Vector3::new(0.1, 0.1, 0.1) })
+            .map(|k| {
+                if (400..600).contains(&k) {
+                    Vector3::new(0.1, 0.1, 1.0)
+                } else {
+                    Vector3::new(0.1, 0.1, 0.1)
+                }
+            })
             .collect();
         let usable = vec![true; time.len()];
-        let samples = Samples { time: &time, acc: &acc, gyr: Some(&gyr), temperature: None, usable: &usable };
+        let samples = Samples {
+            time: &time,
+            acc: &acc,
+            gyr: Some(&gyr),
+            temperature: None,
+            usable: &usable,
+        };
         let cut = RestDetector::new(samples, DT).cut(4.0);
         assert_eq!(cut.rests.len(), 2, "{cut:?}");
     }
@@ -288,8 +350,18 @@ mod tests {
         time.iter_mut().skip(200).for_each(|t| *t += 1.0);
         let mut usable = vec![true; time.len()];
         usable[800] = false;
-        let samples = Samples { time: &time, acc: &acc, gyr: None, temperature: None, usable: &usable };
+        let samples = Samples {
+            time: &time,
+            acc: &acc,
+            gyr: None,
+            temperature: None,
+            usable: &usable,
+        };
         let cut = RestDetector::new(samples, DT).cut(4.0);
-        assert!(cut.rests.iter().all(|r| !r.contains(&800) && !(r.contains(&199) && r.contains(&200))));
+        assert!(
+            cut.rests
+                .iter()
+                .all(|r| !r.contains(&800) && !(r.contains(&199) && r.contains(&200)))
+        );
     }
 }

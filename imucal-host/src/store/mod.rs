@@ -9,7 +9,7 @@ pub mod record_form;
 
 use crate::{
     calibrate::{Calibration, FitSummary},
-    recording::{SensorKind, Unit, atomic_file},
+    recording::{AtomicFile, SensorKind, Unit},
 };
 
 /// What the first line of the TOML says.
@@ -138,7 +138,7 @@ pub enum LoadError {
         what: &'static str,
     },
     /// The record is damaged, foreign or newer.
-    #[error("{path}: {}; copy it again from its source, or calibrate again", .source)]
+    #[error("{path}: {source}; copy it again from its source, or calibrate again")]
     Record {
         /// The file.
         path: PathBuf,
@@ -151,10 +151,17 @@ pub enum LoadError {
 #[derive(Debug, thiserror::Error)]
 pub enum SaveError {
     /// The file cannot be written.
-    #[error(transparent)]
-    File(#[from] atomic_file::WriteFileError),
+    #[error("{path}: cannot be written: {source}; check the folder and its permissions; nothing was changed")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
     /// A field does not fit the record.
-    #[error("{path}: {field} `{text}` is longer than the record's {limit} bytes; shorten it in the recording's TOML")]
+    #[error(
+        "{path}: {field} `{text}` is longer than the record's {limit} bytes; shorten it in the recording's TOML"
+    )]
     TooLong {
         /// The file.
         path: PathBuf,
@@ -210,26 +217,42 @@ impl StoredCalibration {
     /// # Errors
     /// [`LoadError`] names the file and what is wrong with it.
     pub fn load(path: &Path) -> Result<Self, LoadError> {
-        let bytes = std::fs::read(path).map_err(|source| LoadError::Io { path: path.into(), source })?;
+        let bytes = std::fs::read(path).map_err(|source| LoadError::Io {
+            path: path.into(),
+            source,
+        })?;
         if is_toml(path, &bytes) {
             Self::from_toml(path, &bytes)
         } else {
-            let record = record::decode(&bytes)
-                .map_err(|source| LoadError::Record { path: path.into(), source })?;
+            let record = record::decode(&bytes).map_err(|source| LoadError::Record {
+                path: path.into(),
+                source,
+            })?;
             Ok(Self::from_record(&record))
         }
     }
 
     fn from_toml(path: &Path, bytes: &[u8]) -> Result<Self, LoadError> {
-        let wrong = |reason: String| LoadError::Toml { path: path.into(), reason };
+        let wrong = |reason: String| LoadError::Toml {
+            path: path.into(),
+            reason,
+        };
         let text = std::str::from_utf8(bytes).map_err(|e| wrong(e.to_string()))?;
-        let stored: Self = toml::from_str(text).map_err(|e| wrong(e.to_string().trim().replace('\n', " ")))?;
+        let stored: Self =
+            toml::from_str(text).map_err(|e| wrong(e.to_string().trim().replace('\n', " ")))?;
         if stored.format != FORMAT {
-            return Err(LoadError::Format { path: path.into(), found: stored.format });
+            return Err(LoadError::Format {
+                path: path.into(),
+                found: stored.format,
+            });
         }
         for kind in SensorKind::ALL {
             if let Some(what) = stored.triad(kind).and_then(StoredTriad::defect) {
-                return Err(LoadError::Unusable { path: path.into(), sensor: kind, what });
+                return Err(LoadError::Unusable {
+                    path: path.into(),
+                    sensor: kind,
+                    what,
+                });
             }
         }
         Ok(stored)
@@ -242,7 +265,7 @@ impl StoredCalibration {
     pub fn save_toml(&self, path: &Path) -> Result<(), SaveError> {
         // Serialising plain numbers and text into a string cannot fail.
         let text = toml::to_string(self).unwrap_or_default();
-        Ok(atomic_file::write(path, text.as_bytes())?)
+        write_whole(path, text.as_bytes())
     }
 
     /// Writes the record, whole or not at all.
@@ -252,15 +275,26 @@ impl StoredCalibration {
     pub fn save_record(&self, path: &Path) -> Result<(), SaveError> {
         let record = self.to_record(path)?;
         let mut buffer = [0; record::MAX_LEN];
-        let bytes = record::encode(&record, &mut buffer)
-            .map_err(|source| SaveError::Encode { path: path.into(), source })?;
-        Ok(atomic_file::write(path, bytes)?)
+        let bytes = record::encode(&record, &mut buffer).map_err(|source| SaveError::Encode {
+            path: path.into(),
+            source,
+        })?;
+        write_whole(path, bytes)
     }
+}
+
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), SaveError> {
+    AtomicFile::write_whole(path, bytes).map_err(|source| SaveError::File {
+        path: path.into(),
+        source,
+    })
 }
 
 /// A file is TOML by its name, or because it is text.
 fn is_toml(path: &Path, bytes: &[u8]) -> bool {
-    path.extension().is_some_and(|ext| ext.eq_ignore_ascii_case("toml")) || bytes.starts_with(b"format")
+    path.extension()
+        .is_some_and(|ext| ext.eq_ignore_ascii_case("toml"))
+        || bytes.starts_with(b"format")
 }
 
 impl StoredTriad {

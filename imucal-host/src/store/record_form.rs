@@ -27,8 +27,17 @@ fn unit(unit: RawUnit) -> Unit {
     unit.symbol().parse().unwrap_or(Unit::Arbitrary)
 }
 
-fn text<const N: usize>(path: &Path, field: &'static str, text: &str) -> Result<heapless::String<N>, SaveError> {
-    text.parse().map_err(|_| SaveError::TooLong { path: path.into(), field, text: text.into(), limit: N })
+fn text<const N: usize>(
+    path: &Path,
+    field: &'static str,
+    text: &str,
+) -> Result<heapless::String<N>, SaveError> {
+    text.parse().map_err(|_| SaveError::TooLong {
+        path: path.into(),
+        field,
+        text: text.into(),
+        limit: N,
+    })
 }
 
 impl StoredCalibration {
@@ -147,7 +156,9 @@ pub mod date_text {
     fn parse(text: &str) -> Option<Date> {
         let year: u32 = text.get(..4)?.parse().ok()?;
         let first = year.checked_sub(1970)?.checked_mul(365)?;
-        (first..first + 366 + year / 4).map(Date::from_days).find(|date| date.to_string() == text)
+        (first..first + 366 + year / 4)
+            .map(Date::from_days)
+            .find(|date| date.to_string() == text)
     }
 }
 
@@ -161,7 +172,10 @@ mod tests {
             format: FORMAT.into(),
             recording: String::new(),
             date: Date::from_days(20_778),
-            sensor: StoredSensor { name: "MTx".into(), serial: "00300512".into() },
+            sensor: StoredSensor {
+                name: "MTx".into(),
+                serial: "00300512".into(),
+            },
             acc: Some(StoredTriad {
                 model: "T9".into(),
                 unit_in: Unit::Counts,
@@ -202,6 +216,9 @@ mod tests {
         let mut long = stored();
         long.sensor.serial = "x".repeat(33);
         let message = long.to_record(Path::new("x.bin")).unwrap_err().to_string();
-        assert!(message.contains("x.bin") && message.contains("serial") && message.contains("32"), "{message}");
+        assert!(
+            message.contains("x.bin") && message.contains("serial") && message.contains("32"),
+            "{message}"
+        );
     }
 }

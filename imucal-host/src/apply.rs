@@ -1,0 +1,178 @@
+//! Apply: a recording corrected by the core, in `f32`, as the device would.
+
+use imucal_core::{
+    corrector::Corrector,
+    record::{CalibrationRecord, Match, TriadRecord},
+};
+
+use crate::{
+    recording::{Nominal, Recording, SensorKind, Unit},
+    store::{StoredCalibration, StoredTriad},
+};
+
+/// Why a calibration does not fit a recording.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ApplyError {
+    /// It was made for another sensor.
+    #[error(
+        "{recording}: recorded with serial `{connected}`, but the calibration was made for `{recorded}`; use the \
+         calibration of this sensor, or --force"
+    )]
+    WrongSensor {
+        /// The recording.
+        recording: String,
+        /// Serial of the calibration.
+        recorded: String,
+        /// Serial of the recording.
+        connected: String,
+    },
+    /// Raw values are in another unit than the calibration expects.
+    #[error(
+        "{recording}: {sensor} is in {found}, the calibration takes {expected}; calibrate a recording in {found}, or \
+         export this one in {expected}"
+    )]
+    WrongUnit {
+        /// The recording.
+        recording: String,
+        /// Which sensor.
+        sensor: SensorKind,
+        /// Unit of the recording.
+        found: Unit,
+        /// Unit of the calibration.
+        expected: Unit,
+    },
+    /// Nothing in the recording is calibrated.
+    #[error(
+        "{recording}: holds none of the sensors that the calibration is for; check that both belong together"
+    )]
+    NothingToApply {
+        /// The recording.
+        recording: String,
+    },
+}
+
+/// Whether a calibration belongs to a recording; a warning where nobody can tell. `force` turns the refusal of
+/// another serial into a warning.
+///
+/// # Errors
+/// [`ApplyError`] for another serial, another unit, or nothing in common.
+pub fn check(
+    recording: &Recording,
+    stored: &StoredCalibration,
+    record: &CalibrationRecord,
+    force: bool,
+) -> Result<Option<String>, ApplyError> {
+    let serial = recording.manifest.sensor.serial.as_deref().unwrap_or_default();
+    let warning = match record.made_for(serial) {
+        Ok(Match::Confirmed) => None,
+        Ok(Match::Unknown) => Some(format!(
+            "{}: no serial on one side, so nobody can tell whether the calibration is this sensor's",
+            recording.name
+        )),
+        Err(wrong) if force => Some(format!("{wrong}; applied by --force")),
+        Err(wrong) => {
+            return Err(ApplyError::WrongSensor {
+                recording: recording.name.clone(),
+                recorded: wrong.recorded.into(),
+                connected: wrong.connected.into(),
+            });
+        }
+    };
+    let mut any = false;
+    for kind in SensorKind::ALL {
+        let (Some(triple), Some(triad)) = (recording.sensor(kind), stored.triad(kind)) else {
+            continue;
+        };
+        any = true;
+        if triple.unit != triad.unit_in {
+            return Err(ApplyError::WrongUnit {
+                recording: recording.name.clone(),
+                sensor: kind,
+                found: triple.unit,
+                expected: triad.unit_in,
+            });
+        }
+    }
+    if any {
+        Ok(warning)
+    } else {
+        Err(ApplyError::NothingToApply {
+            recording: recording.name.clone(),
+        })
+    }
+}
+
+/// The recording with every calibrated sensor corrected, in calibrated units; the others as they were.
+pub fn apply(recording: &Recording, stored: &StoredCalibration, record: &CalibrationRecord) -> Recording {
+    let mut corrected = recording.clone();
+    let temperature = recording.temperature.as_deref();
+    for kind in SensorKind::ALL {
+        let (Some(stored), Some(triad)) = (stored.triad(kind), triad_record(record, kind)) else {
+            continue;
+        };
+        let triple = match kind {
+            SensorKind::Acc => &mut corrected.acc,
+            SensorKind::Gyr => &mut corrected.gyr,
+            SensorKind::Mag => &mut corrected.mag,
+        };
+        let Some(triple) = triple else { continue };
+        let corrector = Corrector::<f32>::from(triad);
+        let nominal = nominal_out(stored, triple.nominal);
+        for (row, value) in triple.values.iter_mut().enumerate() {
+            let raw = value.map(|x| triple.nominal.to_raw(x) as f32);
+            let warmth = temperature.map_or(f32::NAN, |t| t[row] as f32);
+            *value = corrector
+                .apply_at(&raw, warmth)
+                .map(|x| nominal.to_si(f64::from(x)));
+        }
+        triple.unit = stored.unit_out;
+        triple.full_scale = triple.full_scale_si().map(|scale| scale * nominal.per_unit.abs());
+        triple.nominal = nominal;
+        set_unit(&mut corrected, kind, stored.unit_out);
+    }
+    corrected
+}
+
+/// The device's part of a record for one sensor.
+pub fn triad_record(record: &CalibrationRecord, kind: SensorKind) -> Option<&TriadRecord> {
+    match kind {
+        SensorKind::Acc => record.acc.as_ref(),
+        SensorKind::Gyr => record.gyr.as_ref(),
+        SensorKind::Mag => record.mag.as_ref(),
+    }
+}
+
+/// Conversion of calibrated values; counts without their offset, which the calibration took out.
+fn nominal_out(stored: &StoredTriad, before: Nominal) -> Nominal {
+    match stored.unit_out.per_si() {
+        Some(per_unit) => Nominal {
+            offset: 0.0,
+            per_unit,
+        },
+        None => Nominal {
+            offset: 0.0,
+            per_unit: before.per_unit,
+        },
+    }
+}
+
+fn set_unit(recording: &mut Recording, kind: SensorKind, unit: Unit) {
+    let units = &mut recording.manifest.units;
+    let counts = &mut recording.manifest.counts;
+    let ranges = &mut recording.manifest.ranges;
+    let (slot, counts, range) = match kind {
+        SensorKind::Acc => (&mut units.acc, &mut counts.acc, &mut ranges.acc),
+        SensorKind::Gyr => (&mut units.gyr, &mut counts.gyr, &mut ranges.gyr),
+        SensorKind::Mag => (&mut units.mag, &mut counts.mag, &mut ranges.mag),
+    };
+    let before = slot.per_si().or(counts.map(|c| c.per_unit));
+    *slot = unit;
+    let after = unit.per_si().or(counts.map(|c| c.per_unit));
+    if let (Some(range), Some(before), Some(after)) = (range.as_mut(), before, after) {
+        *range *= after / before;
+    }
+    match (unit, counts.as_mut()) {
+        (Unit::Counts, Some(counts)) => counts.offset = 0.0,
+        _ => *counts = None,
+    }
+}

@@ -1,0 +1,91 @@
+//! `imucal inspect`
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::Ending;
+use crate::{
+    recording::SensorKind,
+    report::{
+        measure::{measure, plain},
+        table::words,
+    },
+    store::{LoadError, StoredCalibration, StoredTriad},
+};
+
+#[derive(Args, Debug)]
+pub(super) struct Arguments {
+    /// The calibration: TOML or record
+    calibration: PathBuf,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let stored = match StoredCalibration::load(&arguments.calibration) {
+        Ok(stored) => stored,
+        // The file was read; what it says is that it must not be used.
+        Err(damaged @ (LoadError::Record { .. } | LoadError::Unusable { .. })) => {
+            println!("{damaged}");
+            return Ok(Ending::Refused);
+        }
+        Err(unreadable) => return Err(unreadable.into()),
+    };
+    println!("{}: intact", arguments.calibration.display());
+    let or_unknown = |text: &str| {
+        if text.is_empty() {
+            "unknown".to_owned()
+        } else {
+            text.to_owned()
+        }
+    };
+    println!(
+        "sensor {}, serial {}",
+        or_unknown(&stored.sensor.name),
+        or_unknown(&stored.sensor.serial)
+    );
+    println!("made on {}", stored.date);
+    for kind in SensorKind::ALL {
+        match stored.triad(kind) {
+            Some(triad) => print_triad(kind, triad),
+            None => println!("{}: not calibrated", words(kind)),
+        }
+    }
+    Ok(Ending::Done)
+}
+
+fn print_triad(kind: SensorKind, triad: &StoredTriad) {
+    println!(
+        "{} ({}): calibrated [{}] = gain · (raw [{}] − bias)",
+        words(kind),
+        triad.model,
+        triad.unit_out,
+        triad.unit_in
+    );
+    for row in 0..3 {
+        let gain: Vec<String> = (0..3)
+            .map(|column| measure(triad.gain[row][column], triad.gain_std[row][column]))
+            .collect();
+        println!(
+            "  {}  {:>26} {:>26} {:>26}   {:>22}",
+            ["x", "y", "z"][row],
+            gain[0],
+            gain[1],
+            gain[2],
+            measure(triad.bias[row], triad.bias_std[row])
+        );
+    }
+    let unit = if kind == SensorKind::Gyr {
+        "rad a turn".into()
+    } else {
+        triad.unit_out.to_string()
+    };
+    let held = triad.held_out_rms.map_or_else(|| "not known".into(), plain);
+    println!(
+        "  {} observations, {} parameters; rms {} {unit}, held out {held}; condition {:.1}, coverage {:.0} %",
+        triad.observations,
+        triad.parameters,
+        plain(triad.rms),
+        triad.condition,
+        100.0 * triad.coverage
+    );
+}

@@ -1,0 +1,76 @@
+//! The program's commands. One file each; this one only reads the command line and says how it ended.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+mod apply;
+mod calibrate;
+mod demo;
+mod inspect;
+mod progress;
+mod verify;
+
+/// Calibrates inertial and magnetic sensors from recordings, through the code that runs on their microcontroller.
+#[derive(Debug, Parser)]
+#[command(name = "imucal", version, about, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Fit what a recording allows; print it with standard errors; refuse what it cannot tell.
+    Calibrate(calibrate::Arguments),
+    /// Correct a recording through the core, as the device would.
+    Apply(apply::Arguments),
+    /// Say what a calibration holds, how good it was, and whether it is intact.
+    Inspect(inspect::Arguments),
+    /// Compare the core in f32 with a reference in f64, sample by sample and fit by fit.
+    Verify(verify::Arguments),
+    /// The whole way on a simulated sensor: record, calibrate, pack, apply, verify.
+    Demo(demo::Arguments),
+}
+
+/// How a command ended, when nothing went wrong on the way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ending {
+    /// Done.
+    Done,
+    /// The data were read, but the answer is a refusal or a failed check.
+    Refused,
+}
+
+/// Runs the program: 0 done, 1 refused or a check failed, 2 bad usage or unreadable input.
+pub fn run() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Calibrate(arguments) => calibrate::run(&arguments),
+        Command::Apply(arguments) => apply::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Verify(arguments) => verify::run(&arguments),
+        Command::Demo(arguments) => demo::run(&arguments),
+    };
+    match result {
+        Ok(Ending::Done) => ExitCode::SUCCESS,
+        Ok(Ending::Refused) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("imucal: error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Tells the user of something on standard error.
+fn warn(message: &dyn std::fmt::Display) {
+    eprintln!("imucal: warning: {message}");
+}
+
+/// Reads a recording and tells of what was odd in it.
+fn read(path: &std::path::Path) -> anyhow::Result<crate::recording::Recording> {
+    let recording = crate::recording::Recording::read(path)?;
+    for warning in &recording.warnings {
+        warn(warning);
+    }
+    Ok(recording)
+}

@@ -1,0 +1,118 @@
+//! `imucal verify`
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{Ending, progress::Progress, read, warn};
+use crate::{
+    apply::{self, triad_record},
+    calibrate::{AccModel, Options, calibrate},
+    equivalence::{FitEquivalence, SampleEquivalence, fits, samples},
+    recording::{Recording, SensorKind},
+    report::table::words,
+    store::StoredCalibration,
+};
+
+#[derive(Args, Debug)]
+pub(super) struct Arguments {
+    /// The recording to replay
+    recording: PathBuf,
+    /// The calibration: TOML or record
+    #[arg(long, value_name = "CAL")]
+    calibration: PathBuf,
+    /// Compare although the calibration was made for another serial
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let recording = read(&arguments.recording)?;
+    let stored = StoredCalibration::load(&arguments.calibration)?;
+    let record = stored.to_record(&arguments.calibration)?;
+    match apply::check(&recording, &stored, &record, arguments.force) {
+        Ok(warning) => warning.iter().for_each(|w| warn(w)),
+        Err(refusal) => {
+            eprintln!("imucal: refused: {refusal}");
+            return Ok(Ending::Refused);
+        }
+    }
+    let progress = Progress::start();
+    progress.stage("comparing samples");
+    let samples: Vec<SampleEquivalence> = SensorKind::ALL
+        .into_iter()
+        .filter_map(|kind| {
+            let (triple, triad) = (recording.sensor(kind)?, stored.triad(kind)?);
+            Some(samples::compare(
+                kind,
+                triple,
+                triad,
+                triad_record(&record, kind)?,
+            ))
+        })
+        .collect();
+    progress.stage("fitting again, by the core and by the reference");
+    let fits = refit(&recording, &stored);
+    drop(progress);
+    samples.iter().for_each(print_samples);
+    fits.iter().for_each(print_fit);
+    let passed = samples.iter().all(SampleEquivalence::passes) && fits.iter().all(FitEquivalence::passes);
+    println!("{}", if passed { "equivalent" } else { "NOT equivalent" });
+    Ok(if passed { Ending::Done } else { Ending::Refused })
+}
+
+/// Fits again whatever the recording and the calibration share.
+fn refit(recording: &Recording, stored: &StoredCalibration) -> Vec<FitEquivalence> {
+    let acc = stored
+        .acc
+        .as_ref()
+        .is_some_and(|t| t.model == AccModel::T6.name());
+    let options = Options {
+        acc: if acc { AccModel::T6 } else { AccModel::T9 },
+        ..Options::default()
+    };
+    let calibration = calibrate(recording, &options, &|_| {});
+    calibration
+        .sensors
+        .iter()
+        .filter(|outcome| stored.triad(outcome.kind).is_some())
+        .filter_map(|outcome| fits::compare(recording, outcome))
+        .collect()
+}
+
+fn print_samples(s: &SampleEquivalence) {
+    println!(
+        "{}: {} samples: f32 core against f64 reference: max {:.3e} {unit}, rms {:.3e} {unit}, max {:.0} ulp; {:.2e} of \
+         full scale ({:.4} {unit}), limit {:.0e}: {}",
+        words(s.kind),
+        s.samples,
+        s.max,
+        s.rms,
+        s.max_ulp,
+        s.max / s.full_scale,
+        s.full_scale,
+        samples::LIMIT,
+        if s.passes() { "ok" } else { "FAILED" },
+        unit = s.unit,
+    );
+}
+
+fn print_fit(fit: &FitEquivalence) {
+    println!(
+        "{}: fitted again: f32 core (stopped by {}) against f64 reference, nominal SI: {}",
+        words(fit.kind),
+        fit.termination.name(),
+        if fit.passes() { "ok" } else { "FAILED" }
+    );
+    for p in &fit.parameters {
+        println!(
+            "  {:<8} {:>14.8} {:>14.8}  difference {:>9.1e} = {:>7.1} ulp = {:.4} standard errors",
+            p.name,
+            p.device,
+            p.reference,
+            p.device - p.reference,
+            p.ulp,
+            (p.device - p.reference).abs() / p.std
+        );
+    }
+}

@@ -1,0 +1,126 @@
+//! The calibration as JSON, by the contract `imucal-calibration/1`.
+
+use nalgebra::{Matrix3, Vector3};
+use serde_json::{Value, json};
+
+use crate::{
+    calibrate::{Calibration, FitSummary, SegmentationReport, SensorOutcome},
+    recording::SensorKind,
+    store::FORMAT,
+};
+
+/// The whole document.
+pub fn calibration(calibration: &Calibration) -> Value {
+    let sensors: serde_json::Map<String, Value> = calibration
+        .sensors
+        .iter()
+        .map(|outcome| (outcome.kind.prefix().to_owned(), sensor(outcome)))
+        .collect();
+    json!({
+        "format": FORMAT,
+        "recording": calibration.recording,
+        "sensor": {"name": calibration.sensor_name, "serial": calibration.serial},
+        "sensors": sensors,
+        "segmentation": calibration.segmentation.as_ref().map(segmentation),
+        "warnings": calibration.warnings,
+    })
+}
+
+fn rows(m: &Matrix3<f64>) -> Value {
+    json!(
+        (0..3)
+            .map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]])
+            .collect::<Vec<_>>()
+    )
+}
+
+fn vector(v: &Vector3<f64>) -> Value {
+    json!([v.x, v.y, v.z])
+}
+
+fn sensor(outcome: &SensorOutcome) -> Value {
+    let mut value = match &outcome.fit {
+        Some(fit) => fit_value(outcome.kind, fit),
+        None => json!({}),
+    };
+    let (status, reason, detail, advice) = match &outcome.verdict {
+        Ok(()) => ("accepted", None, None, None),
+        Err(refused) => (
+            "refused",
+            Some(refused.refusal.reason()),
+            Some(refused.refusal.to_string()),
+            Some(refused.advice.as_str()),
+        ),
+    };
+    if let Some(fields) = value.as_object_mut() {
+        fields.insert("status".into(), json!(status));
+        fields.insert("reason".into(), json!(reason));
+        fields.insert("detail".into(), json!(detail));
+        fields.insert("advice".into(), json!(advice));
+        fields.insert("model".into(), json!(outcome.model));
+    }
+    value
+}
+
+fn fit_value(kind: SensorKind, fit: &FitSummary) -> Value {
+    let triad = fit.raw_triad();
+    let (gain_std, bias_std) = fit.raw_std();
+    let rms_unit = match kind {
+        SensorKind::Gyr => "rad".into(),
+        _ => fit.unit_out.to_string(),
+    };
+    let rig = match kind {
+        SensorKind::Acc => json!({"tilt_x": null, "tilt_y": null, "tilt_std": null}),
+        SensorKind::Gyr => Value::Null,
+        SensorKind::Mag => json!({"outer_hard_iron": null, "middle_hard_iron": null}),
+    };
+    json!({
+        "gain": rows(&triad.gain),
+        "bias": vector(&triad.bias),
+        "gain_std": rows(&gain_std),
+        "bias_std": vector(&bias_std),
+        "unit_in": fit.unit_in.to_string(),
+        "unit_out": fit.unit_out.to_string(),
+        "observations": fit.observations,
+        "parameters": fit.parameters,
+        "rms": fit.rms,
+        "held_out_rms": fit.held_out_rms,
+        "rms_unit": rms_unit,
+        "condition": fit.condition,
+        "coverage": fit.coverage,
+        "nonlinearity": fit.nonlinearity,
+        "std_inflation": fit.inflation,
+        "iterations": fit.iterations,
+        "termination": fit.termination.name(),
+        "field_norm": fit.field_norm,
+        "left_out": fit.left_out,
+        "gain_spread_over_thresholds": fit.gain_spread,
+        "bias_interpolated": fit.bias_wander.map(|w| w.interpolated),
+        "rig": rig,
+    })
+}
+
+fn segmentation(segmentation: &SegmentationReport) -> Value {
+    let trials: Vec<Value> = segmentation
+        .trials
+        .iter()
+        .map(|trial| {
+            json!({
+                "multiplier": trial.multiplier,
+                "rests": trial.rests,
+                "acc_gain": trial.acc_gain.as_ref().map(vector),
+                "acc_rms": trial.acc_rms,
+                "gyr_gain": trial.gyr_gain.as_ref().map(vector),
+            })
+        })
+        .collect();
+    json!({
+        "rests": segmentation.rests.len(),
+        "intervals": segmentation.rests.iter().map(|r| [r.start, r.end]).collect::<Vec<_>>(),
+        "multiplier": segmentation.multiplier,
+        "threshold": segmentation.threshold,
+        "from_initial_rest": segmentation.from_initial_rest,
+        "gain_spread_over_thresholds": segmentation.gain_spread,
+        "thresholds": trials,
+    })
+}

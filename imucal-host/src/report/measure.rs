@@ -1,0 +1,55 @@
+//! A value with its standard error, in the digits that the error leaves.
+
+/// `value ± std`, with two digits of the error; without an error, the value alone.
+pub fn measure(value: f64, std: f64) -> String {
+    if !std.is_finite() {
+        return format!("{} ± ∞", plain(value));
+    }
+    if std <= 0.0 {
+        return plain(value);
+    }
+    let place = std.log10().floor() as i32 - 1;
+    if (-6..=0).contains(&place) {
+        let digits = usize::try_from(-place).unwrap_or(0);
+        return format!("{value:.digits$} ± {std:.digits$}");
+    }
+    let exponent = value.abs().max(std).log10().floor() as i32;
+    let digits = usize::try_from(exponent - place).unwrap_or(0);
+    let scale = 10f64.powi(exponent);
+    if exponent == 0 {
+        return format!("{value:.digits$} ± {std:.digits$}");
+    }
+    format!(
+        "({:.digits$} ± {:.digits$})e{exponent}",
+        value / scale,
+        std / scale
+    )
+}
+
+/// A value without an error, in four digits.
+pub fn plain(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    if (-3..=5).contains(&exponent) {
+        let digits = usize::try_from(3 - exponent).unwrap_or(0);
+        format!("{value:.digits$}")
+    } else {
+        format!("{value:.3e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_error_decides_the_digits() {
+        assert_eq!(measure(33_123.838_4, 0.238), "33123.84 ± 0.24");
+        assert_eq!(measure(0.002_413_05, 1.5e-7), "(2.41305 ± 0.00015)e-3");
+        assert_eq!(measure(0.0, 0.0), "0");
+        assert_eq!(measure(1.25, f64::INFINITY), "1.250 ± ∞");
+        assert_eq!(measure(123_456.0, 2_300.0), "(1.235 ± 0.023)e5");
+    }
+}

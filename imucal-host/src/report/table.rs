@@ -1,0 +1,170 @@
+//! The table of a calibration, for people.
+
+use std::fmt::{self, Write};
+
+use super::measure::{measure, plain};
+use crate::{
+    calibrate::{Calibration, FitSummary, SegmentationReport, SensorOutcome},
+    recording::SensorKind,
+};
+
+/// Sensor's name in words.
+pub fn words(kind: SensorKind) -> &'static str {
+    match kind {
+        SensorKind::Acc => "accelerometer",
+        SensorKind::Gyr => "gyroscope",
+        SensorKind::Mag => "magnetometer",
+    }
+}
+
+/// What an observation of the sensor is called, many of them.
+fn observations(kind: SensorKind) -> &'static str {
+    match kind {
+        SensorKind::Acc => "rests",
+        SensorKind::Gyr => "turns",
+        SensorKind::Mag => "points",
+    }
+}
+
+/// The whole table.
+pub fn table(calibration: &Calibration) -> String {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let _ = write_table(&mut text, calibration);
+    text
+}
+
+fn write_table(text: &mut String, calibration: &Calibration) -> fmt::Result {
+    write!(text, "{}", calibration.recording)?;
+    for part in [&calibration.sensor_name, &calibration.serial] {
+        if !part.is_empty() {
+            write!(text, ", {part}")?;
+        }
+    }
+    writeln!(text)?;
+    for warning in &calibration.warnings {
+        writeln!(text, "warning: {warning}")?;
+    }
+    if let Some(segmentation) = &calibration.segmentation {
+        write_segmentation(text, segmentation)?;
+    }
+    for outcome in &calibration.sensors {
+        writeln!(text)?;
+        write_sensor(text, outcome)?;
+    }
+    Ok(())
+}
+
+fn write_segmentation(text: &mut String, segmentation: &SegmentationReport) -> fmt::Result {
+    let reference = if segmentation.from_initial_rest {
+        "the initial rest"
+    } else {
+        "the quietest tenth"
+    };
+    writeln!(
+        text,
+        "{} rests at {} times the variance of {reference}; over the thresholds tried, gains move by {:.2} % at most",
+        segmentation.rests.len(),
+        segmentation.multiplier,
+        100.0 * segmentation.gain_spread
+    )
+}
+
+fn write_sensor(text: &mut String, outcome: &SensorOutcome) -> fmt::Result {
+    let name = words(outcome.kind);
+    match &outcome.verdict {
+        Ok(()) => writeln!(text, "{name} ({}): accepted", outcome.model)?,
+        Err(refused) => {
+            writeln!(
+                text,
+                "{name} ({}): REFUSED, {}",
+                outcome.model,
+                refused.refusal.reason()
+            )?;
+            writeln!(text, "  because: {}", refused.refusal)?;
+            writeln!(text, "  to do:   {}", refused.advice)?;
+        }
+    }
+    let Some(fit) = &outcome.fit else { return Ok(()) };
+    if outcome.verdict.is_err() {
+        writeln!(text, "  for information only, the refused fit:")?;
+    }
+    write_fit(text, outcome.kind, fit)
+}
+
+fn write_fit(text: &mut String, kind: SensorKind, fit: &FitSummary) -> fmt::Result {
+    let triad = fit.raw_triad();
+    let (gain_std, bias_std) = fit.raw_std();
+    writeln!(
+        text,
+        "  calibrated [{}] = gain · (raw [{}] − bias)",
+        fit.unit_out, fit.unit_in
+    )?;
+    for (row, axis) in ["x", "y", "z"].into_iter().enumerate() {
+        let gain: Vec<String> = (0..3)
+            .map(|column| measure(triad.gain[(row, column)], gain_std[(row, column)]))
+            .collect();
+        let bias = measure(triad.bias[row], bias_std[row]);
+        writeln!(
+            text,
+            "  {axis}  {:>26} {:>26} {:>26}   {bias:>22}",
+            gain[0], gain[1], gain[2]
+        )?;
+    }
+    let held = fit
+        .held_out_rms
+        .map_or_else(|| "not known".into(), |rms| rms_text(kind, fit, rms));
+    writeln!(
+        text,
+        "  {} {}, {} parameters; rms {}, held out {held}",
+        fit.observations,
+        observations(kind),
+        fit.parameters,
+        rms_text(kind, fit, fit.rms)
+    )?;
+    writeln!(
+        text,
+        "  condition {:.1}, coverage {:.0} %, {} iterations to {}",
+        fit.condition,
+        100.0 * fit.coverage,
+        fit.iterations,
+        fit.termination.name()
+    )?;
+    write_notes(text, fit)
+}
+
+fn rms_text(kind: SensorKind, fit: &FitSummary, rms: f64) -> String {
+    match kind {
+        SensorKind::Gyr => format!("{:.3}° a turn", rms.to_degrees()),
+        _ => format!("{} {}", plain(rms), fit.unit_out),
+    }
+}
+
+fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {
+    if let Some(norm) = fit.field_norm {
+        writeln!(
+            text,
+            "  field {} {} (not known beforehand: gain of determinant 1)",
+            plain(norm),
+            fit.unit_in
+        )?;
+    }
+    if fit.inflation > 1.05 {
+        writeln!(
+            text,
+            "  neighbouring residuals are alike: standard errors are up to {:.1} times those of independent ones",
+            fit.inflation
+        )?;
+    }
+    if let Some(wander) = fit.bias_wander.filter(|w| w.interpolated) {
+        writeln!(
+            text,
+            "  the bias wanders by {:.3} °/s rms from rest to rest: interpolated between neighbouring rests",
+            wander.spread.norm().to_degrees() / 3f64.sqrt()
+        )?;
+    }
+    for left in &fit.left_out {
+        writeln!(text, "  left out: {left}")?;
+    }
+    Ok(())
+}
