@@ -39,8 +39,8 @@ impl<T: Scalar> Triad<T> {
     /// `gain · (raw − bias)`: a raw sample, sensor axes and raw unit, to calibrated axes and unit.
     #[inline]
     pub fn correct(&self, raw: &Vector3<T>) -> Vector3<T> {
-        // By components: nalgebra's product is the same arithmetic in the same order, but at `opt-level = "s"` it
-        // stays a loop of some 150 instructions, where these are 30.
+        // By components: nalgebra's product is the same arithmetic in the same order, but at the device's
+        // `opt-level = "s"` it stays a loop, several times as long as the count `tests/firmware_link.rs` asserts.
         let (m, x, y, z) = (
             &self.gain,
             raw.x - self.bias.x,

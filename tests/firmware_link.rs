@@ -1,0 +1,191 @@
+//! The core on the microcontroller: it links without panic and allocator, fits, and computes what the host computes.
+
+use std::path::Path;
+
+use imucal_tests::firmware::{BOARDS, Board, announce, build, ready, run};
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, elf};
+
+/// Flash that reading a record and correcting samples may take, bytes: of the board with a floating-point unit, and
+/// of the other, which brings its arithmetic along.
+const BUDGET: [(&str, u64); 2] = [("Cortex-M4F", 6 * 1024), ("Cortex-M0", 8 * 1024)];
+
+/// Instructions one corrected sample may take on a Cortex-M4F: 18 loads and stores, 12 operations, and a return.
+const INSTRUCTIONS_A_SAMPLE: usize = 40;
+
+#[test]
+fn every_image_links_without_panic_or_allocator_and_finds_its_answer_right() {
+    if !ready() {
+        return;
+    }
+    for board in BOARDS {
+        for image in ["gate", "correct", "empty"] {
+            let output = run(board, image);
+            assert_eq!(
+                output.status.code(),
+                Some(0),
+                "{image} on {}: {output:?}",
+                board.core
+            );
+        }
+    }
+}
+
+#[test]
+fn a_deliberate_panic_does_not_link() {
+    if !ready() {
+        return;
+    }
+    for board in BOARDS {
+        let refusal = build(board, "gate", &["control-panic"]).expect_err("the gate lets a panic through");
+        assert!(
+            refusal.contains("undefined symbol: imucal_a_panic_path_is_left"),
+            "it failed for another reason:\n{refusal}"
+        );
+    }
+}
+
+#[test]
+fn device_and_host_compute_the_same_bits() {
+    if !ready() {
+        return;
+    }
+    let mut host = String::new();
+    firmware_example::replay::write(&mut host).expect("a String takes every line");
+    assert!(host.contains("encoded alike\nacc apply "), "{host}");
+    for board in BOARDS {
+        let output = run(board, "replay");
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+        let device = String::from_utf8(output.stdout).expect("the image writes text");
+        let differing = host
+            .lines()
+            .zip(device.lines())
+            .find(|(host, device)| host != device);
+        assert_eq!(differing, None, "host and {} differ", board.core);
+        assert_eq!(
+            host.len(),
+            device.len(),
+            "{} wrote another number of lines",
+            board.core
+        );
+    }
+}
+
+#[test]
+fn record_and_corrector_stay_within_their_flash() {
+    if !ready() {
+        return;
+    }
+    for (board, (core, budget)) in BOARDS.into_iter().zip(BUDGET) {
+        assert_eq!(board.core, core);
+        let [empty, correct, gate] = ["empty", "correct", "gate"].map(|image| memory(&elf_of(board, image)));
+        let flash = correct.flash - empty.flash;
+        announce(&format!(
+            "size: {core}: decode and apply take {flash} B of flash and {} B of static RAM over an empty image \
+             (budget {budget} B); with encode {} B",
+            correct.ram - empty.ram,
+            gate.flash - empty.flash,
+        ));
+        assert!(flash <= budget, "{core}: {flash} B exceed {budget} B");
+    }
+}
+
+#[test]
+fn a_sample_costs_at_most_forty_instructions_on_a_cortex_m4f() {
+    if !ready() {
+        return;
+    }
+    let bytes = elf_of(BOARDS[0], "correct");
+    let file = object::File::parse(&*bytes).expect("an ELF file");
+    let apply = file
+        .symbols()
+        .find(|symbol| symbol.name().is_ok_and(|name| name.contains("7correct5apply")))
+        .expect("`correct::apply` is not inlined");
+    let text = file.section_by_name(".text").expect("there is code");
+    // The lowest bit of a function's address says Thumb.
+    let code = text
+        .data_range(apply.address() & !1, apply.size())
+        .ok()
+        .flatten()
+        .expect("its code");
+    let count = straight_line_instructions(code).expect("no branch but the return");
+    announce(&format!("cost: Cortex-M4F: {count} instructions a sample"));
+    assert!(count <= INSTRUCTIONS_A_SAMPLE, "{count} instructions");
+}
+
+/// Number of Thumb instructions; `None` if one of them branches, for then a number of bytes says nothing.
+///
+/// Encodings: ARMv7-M Architecture Reference Manual, A5.1 to A5.3.
+fn straight_line_instructions(code: &[u8]) -> Option<usize> {
+    let mut halves = code
+        .chunks_exact(2)
+        .map(|half| u16::from_le_bytes([half[0], half[1]]));
+    let mut count = 0;
+    while let Some(first) = halves.next() {
+        let wide = first >> 11 >= 0b11101;
+        let branches = if wide {
+            let second = halves.next()?;
+            first >> 11 == 0b11110 && second & 0x8000 != 0
+        } else {
+            let conditional = first & 0xF000 == 0xD000;
+            let unconditional = first & 0xF800 == 0xE000;
+            let compare_and_branch = first & 0xF500 == 0xB100;
+            conditional || unconditional || compare_and_branch
+        };
+        if branches {
+            return None;
+        }
+        count += 1;
+    }
+    Some(count)
+}
+
+#[test]
+fn loops_are_not_taken_for_straight_lines() {
+    let add_return = [0x40, 0x18, 0x70, 0x47]; // adds r0, r0, r1; bx lr
+    assert_eq!(straight_line_instructions(&add_return), Some(2));
+    let wide_return = [0x00, 0xEE, 0x20, 0x0A, 0x70, 0x47]; // vmla.f32 s0, s0, s1; bx lr
+    assert_eq!(straight_line_instructions(&wide_return), Some(2));
+    let looping = [0x40, 0x18, 0xFD, 0xD1, 0x70, 0x47]; // adds; bne; bx lr
+    assert_eq!(straight_line_instructions(&looping), None);
+    let calling = [0x00, 0xF0, 0x00, 0xF8, 0x70, 0x47]; // bl; bx lr
+    assert_eq!(straight_line_instructions(&calling), None);
+}
+
+fn elf_of(board: Board, image: &str) -> Vec<u8> {
+    let path = build(board, image, &[]).unwrap_or_else(|refusal| panic!("{refusal}"));
+    read(&path)
+}
+
+fn read(path: &Path) -> Vec<u8> {
+    std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+struct Memory {
+    /// Code, constants, and the initial values of variables.
+    flash: u64,
+    /// Variables, the stack apart.
+    ram: u64,
+}
+
+fn memory(bytes: &[u8]) -> Memory {
+    let file = object::File::parse(bytes).expect("an ELF file");
+    let mut memory = Memory { flash: 0, ram: 0 };
+    for section in file.sections() {
+        let SectionFlags::Elf { sh_flags, .. } = section.flags() else {
+            panic!("not an ELF file");
+        };
+        let (kept, written) = (
+            sh_flags.0 & elf::SHF_ALLOC.0 != 0,
+            sh_flags.0 & elf::SHF_WRITE.0 != 0,
+        );
+        if !kept {
+            continue;
+        }
+        if written {
+            memory.ram += section.size();
+        }
+        let (_, in_file) = section.file_range().unwrap_or_default();
+        memory.flash += in_file;
+    }
+    memory
+}

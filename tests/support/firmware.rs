@@ -1,0 +1,168 @@
+//! Builds the images of `firmware-example` and runs them in QEMU.
+
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// A microcontroller the images are built for. Its machine in QEMU is named in `.cargo/config.toml`.
+#[derive(Clone, Copy, Debug)]
+pub struct Board {
+    /// Target triple.
+    pub target: &'static str,
+    /// Core, for people.
+    pub core: &'static str,
+}
+
+/// The boards every test goes through: one with a floating-point unit and one without.
+pub const BOARDS: [Board; 2] = [
+    Board {
+        target: "thumbv7em-none-eabihf",
+        core: "Cortex-M4F",
+    },
+    Board {
+        target: "thumbv6m-none-eabi",
+        core: "Cortex-M0",
+    },
+];
+
+/// An image that has not ended by then hangs: it takes milliseconds.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Can images be built and run here? If not, says so where nobody can overlook it.
+///
+/// # Panics
+///
+/// Where they cannot, but must: with `CI=true`, or `IMUCAL_FIRMWARE=required` as `tests/run` sets it.
+pub fn ready() -> bool {
+    let missing = missing();
+    if missing.is_empty() {
+        return true;
+    }
+    let report = format!(
+        "\n*** NOT TESTED: firmware. Missing: {}. `sh tests/setup` installs it. ***\n",
+        missing.join(", ")
+    );
+    let set_to = |name, value| std::env::var(name).is_ok_and(|v| v == value);
+    assert!(
+        !set_to("CI", "true") && !set_to("IMUCAL_FIRMWARE", "required"),
+        "{report}"
+    );
+    announce(&report);
+    false
+}
+
+fn missing() -> Vec<String> {
+    let mut missing = Vec::new();
+    if Command::new("qemu-system-arm").arg("--version").output().is_err() {
+        missing.push("qemu-system-arm".to_owned());
+    }
+    for board in BOARDS {
+        let directory = toolchain(&mut Command::new("rustc"))
+            .args(["--print", "target-libdir", "--target", board.target])
+            .output();
+        let found = directory.is_ok_and(|d| Path::new(String::from_utf8_lossy(&d.stdout).trim()).is_dir());
+        if !found {
+            missing.push(format!("Rust target {}", board.target));
+        }
+    }
+    missing
+}
+
+/// To the terminal, past the test harness, which shows the output of failing tests only.
+pub fn announce(line: &str) {
+    writeln!(std::io::stderr(), "{line}").expect("stderr takes a line");
+}
+
+/// Builds one image with the profile that is flashed; the ELF file.
+///
+/// # Errors
+///
+/// What cargo said, if there is no image.
+pub fn build(board: Board, image: &str, features: &[&str]) -> Result<PathBuf, String> {
+    let output = cargo("build", board, image, features)
+        .output()
+        .expect("cargo runs");
+    if output.status.success() {
+        Ok(target_directory().join(board.target).join("firmware").join(image))
+    } else {
+        Err(String::from_utf8_lossy(&output.stderr).into_owned())
+    }
+}
+
+/// Builds and runs one image; its exit status and what it wrote.
+///
+/// # Panics
+///
+/// Where it does not build, or hangs.
+pub fn run(board: Board, image: &str) -> Output {
+    if let Err(refusal) = build(board, image, &[]) {
+        panic!("{image} does not build for {}:\n{refusal}", board.target);
+    }
+    // On Unix cargo becomes its runner, so that to kill the child is to kill QEMU.
+    let mut child = cargo("run", board, image, &[])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("cargo runs");
+    let (mut out, mut err) = (
+        child.stdout.take().expect("piped"),
+        child.stderr.take().expect("piped"),
+    );
+    let read_out = std::thread::spawn(move || read_all(&mut out));
+    let read_err = std::thread::spawn(move || read_all(&mut err));
+    let end = Instant::now() + PATIENCE;
+    let status = loop {
+        if let Some(status) = child.try_wait().expect("the child is ours") {
+            break status;
+        }
+        if Instant::now() > end {
+            child.kill().expect("the child is ours");
+            panic!("{image} hangs on {}", board.core);
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    Output {
+        status,
+        stdout: read_out.join().expect("reads to the end"),
+        stderr: read_err.join().expect("reads to the end"),
+    }
+}
+
+fn read_all(from: &mut impl Read) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    from.read_to_end(&mut bytes).expect("a pipe can be read");
+    bytes
+}
+
+fn cargo(verb: &str, board: Board, image: &str, features: &[&str]) -> Command {
+    let mut command = Command::new("cargo");
+    command
+        .current_dir(workspace())
+        .args([verb, "--quiet", "--locked", "--package", "firmware-example"])
+        .args(["--profile", "firmware", "--target", board.target, "--bin", image])
+        .args(["--features", &features.join(",")])
+        .arg("--target-dir")
+        .arg(target_directory())
+        .env_remove("RUSTFLAGS");
+    toolchain(&mut command);
+    command
+}
+
+/// Not the one of the tests, which cargo may be holding.
+fn target_directory() -> PathBuf {
+    workspace().join("target/tests")
+}
+
+/// The toolchain that `tests/setup` found, where it is not the pinned one: lines of `NAME=value`.
+fn toolchain(command: &mut Command) -> &mut Command {
+    let chosen = std::fs::read_to_string(workspace().join("target/firmware-toolchain")).unwrap_or_default();
+    command.envs(chosen.lines().filter_map(|line| line.split_once('=')))
+}
+
+fn workspace() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("tests lie in the workspace")
+}
