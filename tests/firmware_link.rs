@@ -20,12 +20,7 @@ fn every_image_links_without_panic_or_allocator_and_finds_its_answer_right() {
     for board in BOARDS {
         for image in ["gate", "correct", "empty"] {
             let output = run(board, image);
-            assert_eq!(
-                output.status.code(),
-                Some(0),
-                "{image} on {}: {output:?}",
-                board.core
-            );
+            assert_eq!(output.status.code(), Some(0), "{image} on {}: {output:?}", board.core);
         }
     }
 }
@@ -56,17 +51,9 @@ fn device_and_host_compute_the_same_bits() {
         let output = run(board, "replay");
         assert_eq!(output.status.code(), Some(0), "{output:?}");
         let device = String::from_utf8(output.stdout).expect("the image writes text");
-        let differing = host
-            .lines()
-            .zip(device.lines())
-            .find(|(host, device)| host != device);
+        let differing = host.lines().zip(device.lines()).find(|(host, device)| host != device);
         assert_eq!(differing, None, "host and {} differ", board.core);
-        assert_eq!(
-            host.len(),
-            device.len(),
-            "{} wrote another number of lines",
-            board.core
-        );
+        assert_eq!(host.len(), device.len(), "{} wrote another number of lines", board.core);
     }
 }
 
@@ -102,11 +89,7 @@ fn a_sample_costs_at_most_forty_instructions_on_a_cortex_m4f() {
         .expect("`correct::apply` is not inlined");
     let text = file.section_by_name(".text").expect("there is code");
     // The lowest bit of a function's address says Thumb.
-    let code = text
-        .data_range(apply.address() & !1, apply.size())
-        .ok()
-        .flatten()
-        .expect("its code");
+    let code = text.data_range(apply.address() & !1, apply.size()).ok().flatten().expect("its code");
     let count = straight_line_instructions(code).expect("no branch but the return");
     announce(&format!("cost: Cortex-M4F: {count} instructions a sample"));
     assert!(count <= INSTRUCTIONS_A_SAMPLE, "{count} instructions");
@@ -116,9 +99,7 @@ fn a_sample_costs_at_most_forty_instructions_on_a_cortex_m4f() {
 ///
 /// Encodings: ARMv7-M Architecture Reference Manual, A5.1 to A5.3.
 fn straight_line_instructions(code: &[u8]) -> Option<usize> {
-    let mut halves = code
-        .chunks_exact(2)
-        .map(|half| u16::from_le_bytes([half[0], half[1]]));
+    let mut halves = code.chunks_exact(2).map(|half| u16::from_le_bytes([half[0], half[1]]));
     let mut count = 0;
     while let Some(first) = halves.next() {
         let wide = first >> 11 >= 0b11101;
@@ -174,10 +155,7 @@ fn memory(bytes: &[u8]) -> Memory {
         let SectionFlags::Elf { sh_flags, .. } = section.flags() else {
             panic!("not an ELF file");
         };
-        let (kept, written) = (
-            sh_flags.0 & elf::SHF_ALLOC.0 != 0,
-            sh_flags.0 & elf::SHF_WRITE.0 != 0,
-        );
+        let (kept, written) = (sh_flags.0 & elf::SHF_ALLOC.0 != 0, sh_flags.0 & elf::SHF_WRITE.0 != 0);
         if !kept {
             continue;
         }

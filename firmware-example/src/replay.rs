@@ -22,11 +22,7 @@ pub fn write(out: &mut impl Write) -> fmt::Result {
         Ok(record) => record,
         Err(error) => return writeln!(out, "record refused: {error}"),
     };
-    writeln!(
-        out,
-        "record {} {} {}",
-        record.sensor.name, record.sensor.serial, record.date
-    )?;
+    writeln!(out, "record {} {} {}", record.sensor.name, record.sensor.serial, record.date)?;
     let mut page = [0xFF; record::MAX_LEN];
     let same = record::encode(&record, &mut page) == Ok(crate::RECORD);
     writeln!(out, "encoded {}", if same { "alike" } else { "otherwise" })?;

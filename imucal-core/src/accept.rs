@@ -47,8 +47,8 @@ impl Limits {
             directions,
             coverage: 0.25,
             flatness: 0.01,
-            condition: 200.0,
-            nonlinearity: 0.3,
+            condition: 60.0,
+            nonlinearity: 0.1,
             gain: (0.5, 2.0),
             rms: 0.05,
         }
@@ -159,23 +159,14 @@ impl fmt::Display for Refusal {
             Self::NoRest => write!(f, "no stretch in which the sensor lay still"),
             Self::NoMotion => write!(f, "the sensor was never turned from one rest to another"),
             Self::TooFewObservations { have, need } => write!(f, "{have} observations, {need} needed"),
-            Self::PoorCoverage {
-                coverage,
-                flatness,
-                need_coverage,
-                need_flatness,
-            } => write!(
+            Self::PoorCoverage { coverage, flatness, need_coverage, need_flatness } => write!(
                 f,
                 "directions cover {:.0} % of the sphere ({:.0} % needed), least variance along an axis \
                  {flatness:.4} ({need_flatness} needed; 0 in a plane)",
                 100.0 * coverage,
                 100.0 * need_coverage
             ),
-            Self::NotRedundant {
-                directions,
-                need,
-                parameters,
-            } => write!(
+            Self::NotRedundant { directions, need, parameters } => write!(
                 f,
                 "{directions} distinct directions for {parameters} parameters, {need} needed: nothing would check them"
             ),
@@ -192,31 +183,13 @@ impl fmt::Display for Refusal {
                 100.0 * limit
             ),
             Self::DidNotConverge { termination } => write!(f, "the solver stopped by {}", termination.name()),
-            Self::Implausible {
-                what: Quantity::Gain,
-                value,
-                limit,
-            } => {
-                write!(
-                    f,
-                    "an axis has {value:.3} times its nominal gain, the limit is {limit}"
-                )
+            Self::Implausible { what: Quantity::Gain, value, limit } => {
+                write!(f, "an axis has {value:.3} times its nominal gain, the limit is {limit}")
             }
-            Self::Implausible {
-                what: Quantity::AxisRatio,
-                value,
-                limit,
-            } => {
-                write!(
-                    f,
-                    "one axis has {value:.2} times the gain of another, the limit is {limit}"
-                )
+            Self::Implausible { what: Quantity::AxisRatio, value, limit } => {
+                write!(f, "one axis has {value:.2} times the gain of another, the limit is {limit}")
             }
-            Self::Implausible {
-                what: Quantity::Residual,
-                value,
-                limit,
-            } => write!(
+            Self::Implausible { what: Quantity::Residual, value, limit } => write!(
                 f,
                 "rms residual {:.1} % of the norm, the limit is {:.1} %",
                 100.0 * value,
@@ -239,10 +212,7 @@ pub fn check_observations<T: Scalar>(
     limits: &Limits,
 ) -> Result<(), Refusal> {
     if coverage.observations < limits.observations {
-        return Err(Refusal::TooFewObservations {
-            have: coverage.observations,
-            need: limits.observations,
-        });
+        return Err(Refusal::TooFewObservations { have: coverage.observations, need: limits.observations });
     }
     let (share, flatness) = (coverage.share.wide(), coverage.flatness.wide());
     if share < limits.coverage || flatness < limits.flatness {
@@ -255,11 +225,7 @@ pub fn check_observations<T: Scalar>(
     }
     if coverage.distinct < limits.directions {
         let directions = coverage.distinct;
-        return Err(Refusal::NotRedundant {
-            directions,
-            need: limits.directions,
-            parameters,
-        });
+        return Err(Refusal::NotRedundant { directions, need: limits.directions, parameters });
     }
     Ok(())
 }
@@ -276,10 +242,7 @@ pub fn check_report<T: Scalar>(report: &SolveReport<T>, limits: &Limits) -> Resu
     }
     let condition = report.condition.wide();
     if condition > limits.condition {
-        return Err(Refusal::IllConditioned {
-            condition,
-            limit: limits.condition,
-        });
+        return Err(Refusal::IllConditioned { condition, limit: limits.condition });
     }
     Ok(())
 }
@@ -314,11 +277,7 @@ pub fn nonlinearity<T: Scalar, const P: usize>(
         let mut sum = SquaredSum(T::zero());
         model.rows(&trial, &mut sum);
         let departure = ((sum.0 - here) / expected - T::one()).abs();
-        worst = if departure > worst || !departure.finite() {
-            departure
-        } else {
-            worst
-        };
+        worst = if departure > worst || !departure.finite() { departure } else { worst };
     }
     if worst.finite() { worst } else { T::LARGEST }
 }
@@ -330,10 +289,7 @@ pub fn nonlinearity<T: Scalar, const P: usize>(
 pub fn check_nonlinearity<T: Scalar>(nonlinearity: T, limits: &Limits) -> Result<(), Refusal> {
     let nonlinearity = nonlinearity.wide();
     if nonlinearity > limits.nonlinearity {
-        return Err(Refusal::TooNonlinear {
-            nonlinearity,
-            limit: limits.nonlinearity,
-        });
+        return Err(Refusal::TooNonlinear { nonlinearity, limit: limits.nonlinearity });
     }
     Ok(())
 }
@@ -360,11 +316,7 @@ pub fn check_plausibility<T: Scalar>(
         high = high.max(gain);
         if nominal && !(least..=most).contains(&gain) {
             let limit = if gain < least { least } else { most };
-            return Err(Refusal::Implausible {
-                what: Quantity::Gain,
-                value: gain,
-                limit,
-            });
+            return Err(Refusal::Implausible { what: Quantity::Gain, value: gain, limit });
         }
     }
     if high > most / least * low {
@@ -390,25 +342,13 @@ mod tests {
     use nalgebra::Matrix3;
 
     fn coverage(observations: usize, share: f64, flatness: f64, distinct: usize) -> Coverage<f64> {
-        Coverage {
-            observations,
-            share,
-            flatness,
-            distinct,
-        }
+        Coverage { observations, share, flatness, distinct }
     }
 
     #[test]
     fn thirteen_rests_on_six_faces_are_not_redundant_for_nine_parameters() {
         let verdict = check_observations(&coverage(13, 0.4, 0.3, 6), 9, &Limits::for_norm(9, 10));
-        assert_eq!(
-            verdict,
-            Err(Refusal::NotRedundant {
-                directions: 6,
-                need: 10,
-                parameters: 9
-            })
-        );
+        assert_eq!(verdict, Err(Refusal::NotRedundant { directions: 6, need: 10, parameters: 9 }));
         assert!(check_observations(&coverage(13, 0.4, 0.3, 6), 6, &Limits::for_norm(6, 6)).is_ok());
     }
 
@@ -420,10 +360,7 @@ mod tests {
 
     #[test]
     fn a_gain_of_three_times_nominal_is_implausible() {
-        let triad = Triad {
-            gain: Matrix3::identity() * 3.0f32,
-            bias: nalgebra::Vector3::zeros(),
-        };
+        let triad = Triad { gain: Matrix3::identity() * 3.0f32, bias: nalgebra::Vector3::zeros() };
         let verdict = check_plausibility(&triad, true, 0.0, &Limits::for_norm(9, 10));
         assert_eq!(verdict.unwrap_err().reason(), "implausible");
         assert!(check_plausibility(&triad, false, 0.0, &Limits::for_norm(9, 10)).is_ok());

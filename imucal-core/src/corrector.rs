@@ -79,18 +79,12 @@ mod tests {
 
     #[test]
     fn with_terms_only_apply_at_heeds_the_temperature() {
-        let terms = TemperatureTerms {
-            reference: 20.0,
-            bias_slope: [0.5, 0.0, 0.0],
-            scale_slope: [0.0, 0.0, 0.125],
-        };
+        let terms =
+            TemperatureTerms { reference: 20.0, bias_slope: [0.5, 0.0, 0.0], scale_slope: [0.0, 0.0, 0.125] };
         let corrector = Corrector::new(triad(), Some(terms));
         let raw = Vector3::new(5.0, 6.0, 7.0);
         assert_eq!(corrector.apply(&raw), triad().correct(&raw));
         assert_eq!(corrector.apply_at(&raw, f32::NAN), triad().correct(&raw));
-        assert_eq!(
-            corrector.apply_at(&raw, 22.0),
-            triad().correct(&raw) + Vector3::new(-2.0, 0.0, 8.0)
-        );
+        assert_eq!(corrector.apply_at(&raw, 22.0), triad().correct(&raw) + Vector3::new(-2.0, 0.0, 8.0));
     }
 }

@@ -53,11 +53,7 @@ fn cell<T: Scalar>(index: u16) -> Vector3<T> {
     let z = 1.0 - (2.0 * f64::from(index) + 1.0) / f64::from(CELLS);
     let radius = libm::sqrt(1.0 - z * z);
     let azimuth = golden * f64::from(index);
-    Vector3::new(
-        T::of(radius * libm::cos(azimuth)),
-        T::of(radius * libm::sin(azimuth)),
-        T::of(z),
-    )
+    Vector3::new(T::of(radius * libm::cos(azimuth)), T::of(radius * libm::sin(azimuth)), T::of(z))
 }
 
 fn share<T: Scalar>(directions: impl Iterator<Item = Vector3<T>> + Clone) -> T {
@@ -138,11 +134,7 @@ mod tests {
     #[test]
     fn a_cap_has_the_variance_of_its_height() {
         let c = Coverage::of(cap(0.1, 500).into_iter());
-        assert!(
-            (c.flatness - 0.2f64.powi(2) / 12.0).abs() < 1e-4,
-            "{}",
-            c.flatness
-        );
+        assert!((c.flatness - 0.2f64.powi(2) / 12.0).abs() < 1e-4, "{}", c.flatness);
     }
 
     #[test]
@@ -157,14 +149,7 @@ mod tests {
 
     #[test]
     fn six_faces_visited_twice_are_six_directions() {
-        let faces = [
-            Vector3::x(),
-            -Vector3::x(),
-            Vector3::y(),
-            -Vector3::y(),
-            Vector3::z(),
-            -Vector3::z(),
-        ];
+        let faces = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z(), -Vector3::z()];
         assert_eq!(Coverage::<f32>::of(faces.into_iter().chain(faces)).distinct, 6);
     }
 }

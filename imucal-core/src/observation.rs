@@ -23,11 +23,7 @@ pub struct Moments<T: Scalar> {
 
 impl<T: Scalar> Default for Moments<T> {
     fn default() -> Self {
-        Self {
-            count: 0,
-            mean: Vector3::zeros(),
-            squares: Vector3::zeros(),
-        }
+        Self { count: 0, mean: Vector3::zeros(), squares: Vector3::zeros() }
     }
 }
 
@@ -155,14 +151,7 @@ impl<T: Scalar> BlockBuilder<T> {
     pub fn finish(&mut self) -> (Block<T>, T) {
         let done = core::mem::take(self);
         let s1 = done.s0 * done.duration - done.early;
-        (
-            Block {
-                s0: done.s0,
-                s1,
-                c: done.c,
-            },
-            done.duration,
-        )
+        (Block { s0: done.s0, s1, c: done.c }, done.duration)
     }
 }
 
@@ -192,10 +181,7 @@ pub struct ShellPoint<T: Scalar> {
 impl<T: Scalar> ShellPoint<T> {
     /// A point without correction for curvature.
     pub fn new(value: Vector3<T>) -> Self {
-        Self {
-            value,
-            excess: T::zero(),
-        }
+        Self { value, excess: T::zero() }
     }
 }
 
@@ -221,34 +207,23 @@ mod tests {
         let mut m = Moments::default();
         samples.iter().for_each(|s| m.push(s));
         let mean = samples.iter().sum::<Vector3<f64>>() / 50.0;
-        let variance = samples
-            .iter()
-            .map(|s| (s - mean).component_mul(&(s - mean)))
-            .sum::<Vector3<f64>>()
-            / 49.0;
+        let variance =
+            samples.iter().map(|s| (s - mean).component_mul(&(s - mean))).sum::<Vector3<f64>>() / 49.0;
         assert!((m.mean() - mean).norm() < 1e-9);
         assert!((m.variance() - variance).norm() < 1e-6);
     }
 
     #[test]
     fn a_block_of_equal_intervals_has_the_sums_of_the_paper_s_reconstruction() {
-        let rates: [Vector3<f64>; 4] = [
-            Vector3::x(),
-            Vector3::new(0.0, 2.0, 0.5),
-            Vector3::new(-1.0, 0.3, 0.0),
-            Vector3::z(),
-        ];
+        let rates: [Vector3<f64>; 4] =
+            [Vector3::x(), Vector3::new(0.0, 2.0, 0.5), Vector3::new(-1.0, 0.3, 0.0), Vector3::z()];
         let dt = 0.01;
         let mut b = BlockBuilder::default();
         rates.iter().for_each(|w| b.push(w, dt));
         let (block, duration) = b.finish();
         let m = 4.0;
         let s0: Vector3<f64> = rates.iter().sum();
-        let s1: Vector3<f64> = rates
-            .iter()
-            .enumerate()
-            .map(|(i, w)| w * (m - 1.0 - 2.0 * i as f64))
-            .sum();
+        let s1: Vector3<f64> = rates.iter().enumerate().map(|(i, w)| w * (m - 1.0 - 2.0 * i as f64)).sum();
         let mut c = Vector3::zeros();
         for j in 0..4 {
             for i in 0..j {

@@ -76,11 +76,7 @@ fn coefficients<T: Scalar>(x: T) -> Coefficients<T> {
     } else {
         let angle = x.root();
         let (sin, cos) = (angle.sin(), angle.cos());
-        Coefficients {
-            a: sin / angle,
-            b: (T::one() - cos) / x,
-            c: (angle - sin) / (x * angle),
-        }
+        Coefficients { a: sin / angle, b: (T::one() - cos) / x, c: (angle - sin) / (x * angle) }
     }
 }
 
@@ -152,10 +148,7 @@ mod tests {
         assert!((series.a - angle.sin() / angle).abs() < 1e-15);
         assert!((series.b - (1.0 - angle.cos()) / x).abs() < 1e-15);
         assert!((series.c - (angle - angle.sin()) / (x * angle)).abs() < 1e-15);
-        let (short, long) = (
-            coefficients(0.019_999f64),
-            series_coefficients::<f64, TERMS>(0.019_999),
-        );
+        let (short, long) = (coefficients(0.019_999f64), series_coefficients::<f64, TERMS>(0.019_999));
         assert!((short.a - long.a).abs() + (short.b - long.b).abs() + (short.c - long.c).abs() < 1e-15);
     }
 }

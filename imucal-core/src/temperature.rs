@@ -61,12 +61,7 @@ impl<T: Scalar> TemperatureTerms<T> {
 
     /// Every term is finite.
     pub fn is_finite(&self) -> bool {
-        self.reference.finite()
-            && self
-                .bias_slope
-                .iter()
-                .chain(&self.scale_slope)
-                .all(|x| x.finite())
+        self.reference.finite() && self.bias_slope.iter().chain(&self.scale_slope).all(|x| x.finite())
     }
 
     /// The same terms in another precision.
@@ -80,11 +75,7 @@ impl<T: Scalar> TemperatureTerms<T> {
 
     #[inline]
     fn change(&self, temperature: T) -> T {
-        if temperature.finite() {
-            temperature - self.reference
-        } else {
-            T::zero()
-        }
+        if temperature.finite() { temperature - self.reference } else { T::zero() }
     }
 
     #[inline]
@@ -96,11 +87,7 @@ impl<T: Scalar> TemperatureTerms<T> {
     #[inline]
     fn factor(&self, change: T) -> Vector3<T> {
         let [x, y, z] = self.scale_slope;
-        Vector3::new(
-            T::one() + x * change,
-            T::one() + y * change,
-            T::one() + z * change,
-        )
+        Vector3::new(T::one() + x * change, T::one() + y * change, T::one() + z * change)
     }
 }
 
@@ -112,25 +99,18 @@ mod tests {
     use proptest::prelude::*;
 
     fn triad() -> impl Strategy<Value = Triad<f64>> {
-        (
-            uniform3(0.8f64..1.2),
-            uniform6(-0.1f64..0.1),
-            uniform3(-50.0f64..50.0),
-        )
-            .prop_map(|(s, k, b)| Triad {
+        (uniform3(0.8f64..1.2), uniform6(-0.1f64..0.1), uniform3(-50.0f64..50.0)).prop_map(|(s, k, b)| {
+            Triad {
                 gain: Matrix3::new(s[0], k[0], k[1], k[2], s[1], k[3], k[4], k[5], s[2]),
                 bias: Vector3::from(b),
-            })
+            }
+        })
     }
 
     /// Terms some ten times worse than sensors have them.
     fn terms() -> impl Strategy<Value = TemperatureTerms<f64>> {
         (0.0f64..50.0, uniform3(-0.5f64..0.5), uniform3(-0.003f64..0.003)).prop_map(
-            |(reference, bias_slope, scale_slope)| TemperatureTerms {
-                reference,
-                bias_slope,
-                scale_slope,
-            },
+            |(reference, bias_slope, scale_slope)| TemperatureTerms { reference, bias_slope, scale_slope },
         )
     }
 
@@ -151,11 +131,7 @@ mod tests {
     }
 
     fn example() -> TemperatureTerms<f32> {
-        TemperatureTerms {
-            reference: 25.0,
-            bias_slope: [0.5, 0.0, -0.25],
-            scale_slope: [0.0, 1e-3, -0.1],
-        }
+        TemperatureTerms { reference: 25.0, bias_slope: [0.5, 0.0, -0.25], scale_slope: [0.0, 1e-3, -0.1] }
     }
 
     #[test]
@@ -174,10 +150,6 @@ mod tests {
 
     #[test]
     fn a_scale_that_has_drifted_to_zero_has_no_prediction() {
-        assert!(
-            example()
-                .predict(&Triad::identity(), &Vector3::x(), 35.0)
-                .is_none()
-        );
+        assert!(example().predict(&Triad::identity(), &Vector3::x(), 35.0).is_none());
     }
 }

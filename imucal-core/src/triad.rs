@@ -30,10 +30,7 @@ pub struct Triad<T: Scalar> {
 impl<T: Scalar> Triad<T> {
     /// Changes nothing: unit gain, no bias.
     pub fn identity() -> Self {
-        Self {
-            gain: Matrix3::identity(),
-            bias: Vector3::zeros(),
-        }
+        Self { gain: Matrix3::identity(), bias: Vector3::zeros() }
     }
 
     /// `gain · (raw − bias)`: a raw sample, sensor axes and raw unit, to calibrated axes and unit.
@@ -41,12 +38,7 @@ impl<T: Scalar> Triad<T> {
     pub fn correct(&self, raw: &Vector3<T>) -> Vector3<T> {
         // By components: nalgebra's product is the same arithmetic in the same order, but at the device's
         // `opt-level = "s"` it stays a loop, several times as long as the count `tests/firmware_link.rs` asserts.
-        let (m, x, y, z) = (
-            &self.gain,
-            raw.x - self.bias.x,
-            raw.y - self.bias.y,
-            raw.z - self.bias.z,
-        );
+        let (m, x, y, z) = (&self.gain, raw.x - self.bias.x, raw.y - self.bias.y, raw.z - self.bias.z);
         Vector3::new(
             m.m11 * x + m.m12 * y + m.m13 * z,
             m.m21 * x + m.m22 * y + m.m23 * z,
@@ -68,10 +60,7 @@ impl<T: Scalar> Triad<T> {
     ///
     /// `self` takes `raw'`, the result takes `raw`. `per_unit` must not be zero.
     pub fn in_unit(&self, offset: T, per_unit: T) -> Self {
-        Self {
-            gain: self.gain / per_unit,
-            bias: self.bias * per_unit + Vector3::repeat(offset),
-        }
+        Self { gain: self.gain / per_unit, bias: self.bias * per_unit + Vector3::repeat(offset) }
     }
 
     /// The columns of the gain are dependent, as far as `T` can tell: different raw samples look alike.
@@ -138,10 +127,7 @@ mod tests {
 
     #[test]
     fn singular_is_a_matter_of_direction_and_not_of_unit() {
-        let with = |gain: Matrix3<f32>| Triad {
-            gain,
-            bias: Vector3::zeros(),
-        };
+        let with = |gain: Matrix3<f32>| Triad { gain, bias: Vector3::zeros() };
         for unit in [1e-20, 1.0, 1e15] {
             assert!(!with(Matrix3::new(1.0, 0.1, 0.1, 0.0, 1.0, 0.1, 0.0, 0.0, 1.0) * unit).is_singular());
             assert!(with(Matrix3::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0) * unit).is_singular());
@@ -151,10 +137,7 @@ mod tests {
 
     #[test]
     fn a_singular_gain_has_no_prediction() {
-        let t = Triad {
-            gain: Matrix3::<f32>::zeros(),
-            bias: Vector3::zeros(),
-        };
+        let t = Triad { gain: Matrix3::<f32>::zeros(), bias: Vector3::zeros() };
         assert!(t.predict(&Vector3::x()).is_none());
     }
 }

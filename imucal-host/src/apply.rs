@@ -93,13 +93,7 @@ pub fn check(
             });
         }
     }
-    if any {
-        Ok(warning)
-    } else {
-        Err(ApplyError::NothingToApply {
-            recording: recording.name.clone(),
-        })
-    }
+    if any { Ok(warning) } else { Err(ApplyError::NothingToApply { recording: recording.name.clone() }) }
 }
 
 /// The recording with every calibrated sensor corrected, in calibrated units; the others as they were.
@@ -121,9 +115,7 @@ pub fn apply(recording: &Recording, stored: &StoredCalibration, record: &Calibra
         for (row, value) in triple.values.iter_mut().enumerate() {
             let raw = value.map(|x| triple.nominal.to_raw(x) as f32);
             let warmth = temperature.map_or(f32::NAN, |t| t[row] as f32);
-            *value = corrector
-                .apply_at(&raw, warmth)
-                .map(|x| nominal.to_si(f64::from(x)));
+            *value = corrector.apply_at(&raw, warmth).map(|x| nominal.to_si(f64::from(x)));
         }
         triple.unit = stored.unit_out;
         triple.full_scale = triple.full_scale_si().map(|scale| scale * nominal.per_unit.abs());
@@ -145,14 +137,8 @@ pub fn triad_record(record: &CalibrationRecord, kind: SensorKind) -> Option<&Tri
 /// Conversion of calibrated values; counts without their offset, which the calibration took out.
 fn nominal_out(stored: &StoredTriad, before: Nominal) -> Nominal {
     match stored.unit_out.per_si() {
-        Some(per_unit) => Nominal {
-            offset: 0.0,
-            per_unit,
-        },
-        None => Nominal {
-            offset: 0.0,
-            per_unit: before.per_unit,
-        },
+        Some(per_unit) => Nominal { offset: 0.0, per_unit },
+        None => Nominal { offset: 0.0, per_unit: before.per_unit },
     }
 }
 

@@ -16,14 +16,8 @@ pub struct Board {
 
 /// The boards every test goes through: one with a floating-point unit and one without.
 pub const BOARDS: [Board; 2] = [
-    Board {
-        target: "thumbv7em-none-eabihf",
-        core: "Cortex-M4F",
-    },
-    Board {
-        target: "thumbv6m-none-eabi",
-        core: "Cortex-M0",
-    },
+    Board { target: "thumbv7em-none-eabihf", core: "Cortex-M4F" },
+    Board { target: "thumbv6m-none-eabi", core: "Cortex-M0" },
 ];
 
 /// An image that has not ended by then hangs: it takes milliseconds.
@@ -44,10 +38,7 @@ pub fn ready() -> bool {
         missing.join(", ")
     );
     let set_to = |name, value| std::env::var(name).is_ok_and(|v| v == value);
-    assert!(
-        !set_to("CI", "true") && !set_to("IMUCAL_FIRMWARE", "required"),
-        "{report}"
-    );
+    assert!(!set_to("CI", "true") && !set_to("IMUCAL_FIRMWARE", "required"), "{report}");
     announce(&report);
     false
 }
@@ -80,9 +71,7 @@ pub fn announce(line: &str) {
 ///
 /// What cargo said, if there is no image.
 pub fn build(board: Board, image: &str, features: &[&str]) -> Result<PathBuf, String> {
-    let output = cargo("build", board, image, features)
-        .output()
-        .expect("cargo runs");
+    let output = cargo("build", board, image, features).output().expect("cargo runs");
     if output.status.success() {
         Ok(target_directory().join(board.target).join("firmware").join(image))
     } else {
@@ -106,10 +95,7 @@ pub fn run(board: Board, image: &str) -> Output {
         .stderr(Stdio::piped())
         .spawn()
         .expect("cargo runs");
-    let (mut out, mut err) = (
-        child.stdout.take().expect("piped"),
-        child.stderr.take().expect("piped"),
-    );
+    let (mut out, mut err) = (child.stdout.take().expect("piped"), child.stderr.take().expect("piped"));
     let read_out = std::thread::spawn(move || read_all(&mut out));
     let read_err = std::thread::spawn(move || read_all(&mut err));
     let end = Instant::now() + PATIENCE;
@@ -162,7 +148,5 @@ fn toolchain(command: &mut Command) -> &mut Command {
 }
 
 fn workspace() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .expect("tests lie in the workspace")
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests lie in the workspace")
 }

@@ -16,11 +16,7 @@ fn main() -> ! {
     }
 
     let written = firmware_example::replay::write(&mut Console);
-    semihosting::process::exit(if written.is_ok() {
-        0
-    } else {
-        firmware_example::FAILED
-    })
+    semihosting::process::exit(if written.is_ok() { 0 } else { firmware_example::FAILED })
 }
 
 #[cfg(not(target_os = "none"))]

@@ -60,14 +60,7 @@ impl<T: Scalar> Shell<T> {
         let u = y / length;
         let pulled = triad.gain.tr_mul(&u);
         let slope = pulled.dot(&pulled).root();
-        Self {
-            x,
-            u,
-            outside: length - norm,
-            slope,
-            normal: pulled / slope,
-            length,
-        }
+        Self { x, u, outside: length - norm, slope, normal: pulled / slope, length }
     }
 
     /// Derivative of `outside / slope` by the gain's nine entries (rows) and the bias.
@@ -96,11 +89,8 @@ impl<T: Scalar, const P: usize> Model<T, P> for NormModel<'_, T, P> {
         for point in self.points {
             let shell = Shell::at(&triad, self.norm, &point.value);
             let residual = shell.outside / shell.slope - point.excess;
-            let jacobian = if S::JACOBIAN {
-                self.form.select(&shell.gradient(&triad.gain))
-            } else {
-                SVector::zeros()
-            };
+            let jacobian =
+                if S::JACOBIAN { self.form.select(&shell.gradient(&triad.gain)) } else { SVector::zeros() };
             sink.row(residual, &jacobian);
         }
     }
@@ -133,13 +123,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn cloud(values: &[[f64; 3]]) -> std::vec::Vec<ShellPoint<f64>> {
-        values
-            .iter()
-            .map(|v| ShellPoint {
-                value: Vector3::from(*v),
-                excess: 0.01,
-            })
-            .collect()
+        values.iter().map(|v| ShellPoint { value: Vector3::from(*v), excess: 0.01 }).collect()
     }
 
     proptest! {
@@ -166,15 +150,8 @@ mod tests {
     #[test]
     fn on_a_sphere_the_residual_is_the_exact_distance() {
         let points = cloud(&[[3.0, 4.0, 12.0]]);
-        let model = NormModel {
-            points: &points,
-            norm: 2.0,
-            form: UPPER_TRIANGULAR,
-        };
-        let gain = Triad {
-            gain: Matrix3::identity() * 0.25,
-            bias: Vector3::zeros(),
-        };
+        let model = NormModel { points: &points, norm: 2.0, form: UPPER_TRIANGULAR };
+        let gain = Triad { gain: Matrix3::identity() * 0.25, bias: Vector3::zeros() };
         let mut sum = crate::model::SquaredSum(0.0);
         model.rows(&UPPER_TRIANGULAR.theta(&gain), &mut sum);
         // 13 from the centre of a sphere of radius 8, less the excess.
@@ -183,10 +160,7 @@ mod tests {
 
     #[test]
     fn the_curvature_excess_of_a_sphere_is_the_variance_over_its_radius() {
-        let gain = Triad {
-            gain: Matrix3::identity() * 0.5f64,
-            bias: Vector3::zeros(),
-        };
+        let gain = Triad { gain: Matrix3::identity() * 0.5f64, bias: Vector3::zeros() };
         let excess = curvature_excess(&gain, 10.0, &Vector3::new(20.0, 0.0, 0.0), 0.04);
         assert!((excess - 0.04 / 20.0).abs() < 1e-15);
     }

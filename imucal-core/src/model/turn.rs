@@ -42,11 +42,7 @@ pub struct TurnModel<'a, T: Scalar, const P: usize> {
 
 #[inline]
 fn columns<T: Scalar>(a: &Matrix3<T>) -> [Vector3<T>; 3] {
-    [
-        a.column(0).into_owned(),
-        a.column(1).into_owned(),
-        a.column(2).into_owned(),
-    ]
+    [a.column(0).into_owned(), a.column(1).into_owned(), a.column(2).into_owned()]
 }
 
 /// What a triad does to every block of a turn.
@@ -58,10 +54,7 @@ struct BlockRotation<T: Scalar> {
 
 impl<T: Scalar> BlockRotation<T> {
     fn new(triad: &Triad<T>) -> Self {
-        Self {
-            gain: triad.gain,
-            cofactor: Self::cofactor(&triad.gain),
-        }
+        Self { gain: triad.gain, cofactor: Self::cofactor(&triad.gain) }
     }
 
     fn cofactor(gain: &Matrix3<T>) -> Matrix3<T> {
@@ -79,10 +72,7 @@ impl<T: Scalar> BlockRotation<T> {
 /// A block less its bias: s0 − T b and ½ (c − s1 × b).
 #[inline]
 fn reduce<T: Scalar>(bias: &Vector3<T>, block: &Block<T>, duration: T) -> (Vector3<T>, Vector3<T>) {
-    (
-        block.s0 - bias * duration,
-        (block.c - block.s1.cross(bias)) * T::of(0.5),
-    )
+    (block.s0 - bias * duration, (block.c - block.s1.cross(bias)) * T::of(0.5))
 }
 
 /// `C_after_before`: the attitude after the turn, as the product of its blocks.
@@ -114,12 +104,7 @@ struct DerivativeSums<T: Scalar> {
 impl<T: Scalar> DerivativeSums<T> {
     fn new() -> Self {
         let none = [Matrix3::zeros(); 3];
-        Self {
-            angle: none,
-            coning: none,
-            moment: none,
-            time: Matrix3::zeros(),
-        }
+        Self { angle: none, coning: none, moment: none, time: Matrix3::zeros() }
     }
 
     #[inline]
@@ -131,11 +116,9 @@ impl<T: Scalar> DerivativeSums<T> {
         block: &Block<T>,
         duration: T,
     ) {
-        for (sums, factors) in [
-            (&mut self.angle, angle),
-            (&mut self.coning, coning),
-            (&mut self.moment, &block.s1),
-        ] {
+        for (sums, factors) in
+            [(&mut self.angle, angle), (&mut self.coning, coning), (&mut self.moment, &block.s1)]
+        {
             for (sum, factor) in sums.iter_mut().zip(factors.iter()) {
                 *sum += m * *factor;
             }
@@ -161,8 +144,7 @@ impl<T: Scalar> DerivativeSums<T> {
         let moment = mx * cofactor * cross_matrix(&Vector3::x())
             + my * cofactor * cross_matrix(&Vector3::y())
             + mz * cofactor * cross_matrix(&Vector3::z());
-        by.fixed_columns_mut::<3>(9)
-            .copy_from(&(-(self.time * gain) - moment * T::of(0.5)));
+        by.fixed_columns_mut::<3>(9).copy_from(&(-(self.time * gain) - moment * T::of(0.5)));
         by
     }
 }
@@ -193,11 +175,7 @@ impl<T: Scalar, const P: usize> Model<T, P> for TurnModel<'_, T, P> {
             };
             let carried = c.tr_mul(&turn.before);
             let residual = carried - turn.after;
-            let by_entries = if S::JACOBIAN {
-                cross_matrix(&carried) * c.tr_mul(&by)
-            } else {
-                by
-            };
+            let by_entries = if S::JACOBIAN { cross_matrix(&carried) * c.tr_mul(&by) } else { by };
             for (value, row) in residual.iter().zip(by_entries.row_iter()) {
                 sink.row(*value, &self.form.select(&row.transpose()));
             }
@@ -225,11 +203,7 @@ mod tests {
     /// Rate of a hand that tumbles a sensor through a few radians, rad/s.
     fn rate(k: usize) -> Vector3<f64> {
         let t = k as f64 * DT;
-        Vector3::new(
-            2.0 * (3.0 * t).sin(),
-            1.5 * (2.0 * t + 0.4).sin(),
-            -1.2 * (2.5 * t + 1.0).cos(),
-        )
+        Vector3::new(2.0 * (3.0 * t).sin(), 1.5 * (2.0 * t + 0.4).sin(), -1.2 * (2.5 * t + 1.0).cos())
     }
 
     fn blocks(samples: usize, of: usize) -> (Vec<Block<f64>>, Vec<f64>) {
@@ -279,10 +253,6 @@ mod tests {
         }
         let error =
             nalgebra::Rotation3::from_matrix_unchecked(exact.tr_mul(&attitude(&triad, &turn))).angle();
-        assert!(
-            error.to_degrees() < 1e-3,
-            "{} degrees after 10 s",
-            error.to_degrees()
-        );
+        assert!(error.to_degrees() < 1e-3, "{} degrees after 10 s", error.to_degrees());
     }
 }

@@ -148,10 +148,7 @@ pub fn decode(bytes: &[u8]) -> Result<CalibrationRecord, DecodeError> {
         return Err(DecodeError::BadMagic);
     }
     if major != VERSION.0 {
-        return Err(DecodeError::UnsupportedVersion {
-            found: major,
-            supported: VERSION.0,
-        });
+        return Err(DecodeError::UnsupportedVersion { found: major, supported: VERSION.0 });
     }
 
     let need = HEADER + usize::from(u16::from_le_bytes([a, b])) + CHECKSUM;
@@ -193,15 +190,11 @@ impl fmt::Display for DecodeError {
             }
             Self::BadMagic => f.write_str("not a calibration record: it does not begin with IMUC"),
             Self::UnsupportedVersion { found, supported } => {
-                write!(
-                    f,
-                    "record format {found}, but this program reads format {supported}"
-                )
+                write!(f, "record format {found}, but this program reads format {supported}")
             }
-            Self::BadCrc { stored, computed } => write!(
-                f,
-                "damaged: the checksum is {computed:08x} where the record says {stored:08x}"
-            ),
+            Self::BadCrc { stored, computed } => {
+                write!(f, "damaged: the checksum is {computed:08x} where the record says {stored:08x}")
+            }
             Self::Malformed => f.write_str("intact, but not a record of the version it claims"),
             Self::Unusable(defect) => defect.fmt(f),
         }

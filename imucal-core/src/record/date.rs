@@ -18,11 +18,7 @@ impl Date {
     /// The day on which `seconds` since 1970-01-01T00:00:00Z fall. Beyond the year 11 million it stays there.
     pub const fn from_unix(seconds: u64) -> Self {
         let days = seconds / 86_400;
-        Self(if days > u32::MAX as u64 {
-            u32::MAX
-        } else {
-            days as u32
-        })
+        Self(if days > u32::MAX as u64 { u32::MAX } else { days as u32 })
     }
 
     /// Days since 1970-01-01.
@@ -41,11 +37,7 @@ impl Date {
         let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
         let from_march = (5 * of_year + 2) / 153;
         let day = of_year - (153 * from_march + 2) / 5 + 1;
-        let (month, later) = if from_march < 10 {
-            (from_march + 3, 0)
-        } else {
-            (from_march - 9, 1)
-        };
+        let (month, later) = if from_march < 10 { (from_march + 3, 0) } else { (from_march - 9, 1) };
         ((era * 400 + year_of_era + later) as u32, month as u8, day as u8)
     }
 }

@@ -74,10 +74,7 @@ mod tests {
 
     fn of(serial: &str) -> CalibrationRecord {
         CalibrationRecord {
-            sensor: SensorIdentity {
-                name: "MTx".parse().unwrap(),
-                serial: serial.parse().unwrap(),
-            },
+            sensor: SensorIdentity { name: "MTx".parse().unwrap(), serial: serial.parse().unwrap() },
             date: Date::from_days(0),
             acc: None,
             gyr: None,
@@ -89,10 +86,7 @@ mod tests {
     fn a_record_of_another_serial_is_refused_by_both_names() {
         let record = of("00300017");
         let refusal = record.made_for("00300018").unwrap_err().to_string();
-        assert!(
-            refusal.contains("00300017") && refusal.contains("00300018"),
-            "{refusal}"
-        );
+        assert!(refusal.contains("00300017") && refusal.contains("00300018"), "{refusal}");
         assert_eq!(record.made_for("00300017"), Ok(Match::Confirmed));
     }
 

@@ -80,9 +80,7 @@ impl CalibrationRecord {
 
     /// The triads the record holds, in the order of [`Sensor::ALL`].
     pub fn triads(&self) -> impl Iterator<Item = (Sensor, &TriadRecord)> {
-        Sensor::ALL
-            .into_iter()
-            .filter_map(|sensor| Some((sensor, self.triad(sensor)?)))
+        Sensor::ALL.into_iter().filter_map(|sensor| Some((sensor, self.triad(sensor)?)))
     }
 }
 
@@ -141,10 +139,7 @@ impl TriadRecord {
     pub fn triad<T: Scalar>(&self) -> Triad<T> {
         let of = |entry: f32| T::of(f64::from(entry));
         let [[a, b, c], [d, e, f], [g, h, i]] = self.gain.map(|row| row.map(of));
-        Triad {
-            gain: Matrix3::new(a, b, c, d, e, f, g, h, i),
-            bias: Vector3::from(self.bias.map(of)),
-        }
+        Triad { gain: Matrix3::new(a, b, c, d, e, f, g, h, i), bias: Vector3::from(self.bias.map(of)) }
     }
 }
 
@@ -254,10 +249,7 @@ impl TryFrom<u8> for RawUnit {
     type Error = &'static str;
 
     fn try_from(position: u8) -> Result<Self, Self::Error> {
-        Self::ALL
-            .get(usize::from(position))
-            .copied()
-            .ok_or("no unit of this version")
+        Self::ALL.get(usize::from(position)).copied().ok_or("no unit of this version")
     }
 }
 

@@ -30,11 +30,7 @@ pub fn normalised_condition<T: Scalar, const P: usize>(a: &SMatrix<T, P, P>) -> 
         least = if *value < least { *value } else { least };
         most = if *value > most { *value } else { most };
     }
-    if least > T::zero() && most.finite() {
-        most / least
-    } else {
-        T::LARGEST
-    }
+    if least > T::zero() && most.finite() { most / least } else { T::LARGEST }
 }
 
 /// The unit vector along which `|R x|` with columns at unit length is least: the combination of parameters that
@@ -96,10 +92,7 @@ fn orthogonalise<T: Scalar, const P: usize>(w: &mut SMatrix<T, P, P>, i: usize, 
     let tangent = if zeta < T::zero() { -tangent } else { tangent };
     let cos = T::one() / (T::one() + tangent * tangent).root();
     let sin = cos * tangent;
-    let (first, second) = (
-        w.column(i) * cos - w.column(j) * sin,
-        w.column(i) * sin + w.column(j) * cos,
-    );
+    let (first, second) = (w.column(i) * cos - w.column(j) * sin, w.column(i) * sin + w.column(j) * cos);
     w.set_column(i, &first);
     w.set_column(j, &second);
     true

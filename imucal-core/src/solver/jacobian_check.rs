@@ -30,11 +30,7 @@ fn pick<T: Scalar, const P: usize>(
     theta: &SVector<T, P>,
     wanted: usize,
 ) -> Option<(T, SVector<T, P>)> {
-    let mut sink = Pick {
-        wanted,
-        seen: 0,
-        row: None,
-    };
+    let mut sink = Pick { wanted, seen: 0, row: None };
     model.rows(theta, &mut sink);
     sink.row
 }

@@ -142,12 +142,7 @@ impl<T: Scalar, const P: usize> LevenbergMarquardt<T, P> {
         self.evaluations = self.evaluations.saturating_add(1);
         self.independent_rows = model.independent_rows();
         let finite = self.factor.squared_sum().finite()
-            && self
-                .factor
-                .r()
-                .iter()
-                .chain(self.theta.iter())
-                .all(|x| x.finite());
+            && self.factor.r().iter().chain(self.theta.iter()).all(|x| x.finite());
         if !finite {
             return Err(Termination::NotFinite);
         }
@@ -160,12 +155,7 @@ impl<T: Scalar, const P: usize> LevenbergMarquardt<T, P> {
     fn orthogonality(&self) -> T {
         let length = self.factor.squared_sum().root();
         let mut worst = T::zero();
-        for (slope, norm) in self
-            .factor
-            .gradient()
-            .iter()
-            .zip(self.factor.column_norms().iter())
-        {
+        for (slope, norm) in self.factor.gradient().iter().zip(self.factor.column_norms().iter()) {
             let size = if *slope < T::zero() { -*slope } else { *slope };
             let reach = *norm * length;
             if reach > T::zero() {

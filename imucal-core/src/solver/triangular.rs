@@ -19,11 +19,7 @@ pub struct Triangular<T: Scalar, const P: usize> {
 
 impl<T: Scalar, const P: usize> Default for Triangular<T, P> {
     fn default() -> Self {
-        Self {
-            r: SMatrix::zeros(),
-            q: SVector::zeros(),
-            squared_sum: T::zero(),
-        }
+        Self { r: SMatrix::zeros(), q: SVector::zeros(), squared_sum: T::zero() }
     }
 }
 
@@ -118,12 +114,7 @@ pub(super) fn back_substitute<T: Scalar, const P: usize>(
 ) -> Option<SVector<T, P>> {
     let mut x = *y;
     for k in (0..P).rev() {
-        let known: T = r
-            .row(k)
-            .iter()
-            .zip(x.iter())
-            .skip(k + 1)
-            .fold(T::zero(), |sum, (a, b)| sum + *a * *b);
+        let known: T = r.row(k).iter().zip(x.iter()).skip(k + 1).fold(T::zero(), |sum, (a, b)| sum + *a * *b);
         let pivot = r.get((k, k)).copied().filter(|pivot| *pivot != T::zero())?;
         let entry = x.get_mut(k)?;
         *entry = (*entry - known) / pivot;
@@ -138,12 +129,7 @@ pub(super) fn solve_transposed<T: Scalar, const P: usize>(
 ) -> Option<SVector<T, P>> {
     let mut x = *y;
     for k in 0..P {
-        let known: T = r
-            .column(k)
-            .iter()
-            .zip(x.iter())
-            .take(k)
-            .fold(T::zero(), |sum, (a, b)| sum + *a * *b);
+        let known: T = r.column(k).iter().zip(x.iter()).take(k).fold(T::zero(), |sum, (a, b)| sum + *a * *b);
         let pivot = r.get((k, k)).copied().filter(|pivot| *pivot != T::zero())?;
         let entry = x.get_mut(k)?;
         *entry = (*entry - known) / pivot;

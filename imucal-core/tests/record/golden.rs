@@ -8,11 +8,7 @@ pub const GOLDEN: &[u8] = include_bytes!("../golden/record-1.0.bin");
 /// Figures of a real unit, one sensor with temperature terms and one without.
 pub fn golden_record() -> CalibrationRecord {
     let quality = FitQuality {
-        gain_std: [
-            [1.5e-7, 3.1e-7, 1.1e-6],
-            [0.0, 8.2e-8, 2.9e-7],
-            [0.0, 0.0, 9.2e-8],
-        ],
+        gain_std: [[1.5e-7, 3.1e-7, 1.1e-6], [0.0, 8.2e-8, 2.9e-7], [0.0, 0.0, 9.2e-8]],
         bias_std: [0.24, 0.14, 0.15],
         rms: 0.00112,
         held_out_rms: Some(0.00125),
@@ -23,17 +19,10 @@ pub fn golden_record() -> CalibrationRecord {
         field_norm: None,
     };
     CalibrationRecord {
-        sensor: SensorIdentity {
-            name: "Xsens MTi".parse().unwrap(),
-            serial: "00300017".parse().unwrap(),
-        },
+        sensor: SensorIdentity { name: "Xsens MTi".parse().unwrap(), serial: "00300017".parse().unwrap() },
         date: Date::from_days(20_000),
         acc: Some(TriadRecord {
-            gain: [
-                [0.0024130, -8.23e-6, -2.242e-5],
-                [0.0, 0.0024270, -5.153e-5],
-                [0.0, 0.0, 0.0024118],
-            ],
+            gain: [[0.0024130, -8.23e-6, -2.242e-5], [0.0, 0.0024270, -5.153e-5], [0.0, 0.0, 0.0024118]],
             bias: [33123.838, 33275.163, 32364.494],
             unit_in: RawUnit::Counts,
             unit_out: RawUnit::MetrePerSecondSquared,
@@ -53,11 +42,7 @@ pub fn golden_record() -> CalibrationRecord {
             unit_out: RawUnit::Arbitrary,
             model: "E9".parse().unwrap(),
             temperature: None,
-            quality: FitQuality {
-                held_out_rms: None,
-                field_norm: Some(475.0),
-                ..quality
-            },
+            quality: FitQuality { held_out_rms: None, field_norm: Some(475.0), ..quality },
         }),
     }
 }
@@ -79,12 +64,7 @@ pub fn by_hand() -> Vec<u8> {
     payload.extend([0xA0, 0x9C, 0x01]); // 20 000 days
 
     payload.push(1); // accelerometer
-    floats(
-        &mut payload,
-        &[
-            0.0024130, -8.23e-6, -2.242e-5, 0.0, 0.0024270, -5.153e-5, 0.0, 0.0, 0.0024118,
-        ],
-    );
+    floats(&mut payload, &[0.0024130, -8.23e-6, -2.242e-5, 0.0, 0.0024270, -5.153e-5, 0.0, 0.0, 0.0024118]);
     floats(&mut payload, &[33123.838, 33275.163, 32364.494]);
     payload.extend([3, 0]); // counts to m/s^2
     text(&mut payload, "T9");
@@ -101,10 +81,7 @@ pub fn by_hand() -> Vec<u8> {
     payload.push(0); // no gyroscope
 
     payload.push(1); // magnetometer
-    floats(
-        &mut payload,
-        &[1.1, 0.01, 0.02, 0.01, 0.9, -0.03, 0.02, -0.03, 1.0123],
-    );
+    floats(&mut payload, &[1.1, 0.01, 0.02, 0.01, 0.9, -0.03, 0.02, -0.03, 1.0123]);
     floats(&mut payload, &[12.5, -40.0, 7.25]);
     payload.extend([7, 10]); // mG to a.u.
     text(&mut payload, "E9");
@@ -133,9 +110,7 @@ pub fn framed(major: u8, minor: u8, payload: &[u8]) -> Vec<u8> {
 /// CRC-32 as its definition has it, bit by bit.
 fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |crc, byte| {
-        (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
-            (crc >> 1) ^ (0xEDB8_8320 & (crc & 1).wrapping_neg())
-        })
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xEDB8_8320 & (crc & 1).wrapping_neg()))
     })
 }
 

@@ -17,12 +17,7 @@ use imucal_core::record::{
 #[ignore = "writes the golden bytes of a new version"]
 fn write_golden_bytes() {
     use std::io::Write;
-    let path = format!(
-        "{}/tests/golden/record-{}.{}.bin",
-        env!("CARGO_MANIFEST_DIR"),
-        VERSION.0,
-        VERSION.1
-    );
+    let path = format!("{}/tests/golden/record-{}.{}.bin", env!("CARGO_MANIFEST_DIR"), VERSION.0, VERSION.1);
     let mut file = std::fs::File::create_new(path).expect("golden bytes exist and are never written again");
     file.write_all(&by_hand()).unwrap();
 }
@@ -42,10 +37,7 @@ fn the_golden_bytes_are_read_and_written_unchanged() {
 fn every_truncation_says_how_much_is_missing() {
     for have in 0..GOLDEN.len() {
         let need = if have < 8 { 12 } else { GOLDEN.len() };
-        assert_eq!(
-            decode(&GOLDEN[..have]),
-            Err(DecodeError::Truncated { have, need })
-        );
+        assert_eq!(decode(&GOLDEN[..have]), Err(DecodeError::Truncated { have, need }));
     }
 }
 
@@ -57,18 +49,9 @@ fn every_single_bit_flip_is_found() {
         let refusal = decode(&bytes).unwrap_err();
         match bit / 8 {
             0..4 => assert_eq!(refusal, DecodeError::BadMagic),
-            4 => assert!(matches!(
-                refusal,
-                DecodeError::UnsupportedVersion { supported: 1, .. }
-            )),
-            6..8 => assert!(matches!(
-                refusal,
-                DecodeError::Truncated { .. } | DecodeError::BadCrc { .. }
-            )),
-            _ => assert!(
-                matches!(refusal, DecodeError::BadCrc { .. }),
-                "bit {bit}: {refusal}"
-            ),
+            4 => assert!(matches!(refusal, DecodeError::UnsupportedVersion { supported: 1, .. })),
+            6..8 => assert!(matches!(refusal, DecodeError::Truncated { .. } | DecodeError::BadCrc { .. })),
+            _ => assert!(matches!(refusal, DecodeError::BadCrc { .. }), "bit {bit}: {refusal}"),
         }
     }
 }
@@ -82,12 +65,9 @@ fn what_follows_the_record_is_not_looked_at() {
 
 #[test]
 fn foreign_bytes_are_no_record() {
-    for foreign in [
-        &[0xFF; 600][..],
-        &[0; 600],
-        b"# time,acc_x,acc_y,acc_z",
-        b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0",
-    ] {
+    for foreign in
+        [&[0xFF; 600][..], &[0; 600], b"# time,acc_x,acc_y,acc_z", b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0"]
+    {
         assert_eq!(decode(foreign), Err(DecodeError::BadMagic));
     }
 }
@@ -113,10 +93,7 @@ fn a_newer_minor_with_appended_fields_is_read() {
 fn bytes_after_the_last_field_of_this_minor_are_a_faulty_writer() {
     let mut payload = golden_payload().to_vec();
     payload.push(0);
-    assert_eq!(
-        decode(&framed(1, VERSION.1, &payload)),
-        Err(DecodeError::Malformed)
-    );
+    assert_eq!(decode(&framed(1, VERSION.1, &payload)), Err(DecodeError::Malformed));
 }
 
 #[test]
@@ -137,19 +114,13 @@ fn refused_both_ways(
 ) {
     let mut record = golden_record();
     spoil(record.acc.as_mut().unwrap());
-    assert_eq!(
-        encode(&record, &mut [0; MAX_LEN]),
-        Err(EncodeError::Unusable(defect))
-    );
+    assert_eq!(encode(&record, &mut [0; MAX_LEN]), Err(EncodeError::Unusable(defect)));
 
     let mut payload = golden_payload().to_vec();
     for (slot, figure) in payload[payload_at..].chunks_exact_mut(4).zip(figures) {
         slot.copy_from_slice(&figure.to_le_bytes());
     }
-    assert_eq!(
-        decode(&framed(1, 0, &payload)),
-        Err(DecodeError::Unusable(defect))
-    );
+    assert_eq!(decode(&framed(1, 0, &payload)), Err(DecodeError::Unusable(defect)));
 }
 
 #[test]
@@ -158,18 +129,8 @@ fn figures_that_are_not_finite_are_refused_both_ways() {
     let at = |figures| Defect::NotFinite { sensor, figures };
     let gain = 9 + 1 + 8 + 1 + 3 + 1;
     let temperature = gain + 48 + 2 + 3 + 1;
-    refused_both_ways(
-        |acc| acc.gain[0][0] = f32::NAN,
-        gain,
-        &[f32::NAN],
-        at(Figures::Gain),
-    );
-    refused_both_ways(
-        |acc| acc.bias[0] = f32::INFINITY,
-        gain + 36,
-        &[f32::INFINITY],
-        at(Figures::Bias),
-    );
+    refused_both_ways(|acc| acc.gain[0][0] = f32::NAN, gain, &[f32::NAN], at(Figures::Gain));
+    refused_both_ways(|acc| acc.bias[0] = f32::INFINITY, gain + 36, &[f32::INFINITY], at(Figures::Bias));
     refused_both_ways(
         |acc| acc.temperature.as_mut().unwrap().reference = f32::NAN,
         temperature,
@@ -187,9 +148,7 @@ fn figures_that_are_not_finite_are_refused_both_ways() {
 #[test]
 fn a_singular_gain_is_refused_both_ways() {
     let gain = 9 + 1 + 8 + 1 + 3 + 1;
-    let defect = Defect::Singular {
-        sensor: Sensor::Accelerometer,
-    };
+    let defect = Defect::Singular { sensor: Sensor::Accelerometer };
     refused_both_ways(|acc| acc.gain = [[0.0; 3]; 3], gain, &[0.0; 9], defect);
     let flat = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0];
     refused_both_ways(

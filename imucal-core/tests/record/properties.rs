@@ -19,33 +19,14 @@ fn figure() -> impl Strategy<Value = f32> {
 fn triad() -> impl Strategy<Value = TriadRecord> {
     let gain = (uniform9(-0.3f32..0.3), -6i32..6).prop_map(|(skew, decade)| {
         let entry = |i: usize| (skew[i] + if i.is_multiple_of(4) { 1.0 } else { 0.0 }) * 10f32.powi(decade);
-        [
-            [entry(0), entry(1), entry(2)],
-            [entry(3), entry(4), entry(5)],
-            [entry(6), entry(7), entry(8)],
-        ]
+        [[entry(0), entry(1), entry(2)], [entry(3), entry(4), entry(5)], [entry(6), entry(7), entry(8)]]
     });
     let temperature = (figure(), uniform3(figure()), uniform3(figure())).prop_map(
-        |(reference, bias_slope, scale_slope)| TemperatureTerms {
-            reference,
-            bias_slope,
-            scale_slope,
-        },
+        |(reference, bias_slope, scale_slope)| TemperatureTerms { reference, bias_slope, scale_slope },
     );
     let quality = (
-        (
-            uniform3(uniform3(figure())),
-            uniform3(figure()),
-            figure(),
-            option::of(figure()),
-        ),
-        (
-            any::<u32>(),
-            any::<u8>(),
-            figure(),
-            figure(),
-            option::of(figure()),
-        ),
+        (uniform3(uniform3(figure())), uniform3(figure()), figure(), option::of(figure())),
+        (any::<u32>(), any::<u8>(), figure(), figure(), option::of(figure())),
     )
         .prop_map(
             |(
@@ -66,26 +47,17 @@ fn triad() -> impl Strategy<Value = TriadRecord> {
             },
         );
     let unit = || prop::sample::select(RawUnit::ALL.to_vec());
-    (
-        gain,
-        uniform3(figure()),
-        unit(),
-        unit(),
-        "[A-Z0-9+]{0,8}",
-        option::of(temperature),
-        quality,
+    (gain, uniform3(figure()), unit(), unit(), "[A-Z0-9+]{0,8}", option::of(temperature), quality).prop_map(
+        |(gain, bias, unit_in, unit_out, model, temperature, quality)| TriadRecord {
+            gain,
+            bias,
+            unit_in,
+            unit_out,
+            model: model.parse().unwrap(),
+            temperature,
+            quality,
+        },
     )
-        .prop_map(
-            |(gain, bias, unit_in, unit_out, model, temperature, quality)| TriadRecord {
-                gain,
-                bias,
-                unit_in,
-                unit_out,
-                model: model.parse().unwrap(),
-                temperature,
-                quality,
-            },
-        )
 }
 
 prop_compose! {

@@ -56,22 +56,14 @@ pub struct AccResult {
 }
 
 fn points(rests: &[Rest<f64>]) -> Vec<ShellPoint<f64>> {
-    rests
-        .iter()
-        .map(|rest| ShellPoint::new(rest.acc.mean()))
-        .collect()
+    rests.iter().map(|rest| ShellPoint::new(rest.acc.mean())).collect()
 }
 
 /// Fit of T9 at one segmentation, for comparing segmentations; `None` where there is too little to fit.
 pub fn trial(rests: &[Rest<f64>], gravity: f64) -> Option<(Triad<f64>, f64)> {
     let points = points(rests);
     (points.len() > 9).then(|| {
-        let problem = NormProblem {
-            points: &points,
-            norm: gravity,
-            form: UPPER_TRIANGULAR,
-            serial: false,
-        };
+        let problem = NormProblem { points: &points, norm: gravity, form: UPPER_TRIANGULAR, serial: false };
         let fit = problem.fit(&Triad::identity());
         (UPPER_TRIANGULAR.triad(fit.solver.theta()), fit.rms())
     })
@@ -98,10 +90,7 @@ fn with_form<const P: usize>(
         outcome: SensorOutcome {
             kind: SensorKind::Acc,
             model: model.name(),
-            verdict: Err(Refused {
-                advice: advice(&refusal, model),
-                refusal,
-            }),
+            verdict: Err(Refused { advice: advice(&refusal, model), refusal }),
             fit,
             evidence: None,
         },
@@ -113,19 +102,11 @@ fn with_form<const P: usize>(
     if points.len() <= P {
         let seen = raw_coverage(&points, &Vector3::zeros());
         return refuse(
-            Refusal::TooFewObservations {
-                have: seen.observations,
-                need: limits.observations,
-            },
+            Refusal::TooFewObservations { have: seen.observations, need: limits.observations },
             None,
         );
     }
-    let problem = NormProblem {
-        points: &points,
-        norm: gravity,
-        form,
-        serial: false,
-    };
+    let problem = NormProblem { points: &points, norm: gravity, form, serial: false };
     let fit = problem.fit(&Triad::identity());
     let coverage = problem.coverage(&fit);
     let inflation = problem.inflation(&fit);
@@ -183,11 +164,7 @@ fn summary<const P: usize>(
             .left_out
             .iter()
             .map(|(k, size)| {
-                format!(
-                    "rest {} at {:.1} s: {size:.1} robust standard deviations",
-                    k + 1,
-                    rests[*k].time
-                )
+                format!("rest {} at {:.1} s: {size:.1} robust standard deviations", k + 1, rests[*k].time)
             })
             .collect(),
         gain_spread: None,

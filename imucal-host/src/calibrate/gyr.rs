@@ -9,13 +9,12 @@ use imucal_core::{
     triad::Triad,
 };
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
-use rayon::prelude::*;
 use std::ops::Range;
 
 use super::{
     outcome::{BiasWander, Evidence, FitSummary, KnownTurn, Refused, SensorOutcome},
     outlier::outliers,
-    rows::Residuals,
+    rows::{Residuals, Rows},
 };
 use crate::{
     observe::turn::{BiasPath, TurnData, compress},
@@ -66,39 +65,18 @@ struct Turns {
 impl GyrInput<'_> {
     fn turns(&self) -> Turns {
         let (bias, bias_std, wander) = rest_bias(self.rests);
-        let mut turns = Turns {
-            data: Vec::new(),
-            bias,
-            bias_std,
-            wander,
-            left_out: Vec::new(),
-        };
+        let mut turns = Turns { data: Vec::new(), bias, bias_std, wander, left_out: Vec::new() };
         for pair in self.used.windows(2) {
             let (i, j) = (pair[0], pair[1]);
             let mean = |k: usize| {
-                if wander.interpolated {
-                    self.rests[k].gyr.mean()
-                } else {
-                    bias
-                }
+                if wander.interpolated { self.rests[k].gyr.mean() } else { bias }
             };
-            let path = BiasPath {
-                before: (self.rests[i].time, mean(i)),
-                after: (self.rests[j].time, mean(j)),
-            };
+            let path =
+                BiasPath { before: (self.rests[i].time, mean(i)), after: (self.rests[j].time, mean(j)) };
             let ends = (i, &self.rows[i], j, &self.rows[j]);
-            match compress(
-                self.time,
-                &self.sensor.values,
-                self.usable,
-                self.interval,
-                ends,
-                &path,
-            ) {
+            match compress(self.time, &self.sensor.values, self.usable, self.interval, ends, &path) {
                 Ok(data) => turns.data.push(data),
-                Err(gap) => turns
-                    .left_out
-                    .push(format!("turn from rest {} to {}: {gap}", i + 1, j + 1)),
+                Err(gap) => turns.left_out.push(format!("turn from rest {} to {}: {gap}", i + 1, j + 1)),
             }
         }
         turns
@@ -118,41 +96,21 @@ impl GyrInput<'_> {
 /// Mean rate at rest, its standard error, and how it moved from rest to rest.
 fn rest_bias(rests: &[Rest<f64>]) -> (Vector3<f64>, Vector3<f64>, BiasWander) {
     let total: f64 = rests.iter().map(|r| f64::from(r.gyr.count())).sum();
-    let bias = rests
-        .iter()
-        .map(|r| r.gyr.mean() * f64::from(r.gyr.count()))
-        .sum::<Vector3<f64>>()
-        / total;
+    let bias = rests.iter().map(|r| r.gyr.mean() * f64::from(r.gyr.count())).sum::<Vector3<f64>>() / total;
     let count = rests.len().max(2) as f64;
-    let spread = rests
-        .iter()
-        .map(|r| (r.gyr.mean() - bias).map(|d| d * d))
-        .sum::<Vector3<f64>>()
-        / (count - 1.0);
-    let noise = rests
-        .iter()
-        .map(|r| r.gyr.variance() / f64::from(r.gyr.count().max(1)))
-        .sum::<Vector3<f64>>()
-        / count;
+    let spread =
+        rests.iter().map(|r| (r.gyr.mean() - bias).map(|d| d * d)).sum::<Vector3<f64>>() / (count - 1.0);
+    let noise =
+        rests.iter().map(|r| r.gyr.variance() / f64::from(r.gyr.count().max(1))).sum::<Vector3<f64>>()
+            / count;
     let (spread, expected) = (spread.map(f64::sqrt), noise.map(f64::sqrt));
     let interpolated = (0..3).any(|axis| spread[axis] > WANDER * expected[axis]);
-    (
-        bias,
-        spread / count.sqrt(),
-        BiasWander {
-            spread,
-            expected,
-            interpolated,
-        },
-    )
+    (bias, spread / count.sqrt(), BiasWander { spread, expected, interpolated })
 }
 
 fn solve(turns: &[Turn<'_, f64>], start: SVector<f64, 9>) -> LevenbergMarquardt<f64, 9> {
     let mut solver = LevenbergMarquardt::new(start, Settings::default());
-    solver.run(&TurnModel {
-        turns,
-        form: FULL_GAIN,
-    });
+    solver.run(&TurnModel { turns, form: FULL_GAIN });
     solver
 }
 
@@ -162,16 +120,10 @@ fn identity() -> SVector<f64, 9> {
 
 /// Chord between the carried and the measured direction of each turn, rad.
 fn turn_errors(turns: &[Turn<'_, f64>], theta: &SVector<f64, 9>) -> Vec<f64> {
-    Residuals::of(
-        &TurnModel {
-            turns,
-            form: FULL_GAIN,
-        },
-        theta,
-    )
-    .chunks_exact(3)
-    .map(|r| r.iter().map(|x| x * x).sum::<f64>().sqrt())
-    .collect()
+    Residuals::of(&TurnModel { turns, form: FULL_GAIN }, theta)
+        .chunks_exact(3)
+        .map(|r| r.iter().map(|x| x * x).sum::<f64>().sqrt())
+        .collect()
 }
 
 fn rms(errors: &[f64]) -> f64 {
@@ -179,19 +131,18 @@ fn rms(errors: &[f64]) -> f64 {
 }
 
 /// Gain's diagonal at one segmentation, for comparing segmentations; `None` where there are too few turns.
-pub fn trial(input: &GyrInput<'_>, start: &Matrix3<f64>) -> Option<Vector3<f64>> {
+///
+/// One Gauss–Newton step from `near`, the gain at the chosen segmentation: segmentations differ by parts in a
+/// thousand, so what a second step would add is a part in a million.
+pub fn trial(input: &GyrInput<'_>, near: &Matrix3<f64>) -> Option<Vector3<f64>> {
     let turns = input.turns();
-    let start = FULL_GAIN.theta(&Triad {
-        gain: *start,
-        bias: Vector3::zeros(),
-    });
-    let solver =
-        (turns.data.len() >= LEAST_TURNS).then(|| solve(&input.with_directions(&turns.data), start))?;
-    solver
-        .report()
-        .termination
-        .was_successful()
-        .then(|| FULL_GAIN.triad(solver.theta()).gain.diagonal())
+    if turns.data.len() < LEAST_TURNS {
+        return None;
+    }
+    let near = FULL_GAIN.theta(&Triad { gain: *near, bias: Vector3::zeros() });
+    let known = input.with_directions(&turns.data);
+    let step = Rows::of(&TurnModel { turns: &known, form: FULL_GAIN }, &near).step_without(0..0)?;
+    Some(FULL_GAIN.triad(&(near + step)).gain.diagonal())
 }
 
 /// The outcome of a gyroscope whose accelerometer gives no directions.
@@ -217,8 +168,8 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
     }
     let mut solver = solve(&input.with_directions(&turns.data), identity());
     let gross = outliers(&turn_errors(&input.with_directions(&turns.data), solver.theta()));
-    for (index, size) in gross.into_iter().rev() {
-        let turn = turns.data.remove(index);
+    for (index, size) in gross.iter().rev() {
+        let turn = turns.data.remove(*index);
         turns.left_out.push(format!(
             "turn from rest {} to {}: {size:.1} robust standard deviations",
             turn.rest_before + 1,
@@ -226,13 +177,11 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
         ));
     }
     let known = input.with_directions(&turns.data);
-    solver = if known.len() < input.used.len() {
-        solve(&known, *solver.theta())
-    } else {
-        solver
-    };
+    if !gross.is_empty() {
+        solver = solve(&known, identity());
+    }
     let summary = summarise(input, &turns, &known, &solver);
-    match judge(&solver, &summary, &known) {
+    match judge(&solver, &summary) {
         Ok(()) => SensorOutcome {
             kind: SensorKind::Gyr,
             model: MODEL,
@@ -258,42 +207,19 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
 fn check_turns(input: &GyrInput<'_>, data: &[TurnData]) -> Result<(), Refusal> {
     let telling = data
         .iter()
-        .filter(|t| {
-            input
-                .direction(t.rest_before)
-                .angle(&input.direction(t.rest_after))
-                > LEAST_ANGLE
-        })
+        .filter(|t| input.direction(t.rest_before).angle(&input.direction(t.rest_after)) > LEAST_ANGLE)
         .count();
     match telling {
         0 => Err(Refusal::NoMotion),
-        have if have < LEAST_TURNS => Err(Refusal::TooFewObservations {
-            have,
-            need: LEAST_TURNS,
-        }),
+        have if have < LEAST_TURNS => Err(Refusal::TooFewObservations { have, need: LEAST_TURNS }),
         _ => Ok(()),
     }
 }
 
-fn judge(
-    solver: &LevenbergMarquardt<f64, 9>,
-    summary: &FitSummary,
-    known: &[Turn<'_, f64>],
-) -> Result<(), Refusal> {
-    let limits = Limits {
-        rms: LARGEST_RMS,
-        ..Limits::for_norm(9, LEAST_TURNS)
-    };
+fn judge(solver: &LevenbergMarquardt<f64, 9>, summary: &FitSummary) -> Result<(), Refusal> {
+    let limits = Limits { rms: LARGEST_RMS, ..Limits::for_norm(9, LEAST_TURNS) };
     accept::check_report(&solver.report(), &limits)?;
-    let bend = accept::nonlinearity(
-        solver,
-        &TurnModel {
-            turns: known,
-            form: FULL_GAIN,
-        },
-        1.0,
-    );
-    accept::check_nonlinearity(bend, &limits)?;
+    accept::check_nonlinearity(summary.nonlinearity, &limits)?;
     accept::check_plausibility(&summary.triad, true, summary.rms, &limits)
 }
 
@@ -313,24 +239,20 @@ fn refuse(refusal: Refusal, fit: Option<FitSummary>) -> SensorOutcome {
     SensorOutcome {
         kind: SensorKind::Gyr,
         model: MODEL,
-        verdict: Err(Refused {
-            refusal,
-            advice: advice.into(),
-        }),
+        verdict: Err(Refused { refusal, advice: advice.into() }),
         fit,
         evidence: None,
     }
 }
 
-/// Rms error of turns left out of the fit, one at a time.
+/// Rms error of turns left out of the fit, one at a time. Each time the fit takes one Gauss–Newton step from the
+/// optimum of all; the held turn is then integrated afresh.
 fn held_out_rms(known: &[Turn<'_, f64>], theta: &SVector<f64, 9>) -> Option<f64> {
+    let rows = Rows::of(&TurnModel { turns: known, form: FULL_GAIN }, theta);
     let errors: Option<Vec<f64>> = (0..known.len())
-        .into_par_iter()
         .map(|left| {
-            let kept: Vec<_> = known[..left].iter().chain(&known[left + 1..]).copied().collect();
-            let solver = solve(&kept, *theta);
-            let held = turn_errors(&known[left..=left], solver.theta());
-            solver.report().termination.was_successful().then(|| held[0])
+            let step = rows.step_without(3 * left..3 * left + 3)?;
+            turn_errors(&known[left..=left], &(theta + step)).first().copied()
         })
         .collect();
     Some(rms(&errors?))
@@ -344,15 +266,10 @@ fn summarise(
 ) -> FitSummary {
     let report = solver.report();
     let gain = FULL_GAIN.triad(solver.theta()).gain;
-    let covariance = solver
-        .covariance()
-        .unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
+    let covariance = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
     let gain_std = FULL_GAIN.triad(&covariance.diagonal().map(f64::sqrt)).gain;
     FitSummary {
-        triad: Triad {
-            gain,
-            bias: turns.bias,
-        },
+        triad: Triad { gain, bias: turns.bias },
         gain_std,
         bias_std: turns.bias_std,
         unit_in: input.sensor.unit,
@@ -364,14 +281,7 @@ fn summarise(
         parameters: 9,
         condition: report.condition,
         coverage: Coverage::of(known.iter().flat_map(|t| turn_axis(t))).share,
-        nonlinearity: accept::nonlinearity(
-            solver,
-            &TurnModel {
-                turns: known,
-                form: FULL_GAIN,
-            },
-            1.0,
-        ),
+        nonlinearity: accept::nonlinearity(solver, &TurnModel { turns: known, form: FULL_GAIN }, 1.0),
         inflation: 1.0,
         iterations: report.iterations,
         termination: report.termination,

@@ -38,30 +38,14 @@ fn outcome(
     fit: Option<FitSummary>,
     evidence: Option<Evidence>,
 ) -> SensorOutcome {
-    let verdict = verdict.map_err(|refusal| Refused {
-        advice: advice(&refusal),
-        refusal,
-    });
-    SensorOutcome {
-        kind: SensorKind::Mag,
-        model: MODEL,
-        verdict,
-        fit,
-        evidence,
-    }
+    let verdict = verdict.map_err(|refusal| Refused { advice: advice(&refusal), refusal });
+    SensorOutcome { kind: SensorKind::Mag, model: MODEL, verdict, fit, evidence }
 }
 
 /// Fits from the start with the lower cost: an algebraic ellipsoid can be far off on a small part of the sphere.
 fn best_fit(problem: &NormProblem<'_, 9>) -> Option<NormFit<9>> {
-    let starts = [
-        adjusted::start(problem.points, problem.norm),
-        sphere::start(problem.points, problem.norm),
-    ];
-    starts
-        .iter()
-        .flatten()
-        .map(|triad| problem.fit(triad))
-        .min_by(|a, b| a.rms().total_cmp(&b.rms()))
+    let starts = [adjusted::start(problem.points, problem.norm), sphere::start(problem.points, problem.norm)];
+    starts.iter().flatten().map(|triad| problem.fit(triad)).min_by(|a, b| a.rms().total_cmp(&b.rms()))
 }
 
 type Judged = (FitSummary, Result<Evidence, Refusal>);
@@ -69,10 +53,7 @@ type Judged = (FitSummary, Result<Evidence, Refusal>);
 fn fit(points: &[ShellPoint<f64>], sensor: &Triple, field: Option<f64>) -> Result<Judged, Refusal> {
     let limits = Limits::for_norm(9, 10);
     if points.len() < limits.observations {
-        return Err(Refusal::TooFewObservations {
-            have: points.len(),
-            need: limits.observations,
-        });
+        return Err(Refusal::TooFewObservations { have: points.len(), need: limits.observations });
     }
     // Without a known field the radius is a gauge: that of a sphere through the cloud keeps gains near one.
     let flat = Refusal::PoorCoverage {
@@ -83,12 +64,7 @@ fn fit(points: &[ShellPoint<f64>], sensor: &Triple, field: Option<f64>) -> Resul
     };
     let radius = sphere::start(points, 1.0).map(|t| 1.0 / t.gain.m11).ok_or(flat)?;
     let norm = field.unwrap_or(radius);
-    let problem = NormProblem {
-        points,
-        norm,
-        form: UPPER_TRIANGULAR,
-        serial: true,
-    };
+    let problem = NormProblem { points, norm, form: UPPER_TRIANGULAR, serial: true };
     let fit = best_fit(&problem).ok_or(flat)?;
     let coverage = problem.coverage(&fit);
     let inflation = problem.inflation(&fit);
@@ -114,9 +90,7 @@ fn summarise(
     sensor: &Triple,
     inflation: &SVector<f64, 9>,
 ) -> FitSummary {
-    let std = problem
-        .form
-        .triad(&fit.covariance(inflation).diagonal().map(f64::sqrt));
+    let std = problem.form.triad(&fit.covariance(inflation).diagonal().map(f64::sqrt));
     FitSummary {
         triad: problem.form.triad(fit.solver.theta()),
         gain_std: std.gain,
@@ -161,24 +135,15 @@ fn to_unit_determinant(
         let unit = SVector::<f64, 9>::from_fn(|row, _| f64::from(u8::from(row == k)));
         let by = problem.form.triad(&unit);
         let moved = (by.gain - gain * ((inverse * by.gain).trace() / 3.0)) / d;
-        problem.form.theta(&Triad {
-            gain: moved,
-            bias: by.bias,
-        })
+        problem.form.theta(&Triad { gain: moved, bias: by.bias })
     }));
-    let std = problem.form.triad(
-        &(jacobian * covariance * jacobian.transpose())
-            .diagonal()
-            .map(f64::sqrt),
-    );
+    let std = problem.form.triad(&(jacobian * covariance * jacobian.transpose()).diagonal().map(f64::sqrt));
     summary.triad.gain = gain / d;
     (summary.gain_std, summary.bias_std) = (std.gain, std.bias);
     summary.field_norm = Some(problem.norm / d * sensor.nominal.per_unit.abs());
     summary.unit_out = sensor.unit;
     summary.rms *= sensor.nominal.per_unit.abs();
-    summary.held_out_rms = summary
-        .held_out_rms
-        .map(|rms| rms * sensor.nominal.per_unit.abs());
+    summary.held_out_rms = summary.held_out_rms.map(|rms| rms * sensor.nominal.per_unit.abs());
 }
 
 fn advice(refusal: &Refusal) -> String {

@@ -40,11 +40,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            acc: AccModel::T9,
-            skip: Vec::new(),
-            multipliers: segmentation::MULTIPLIERS.to_vec(),
-        }
+        Self { acc: AccModel::T9, skip: Vec::new(), multipliers: segmentation::MULTIPLIERS.to_vec() }
     }
 }
 
@@ -62,17 +58,9 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
     };
     integrity_warnings(&integrity, &mut calibration.warnings);
     inertial(recording, &integrity, options, progress, &mut calibration);
-    if let Some(mag) = recording
-        .mag
-        .as_ref()
-        .filter(|_| !options.skip.contains(&SensorKind::Mag))
-    {
+    if let Some(mag) = recording.mag.as_ref().filter(|_| !options.skip.contains(&SensorKind::Mag)) {
         progress("fitting the magnetometer");
-        let field = recording
-            .manifest
-            .site
-            .field_ned_ut
-            .map(|f| Vector3::from(f).norm());
+        let field = recording.manifest.site.field_ned_ut.map(|f| Vector3::from(f).norm());
         let usable = usable(&integrity, SensorKind::Mag, recording.rows());
         calibration.sensors.push(mag::calibrate(mag, &usable, field));
     }
@@ -95,24 +83,17 @@ fn integrity_warnings(integrity: &Integrity, warnings: &mut Vec<String>) {
         for stretch in &sensor.saturated {
             let axis = ["x", "y", "z"][stretch.axis % 3];
             let (from, to) = (stretch.rows.start, stretch.rows.end);
-            warnings.push(format!(
-                "{prefix}_{axis}: clipped in rows {from} to {to}; left out"
-            ));
+            warnings.push(format!("{prefix}_{axis}: clipped in rows {from} to {to}; left out"));
         }
         for rows in &sensor.stuck {
-            warnings.push(format!(
-                "{prefix}: stuck in rows {} to {}; left out",
-                rows.start, rows.end
-            ));
+            warnings.push(format!("{prefix}: stuck in rows {} to {}; left out", rows.start, rows.end));
         }
     }
 }
 
 /// Rows in which a sensor is measured, not clipped and not stuck; all rows where there is no such sensor.
 fn usable(integrity: &Integrity, kind: SensorKind, rows: usize) -> Vec<bool> {
-    integrity
-        .sensor(kind)
-        .map_or_else(|| vec![true; rows], |sensor| sensor.usable.clone())
+    integrity.sensor(kind).map_or_else(|| vec![true; rows], |sensor| sensor.usable.clone())
 }
 
 /// Accelerometer and gyroscope, which share the rests.
@@ -125,9 +106,7 @@ fn inertial(
 ) {
     let Some(acc) = &recording.acc else {
         if recording.gyr.is_some() && !options.skip.contains(&SensorKind::Gyr) {
-            calibration
-                .sensors
-                .push(gyr::without_accelerometer(Refusal::NoRest));
+            calibration.sensors.push(gyr::without_accelerometer(Refusal::NoRest));
         }
         return;
     };
@@ -164,23 +143,14 @@ fn inertial(
     let mut trials: Vec<_> = cuts.iter().map(Cut::trial).collect();
     let mut acc_outcome = result.outcome;
     if let Some(fit) = &mut acc_outcome.fit {
-        let gains: Vec<_> = segmentation::comparable(&cuts)
-            .filter_map(|cut| Some(cut.fit?.0.gain.diagonal()))
-            .collect();
+        let gains: Vec<_> =
+            segmentation::comparable(&cuts).filter_map(|cut| Some(cut.fit?.0.gain.diagonal())).collect();
         fit.gain_spread = Some(outcome::gain_spread(gains.iter().copied()));
     }
-    let gyr_outcome = recording
-        .gyr
-        .as_ref()
-        .filter(|_| !options.skip.contains(&SensorKind::Gyr))
-        .map(|gyr| {
+    let gyr_outcome =
+        recording.gyr.as_ref().filter(|_| !options.skip.contains(&SensorKind::Gyr)).map(|gyr| {
             progress("fitting the gyroscope");
-            let shared = GyrShared {
-                recording,
-                gyr,
-                usable: &usable,
-                interval,
-            };
+            let shared = GyrShared { recording, gyr, usable: &usable, interval };
             match (&acc_outcome.verdict, acc_outcome.fit.as_ref()) {
                 (Ok(()), Some(fit)) => shared.outcome(chosen, &cuts, &fit.triad, &result.used, &mut trials),
                 (Err(refused), _) => gyr::without_accelerometer(refused.refusal),
@@ -191,10 +161,7 @@ fn inertial(
         calibration.sensors.push(acc_outcome);
     }
     calibration.sensors.extend(gyr_outcome);
-    let spreads = calibration
-        .sensors
-        .iter()
-        .filter_map(|s| s.fit.as_ref()?.gain_spread);
+    let spreads = calibration.sensors.iter().filter_map(|s| s.fit.as_ref()?.gain_spread);
     calibration.segmentation = Some(SegmentationReport {
         rests: chosen.rows.clone(),
         multiplier: chosen.multiplier,

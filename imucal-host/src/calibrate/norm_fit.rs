@@ -53,11 +53,7 @@ pub struct NormFit<const P: usize> {
 
 impl<const P: usize> NormProblem<'_, P> {
     fn model<'a>(&self, points: &'a [ShellPoint<f64>]) -> NormModel<'a, f64, P> {
-        NormModel {
-            points,
-            norm: self.norm,
-            form: self.form,
-        }
+        NormModel { points, norm: self.norm, form: self.form }
     }
 
     fn solve(&self, points: &[ShellPoint<f64>], start: SVector<f64, P>) -> LevenbergMarquardt<f64, P> {
@@ -88,13 +84,7 @@ impl<const P: usize> NormProblem<'_, P> {
             solver = self.solve(&points, *solver.theta());
         }
         left_out.sort_by_key(|(index, _)| *index);
-        NormFit {
-            report: solver.report(),
-            solver,
-            points,
-            used,
-            left_out,
-        }
+        NormFit { report: solver.report(), solver, points, used, left_out }
     }
 
     /// Sets the excess that the residuals' own noise makes on the curved shell.
@@ -113,22 +103,11 @@ impl<const P: usize> NormProblem<'_, P> {
         let errors: Option<Vec<f64>> = (0..folds.min(count))
             .into_par_iter()
             .map(|fold| {
-                let (from, to) = (
-                    fold * count / folds.min(count),
-                    (fold + 1) * count / folds.min(count),
-                );
-                let kept: Vec<_> = fit.points[..from]
-                    .iter()
-                    .chain(&fit.points[to..])
-                    .copied()
-                    .collect();
+                let (from, to) = (fold * count / folds.min(count), (fold + 1) * count / folds.min(count));
+                let kept: Vec<_> = fit.points[..from].iter().chain(&fit.points[to..]).copied().collect();
                 let solver = self.solve(&kept, *fit.solver.theta());
                 let residuals = Residuals::of(&self.model(&fit.points[from..to]), solver.theta());
-                solver
-                    .report()
-                    .termination
-                    .was_successful()
-                    .then(|| residuals.iter().map(|r| r * r).sum())
+                solver.report().termination.was_successful().then(|| residuals.iter().map(|r| r * r).sum())
             })
             .collect();
         Some((errors?.iter().sum::<f64>() / count as f64).sqrt())
@@ -176,12 +155,7 @@ impl<const P: usize> NormProblem<'_, P> {
         accept::check_observations(coverage, P, limits)?;
         accept::check_report(&fit.report, limits)?;
         accept::check_nonlinearity(bend, limits)?;
-        accept::check_plausibility(
-            &triad,
-            nominal,
-            fit.rms() / mean_radius(&triad, self.norm),
-            limits,
-        )
+        accept::check_plausibility(&triad, nominal, fit.rms() / mean_radius(&triad, self.norm), limits)
     }
 }
 
@@ -199,10 +173,9 @@ impl<const P: usize> NormFit<P> {
     /// Covariance of the parameters with inflated standard errors; infinite where the Jacobian is singular.
     pub fn covariance(&self, inflation: &SVector<f64, P>) -> SMatrix<f64, P, P> {
         let scale = SMatrix::from_diagonal(inflation);
-        self.solver.covariance().map_or_else(
-            || SMatrix::repeat(f64::INFINITY),
-            |classical| scale * classical * scale,
-        )
+        self.solver
+            .covariance()
+            .map_or_else(|| SMatrix::repeat(f64::INFINITY), |classical| scale * classical * scale)
     }
 }
 

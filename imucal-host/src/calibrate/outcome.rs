@@ -138,10 +138,7 @@ impl FitSummary {
     /// The calibration of raw values in the recording's own unit.
     pub fn raw_triad(&self) -> Triad<f64> {
         if self.in_raw_scale() {
-            Triad {
-                gain: self.triad.gain,
-                bias: self.raw_bias(),
-            }
+            Triad { gain: self.triad.gain, bias: self.raw_bias() }
         } else {
             self.triad.in_unit(self.nominal.offset, self.nominal.per_unit)
         }
@@ -150,11 +147,7 @@ impl FitSummary {
     /// Standard errors of [`raw_triad`](Self::raw_triad): gain, bias.
     pub fn raw_std(&self) -> (Matrix3<f64>, Vector3<f64>) {
         let per = self.nominal.per_unit.abs();
-        let gain = if self.in_raw_scale() {
-            self.gain_std
-        } else {
-            self.gain_std / per
-        };
+        let gain = if self.in_raw_scale() { self.gain_std } else { self.gain_std / per };
         (gain, self.bias_std * per)
     }
 
@@ -218,16 +211,10 @@ impl SensorOutcome {
 pub fn gain_spread(gains: impl Iterator<Item = Vector3<f64>> + Clone) -> f64 {
     (0..3)
         .map(|axis| {
-            let (low, high) = gains
-                .clone()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), g| {
-                    (low.min(g[axis].abs()), high.max(g[axis].abs()))
-                });
-            if high > low {
-                (high - low) / (0.5 * (high + low))
-            } else {
-                0.0
-            }
+            let (low, high) = gains.clone().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), g| {
+                (low.min(g[axis].abs()), high.max(g[axis].abs()))
+            });
+            if high > low { (high - low) / (0.5 * (high + low)) } else { 0.0 }
         })
         .fold(0.0, f64::max)
 }

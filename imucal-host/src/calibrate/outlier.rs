@@ -32,11 +32,7 @@ pub fn outliers(residuals: &[f64]) -> Vec<(usize, f64)> {
         .map(|(k, r)| (k, r.abs() / std))
         .filter(|(_, size)| !(*size <= GROSS))
         .collect();
-    if found.len() as f64 > MOST * residuals.len() as f64 {
-        Vec::new()
-    } else {
-        found
-    }
+    if found.len() as f64 > MOST * residuals.len() as f64 { Vec::new() } else { found }
 }
 
 #[cfg(test)]

@@ -1,6 +1,11 @@
 //! The rows of a model, kept: for residuals by observation, influence and held-out errors.
 
-use imucal_core::model::{Model, RowSink};
+use std::ops::Range;
+
+use imucal_core::{
+    model::{Model, RowSink},
+    solver::triangular::Triangular,
+};
 use nalgebra::SVector;
 
 /// Residuals and derivatives in the model's order.
@@ -15,12 +20,21 @@ pub struct Rows<const P: usize> {
 impl<const P: usize> Rows<P> {
     /// All rows of a model.
     pub fn of(model: &impl Model<f64, P>, theta: &SVector<f64, P>) -> Self {
-        let mut rows = Self {
-            residuals: Vec::new(),
-            jacobian: Vec::new(),
-        };
+        let mut rows = Self { residuals: Vec::new(), jacobian: Vec::new() };
         model.rows(theta, &mut rows);
         rows
+    }
+
+    /// The Gauss–Newton step from the optimum of all rows to that without some of them: exact for a linear model,
+    /// and to second order in the step for another. `None` where the others do not determine it.
+    pub fn step_without(&self, left_out: Range<usize>) -> Option<SVector<f64, P>> {
+        let mut factor = Triangular::default();
+        for (k, (residual, jacobian)) in self.residuals.iter().zip(&self.jacobian).enumerate() {
+            if !left_out.contains(&k) {
+                factor.push(*residual, jacobian);
+            }
+        }
+        factor.damped_step(0.0, &SVector::repeat(0.0))
     }
 }
 

@@ -52,13 +52,7 @@ pub fn cuts(detector: &RestDetector<'_>, multipliers: &[f64], gravity: f64) -> V
             let cut = detector.cut(*multiplier);
             let rests: Vec<_> = cut.rests.iter().map(|rows| detector.rest(rows)).collect();
             let fit = acc::trial(&rests, gravity);
-            Cut {
-                multiplier: cut.multiplier,
-                threshold: cut.threshold,
-                rows: cut.rests,
-                rests,
-                fit,
-            }
+            Cut { multiplier: cut.multiplier, threshold: cut.threshold, rows: cut.rests, rests, fit }
         })
         .collect()
 }
@@ -66,8 +60,7 @@ pub fn cuts(detector: &RestDetector<'_>, multipliers: &[f64], gravity: f64) -> V
 /// Those that keep most of the rests: the ones whose answers may be compared.
 pub fn comparable(cuts: &[Cut]) -> impl Iterator<Item = &Cut> + Clone {
     let most = cuts.iter().map(|cut| cut.rows.len()).max().unwrap_or(0);
-    cuts.iter()
-        .filter(move |cut| cut.rows.len() as f64 >= KEEPS * most as f64)
+    cuts.iter().filter(move |cut| cut.rows.len() as f64 >= KEEPS * most as f64)
 }
 
 /// The cut to use: the smallest residual; without any fit, the most rests.

@@ -39,26 +39,15 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if let Some(warning) = warning {
         warn(&warning);
     }
-    let out = arguments
-        .out
-        .clone()
-        .unwrap_or_else(|| beside(&arguments.recording));
+    let out = arguments.out.clone().unwrap_or_else(|| beside(&arguments.recording));
     apply::apply(&recording, &stored, &record).write(&out)?;
-    println!(
-        "{}: {} rows corrected into {}",
-        recording.name,
-        recording.rows(),
-        out.display()
-    );
+    println!("{}: {} rows corrected into {}", recording.name, recording.rows(), out.display());
     Ok(Ending::Done)
 }
 
 /// `NAME-calibrated.csv.gz` for `NAME.csv.gz`.
 fn beside(path: &Path) -> PathBuf {
-    let name = path
-        .file_name()
-        .and_then(OsStr::to_str)
-        .unwrap_or("recording.csv");
+    let name = path.file_name().and_then(OsStr::to_str).unwrap_or("recording.csv");
     let (stem, ending) = name.split_once('.').unwrap_or((name, "csv"));
     path.with_file_name(format!("{stem}-calibrated.{ending}"))
 }

@@ -49,9 +49,7 @@ fn model(text: &str) -> Result<(SensorKind, ModelChoice), String> {
         "acc=T6" => Ok((SensorKind::Acc, ModelChoice::Acc(AccModel::T6))),
         _ if text.strip_prefix("gyr=") == Some(gyr::MODEL) => Ok((SensorKind::Gyr, ModelChoice::Only)),
         _ if text.strip_prefix("mag=") == Some(mag::MODEL) => Ok((SensorKind::Mag, ModelChoice::Only)),
-        _ => Err(format!(
-            "`{text}` is no model; expected acc=T9, acc=T6, gyr=K9 or mag=E9"
-        )),
+        _ => Err(format!("`{text}` is no model; expected acc=T9, acc=T6, gyr=K9 or mag=E9")),
     }
 }
 
@@ -69,9 +67,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let progress = Progress::start();
     let calibration = calibrate(&recording, &options(arguments), &|stage| progress.stage(stage));
     drop(progress);
-    for warning in &calibration.warnings {
-        warn(warning);
-    }
     print(arguments, &calibration)?;
     write(arguments, &calibration)?;
     Ok(ending(&calibration, &named))
@@ -103,17 +98,9 @@ fn check_named(recording: &Recording, named: &[SensorKind]) -> anyhow::Result<()
 
 /// 0 once something was accepted and nothing named was refused.
 fn ending(calibration: &Calibration, named: &[SensorKind]) -> Ending {
-    let accepted = |kind: SensorKind| {
-        calibration
-            .sensor(kind)
-            .is_some_and(|outcome| outcome.verdict.is_ok())
-    };
+    let accepted = |kind: SensorKind| calibration.sensor(kind).is_some_and(|outcome| outcome.verdict.is_ok());
     let any = SensorKind::ALL.into_iter().any(accepted);
-    if any && named.iter().all(|kind| accepted(*kind)) {
-        Ending::Done
-    } else {
-        Ending::Refused
-    }
+    if any && named.iter().all(|kind| accepted(*kind)) { Ending::Done } else { Ending::Refused }
 }
 
 fn print(arguments: &Arguments, calibration: &Calibration) -> anyhow::Result<()> {
@@ -135,14 +122,9 @@ fn print(arguments: &Arguments, calibration: &Calibration) -> anyhow::Result<()>
 
 fn write(arguments: &Arguments, calibration: &Calibration) -> anyhow::Result<()> {
     let stored = StoredCalibration::of(calibration, today());
-    let nothing = SensorKind::ALL
-        .into_iter()
-        .all(|kind| stored.triad(kind).is_none());
+    let nothing = SensorKind::ALL.into_iter().all(|kind| stored.triad(kind).is_none());
     for path in arguments.out.iter().chain(&arguments.record).filter(|_| nothing) {
-        warn(&format!(
-            "{}: not written, since no sensor was accepted",
-            path.display()
-        ));
+        warn(&format!("{}: not written, since no sensor was accepted", path.display()));
     }
     if nothing {
         return Ok(());
@@ -158,13 +140,9 @@ fn write(arguments: &Arguments, calibration: &Calibration) -> anyhow::Result<()>
 
 /// Today, UTC; `SOURCE_DATE_EPOCH` overrides it, for outputs that must not depend on the day.
 pub(super) fn today() -> Date {
-    let seconds = std::env::var("SOURCE_DATE_EPOCH")
-        .ok()
-        .and_then(|text| text.parse().ok())
-        .unwrap_or_else(|| {
-            SystemTime::now()
-                .duration_since(SystemTime::UNIX_EPOCH)
-                .map_or(0, |since| since.as_secs())
+    let seconds =
+        std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|text| text.parse().ok()).unwrap_or_else(|| {
+            SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs())
         });
     Date::from_unix(seconds)
 }

@@ -51,10 +51,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     println!("\n4. Apply the record through the f32 core and compare with the f64 reference.\n");
     let device = stored.to_record(out)?;
     let equal = SensorKind::ALL.into_iter().all(|kind| {
-        let compared = recording
-            .sensor(kind)
-            .zip(stored.triad(kind))
-            .zip(triad_record(&device, kind));
+        let compared = recording.sensor(kind).zip(stored.triad(kind)).zip(triad_record(&device, kind));
         compared.is_some_and(|((triple, stored), record)| {
             let result = samples::compare(kind, triple, stored, record);
             print_samples(&result);
@@ -73,18 +70,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         ("calibration.toml", "the calibration for people"),
         ("calibration.bin", "the record for the device"),
         ("calibration.json", "everything, for programs"),
-        (
-            "tumble-calibrated.csv.gz, .toml",
-            "the recording corrected through the core",
-        ),
+        ("tumble-calibrated.csv.gz, .toml", "the recording corrected through the core"),
     ] {
         println!("  {file:<32} {what}");
     }
-    Ok(if found && equal && refitted {
-        Ending::Done
-    } else {
-        Ending::Refused
-    })
+    Ok(if found && equal && refitted { Ending::Done } else { Ending::Refused })
 }
 
 /// Largest error in standard errors, sensor by sensor; whether all were accepted.
@@ -103,11 +93,7 @@ fn against_truth(calibration: &Calibration, unit: &SimulatedUnit) -> bool {
             .map(|(error, std)| error.abs() / std)
             .collect::<Vec<_>>();
         let worst = errors.iter().copied().fold(0.0, f64::max);
-        println!(
-            "{}: largest error {worst:.1} standard errors, of {} parameters",
-            words(kind),
-            errors.len()
-        );
+        println!("{}: largest error {worst:.1} standard errors, of {} parameters", words(kind), errors.len());
         true
     })
 }
@@ -122,14 +108,7 @@ fn print_samples(s: &SampleEquivalence) {
 }
 
 fn print_fit(fit: &FitEquivalence) -> bool {
-    let worst = fit
-        .parameters
-        .iter()
-        .map(|p| (p.device - p.reference).abs() / p.std)
-        .fold(0.0, f64::max);
-    println!(
-        "{}: fitted again in f32, largest difference {worst:.4} standard errors",
-        words(fit.kind)
-    );
+    let worst = fit.parameters.iter().map(|p| (p.device - p.reference).abs() / p.std).fold(0.0, f64::max);
+    println!("{}: fitted again in f32, largest difference {worst:.4} standard errors", words(fit.kind));
     fit.passes()
 }

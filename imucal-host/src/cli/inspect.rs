@@ -32,17 +32,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     };
     println!("{}: intact", arguments.calibration.display());
     let or_unknown = |text: &str| {
-        if text.is_empty() {
-            "unknown".to_owned()
-        } else {
-            text.to_owned()
-        }
+        if text.is_empty() { "unknown".to_owned() } else { text.to_owned() }
     };
-    println!(
-        "sensor {}, serial {}",
-        or_unknown(&stored.sensor.name),
-        or_unknown(&stored.sensor.serial)
-    );
+    println!("sensor {}, serial {}", or_unknown(&stored.sensor.name), or_unknown(&stored.sensor.serial));
     println!("made on {}", stored.date);
     for kind in SensorKind::ALL {
         match stored.triad(kind) {
@@ -62,9 +54,8 @@ fn print_triad(kind: SensorKind, triad: &StoredTriad) {
         triad.unit_in
     );
     for row in 0..3 {
-        let gain: Vec<String> = (0..3)
-            .map(|column| measure(triad.gain[row][column], triad.gain_std[row][column]))
-            .collect();
+        let gain: Vec<String> =
+            (0..3).map(|column| measure(triad.gain[row][column], triad.gain_std[row][column])).collect();
         println!(
             "  {}  {:>26} {:>26} {:>26}   {:>22}",
             ["x", "y", "z"][row],
@@ -74,11 +65,7 @@ fn print_triad(kind: SensorKind, triad: &StoredTriad) {
             measure(triad.bias[row], triad.bias_std[row])
         );
     }
-    let unit = if kind == SensorKind::Gyr {
-        "rad a turn".into()
-    } else {
-        triad.unit_out.to_string()
-    };
+    let unit = if kind == SensorKind::Gyr { "rad a turn".into() } else { triad.unit_out.to_string() };
     let held = triad.held_out_rms.map_or_else(|| "not known".into(), plain);
     println!(
         "  {} observations, {} parameters; rms {} {unit}, held out {held}; condition {:.1}, coverage {:.0} %",

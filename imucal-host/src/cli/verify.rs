@@ -43,12 +43,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         .into_iter()
         .filter_map(|kind| {
             let (triple, triad) = (recording.sensor(kind)?, stored.triad(kind)?);
-            Some(samples::compare(
-                kind,
-                triple,
-                triad,
-                triad_record(&record, kind)?,
-            ))
+            Some(samples::compare(kind, triple, triad, triad_record(&record, kind)?))
         })
         .collect();
     progress.stage("fitting again, by the core and by the reference");
@@ -63,14 +58,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
 
 /// Fits again whatever the recording and the calibration share.
 fn refit(recording: &Recording, stored: &StoredCalibration) -> Vec<FitEquivalence> {
-    let acc = stored
-        .acc
-        .as_ref()
-        .is_some_and(|t| t.model == AccModel::T6.name());
-    let options = Options {
-        acc: if acc { AccModel::T6 } else { AccModel::T9 },
-        ..Options::default()
-    };
+    let acc = stored.acc.as_ref().is_some_and(|t| t.model == AccModel::T6.name());
+    let options = Options { acc: if acc { AccModel::T6 } else { AccModel::T9 }, ..Options::default() };
     let calibration = calibrate(recording, &options, &|_| {});
     calibration
         .sensors

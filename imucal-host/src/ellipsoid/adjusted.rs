@@ -28,13 +28,8 @@ const MONOMIALS: [[usize; 3]; 10] = [
     [0, 0, 0],
 ];
 /// Coefficient of σ^{2k} x^{n−2k} in the unbiased monomial of degree n.
-const UNBIASED: [[f64; 3]; 5] = [
-    [1.0, 0.0, 0.0],
-    [1.0, 0.0, 0.0],
-    [1.0, -1.0, 0.0],
-    [1.0, -3.0, 0.0],
-    [1.0, -6.0, 3.0],
-];
+const UNBIASED: [[f64; 3]; 5] =
+    [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, -1.0, 0.0], [1.0, -3.0, 0.0], [1.0, -6.0, 3.0]];
 /// The noise is looked for up to this share of the cloud's extent.
 const LARGEST_NOISE: f64 = 0.2;
 
@@ -51,12 +46,7 @@ impl Moments {
     fn of(points: &[ShellPoint<f64>]) -> Option<Self> {
         let count = points.len() as f64;
         let middle: Vector3<f64> = points.iter().map(|p| p.value).sum::<Vector3<f64>>() / count;
-        let extent = (points
-            .iter()
-            .map(|p| (p.value - middle).norm_squared())
-            .sum::<f64>()
-            / count)
-            .sqrt();
+        let extent = (points.iter().map(|p| (p.value - middle).norm_squared()).sum::<f64>() / count).sqrt();
         if !(extent.is_finite() && extent > 0.0) {
             return None;
         }
@@ -144,10 +134,8 @@ pub fn start(points: &[ShellPoint<f64>], norm: f64) -> Option<Triad<f64>> {
     let centre = -(q.try_inverse()? * linear);
     let scale = centre.dot(&(q * centre)) - psi[9];
     let upper = (q / scale).cholesky()?.l().transpose();
-    let triad = Triad {
-        gain: upper * (norm / moments.extent),
-        bias: moments.middle + centre * moments.extent,
-    };
+    let triad =
+        Triad { gain: upper * (norm / moments.extent), bias: moments.middle + centre * moments.extent };
     triad.is_finite().then_some(triad)
 }
 
@@ -177,21 +165,13 @@ mod tests {
     #[test]
     fn without_noise_the_ellipsoid_is_exact() {
         let triad = start(&cap(1.0, 300, 0.0), 475.0).unwrap();
-        assert!(
-            (triad.bias - Vector3::new(100.0, -50.0, 20.0)).norm() < 1e-3,
-            "{}",
-            triad.bias
-        );
+        assert!((triad.bias - Vector3::new(100.0, -50.0, 20.0)).norm() < 1e-3, "{}", triad.bias);
     }
 
     #[test]
     fn on_the_top_third_noise_does_not_shift_the_centre() {
         let triad = start(&cap(0.3, 200_000, 2.0), 475.0).unwrap();
-        assert!(
-            (triad.bias - Vector3::new(100.0, -50.0, 20.0)).norm() < 2.5,
-            "{}",
-            triad.bias
-        );
+        assert!((triad.bias - Vector3::new(100.0, -50.0, 20.0)).norm() < 2.5, "{}", triad.bias);
     }
 
     #[test]

@@ -24,9 +24,6 @@ pub fn start(points: &[ShellPoint<f64>], norm: f64) -> Option<Triad<f64>> {
     let solution = normal.cholesky()?.solve(&image);
     let centre = solution.xyz();
     let radius = (solution.w + centre.norm_squared()).sqrt();
-    let triad = Triad {
-        gain: Matrix3::identity() * (norm / radius),
-        bias: middle + centre,
-    };
+    let triad = Triad { gain: Matrix3::identity() * (norm / radius), bias: middle + centre };
     triad.is_finite().then_some(triad)
 }

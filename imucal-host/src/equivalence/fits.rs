@@ -73,18 +73,12 @@ impl FitEquivalence {
 pub fn compare(recording: &Recording, outcome: &SensorOutcome) -> Option<FitEquivalence> {
     let summary = outcome.accepted()?;
     match outcome.evidence.as_ref()? {
-        Evidence::Shell {
-            points,
-            norm,
-            diagonal: false,
-            triad,
-        } => shell(outcome.kind, points, *norm, triad, UPPER_TRIANGULAR, summary),
-        Evidence::Shell {
-            points,
-            norm,
-            diagonal: true,
-            triad,
-        } => shell(outcome.kind, points, *norm, triad, DIAGONAL, summary),
+        Evidence::Shell { points, norm, diagonal: false, triad } => {
+            shell(outcome.kind, points, *norm, triad, UPPER_TRIANGULAR, summary)
+        }
+        Evidence::Shell { points, norm, diagonal: true, triad } => {
+            shell(outcome.kind, points, *norm, triad, DIAGONAL, summary)
+        }
         Evidence::Turns(turns) => gyroscope(recording, turns, summary),
     }
 }
@@ -98,29 +92,14 @@ fn shell<const P: usize>(
     summary: &FitSummary,
 ) -> Option<FitEquivalence> {
     // Both start a few percent away from the answer, so that both have to find it.
-    let start = form.theta(&Triad {
-        gain: near.gain * 1.02,
-        bias: near.bias * 0.98,
-    });
-    let narrow: Vec<ShellPoint<f32>> = points
-        .iter()
-        .map(|p| ShellPoint {
-            value: p.value.cast(),
-            excess: p.excess as f32,
-        })
-        .collect();
+    let start = form.theta(&Triad { gain: near.gain * 1.02, bias: near.bias * 0.98 });
+    let narrow: Vec<ShellPoint<f32>> =
+        points.iter().map(|p| ShellPoint { value: p.value.cast(), excess: p.excess as f32 }).collect();
     let mut solver = LevenbergMarquardt::new(start.cast::<f32>(), Default::default());
-    let report = solver.run(&NormModel {
-        points: &narrow,
-        norm: norm as f32,
-        form,
-    });
+    let report = solver.run(&NormModel { points: &narrow, norm: norm as f32, form });
     let plain: Vec<([f64; 3], f64)> = points.iter().map(|p| (p.value.into(), p.excess)).collect();
     let reference = reference::fit_shell(&plain, norm, P == 6, start.as_slice())?;
-    let std = form.theta(&Triad {
-        gain: summary.gain_std,
-        bias: summary.bias_std,
-    });
+    let std = form.theta(&Triad { gain: summary.gain_std, bias: summary.bias_std });
     let scales = form.theta(&Triad {
         gain: nalgebra::Matrix3::repeat(near.gain.norm()),
         bias: Vector3::repeat(norm / near.gain.norm()),
@@ -132,11 +111,7 @@ fn shell<const P: usize>(
         std.as_slice(),
         scales.as_slice(),
     );
-    Some(FitEquivalence {
-        kind,
-        termination: report.termination,
-        parameters,
-    })
+    Some(FitEquivalence { kind, termination: report.termination, parameters })
 }
 
 fn gyroscope(recording: &Recording, turns: &[KnownTurn], summary: &FitSummary) -> Option<FitEquivalence> {
@@ -153,10 +128,7 @@ fn gyroscope(recording: &Recording, turns: &[KnownTurn], summary: &FitSummary) -
         })
         .collect();
     let mut solver = LevenbergMarquardt::new(start.cast::<f32>(), Default::default());
-    let report = solver.run(&TurnModel {
-        turns: &known,
-        form: FULL_GAIN,
-    });
+    let report = solver.run(&TurnModel { turns: &known, form: FULL_GAIN });
     let sampled: Vec<SampledTurn> = turns
         .iter()
         .map(|turn| SampledTurn {
@@ -168,10 +140,7 @@ fn gyroscope(recording: &Recording, turns: &[KnownTurn], summary: &FitSummary) -
         .collect();
     let gyr = &recording.gyr.as_ref()?.values;
     let reference = reference::fit_turns(&sampled, &recording.time, gyr, start.as_slice())?;
-    let std = FULL_GAIN.theta(&Triad {
-        gain: summary.gain_std,
-        bias: summary.bias_std,
-    });
+    let std = FULL_GAIN.theta(&Triad { gain: summary.gain_std, bias: summary.bias_std });
     let parameters = differences(
         FULL_GAIN.entries(),
         solver.theta().iter().map(|x| f64::from(*x)),
@@ -179,11 +148,7 @@ fn gyroscope(recording: &Recording, turns: &[KnownTurn], summary: &FitSummary) -
         std.as_slice(),
         &[1.0; 9],
     );
-    Some(FitEquivalence {
-        kind: SensorKind::Gyr,
-        termination: report.termination,
-        parameters,
-    })
+    Some(FitEquivalence { kind: SensorKind::Gyr, termination: report.termination, parameters })
 }
 
 fn differences(
@@ -197,16 +162,14 @@ fn differences(
         .iter()
         .zip(device.zip(reference))
         .zip(std.iter().zip(scales))
-        .map(
-            |((entry, (device, reference)), (std, scale))| ParameterDifference {
-                name: entry_name(*entry),
-                device,
-                reference: *reference,
-                ulp: ulp(device, *reference),
-                std: *std,
-                scale: *scale,
-            },
-        )
+        .map(|((entry, (device, reference)), (std, scale))| ParameterDifference {
+            name: entry_name(*entry),
+            device,
+            reference: *reference,
+            ulp: ulp(device, *reference),
+            std: *std,
+            scale: *scale,
+        })
         .collect()
 }
 

@@ -43,10 +43,7 @@ fn split_upper(theta: &[f64]) -> ([[f64; 3]; 3], [f64; 3]) {
 pub fn fit_shell(points: &[([f64; 3], f64)], norm: f64, diagonal: bool, start: &[f64]) -> Option<Vec<f64>> {
     debug_assert_eq!(start.len(), if diagonal { 6 } else { 9 });
     gauss_newton(start, |theta| {
-        points
-            .iter()
-            .map(|(m, excess)| shell_distance(theta, *m, norm, *excess))
-            .collect()
+        points.iter().map(|(m, excess)| shell_distance(theta, *m, norm, *excess)).collect()
     })
 }
 
@@ -68,16 +65,8 @@ fn carry(theta: &[f64], turn: &SampledTurn, time: &[f64], gyr: &[Vector3<f64>]) 
     let gain: [[f64; 3]; 3] = [0, 1, 2].map(|i| [theta[3 * i], theta[3 * i + 1], theta[3 * i + 2]]);
     let mut attitude = UnitQuaternion::identity();
     for k in turn.rows.clone() {
-        let since = if k > turn.rows.start {
-            time[k] - time[k - 1]
-        } else {
-            0.0
-        };
-        let until = if k + 1 < turn.rows.end {
-            time[k + 1] - time[k]
-        } else {
-            0.0
-        };
+        let since = if k > turn.rows.start { time[k] - time[k - 1] } else { 0.0 };
+        let until = if k + 1 < turn.rows.end { time[k + 1] - time[k] } else { 0.0 };
         let rate = correct(&gain, &turn.bias.at(time[k]).into(), gyr[k].into());
         attitude *= UnitQuaternion::from_scaled_axis(Vector3::from(rate) * (0.5 * (since + until)));
     }
@@ -108,10 +97,7 @@ fn gauss_newton(start: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64> + Sync) ->
     let mut here = DVector::from_vec(residuals(&theta));
     for _ in 0..ROUNDS {
         let jacobian = differences(&theta, &residuals, here.len());
-        let scale: Vec<f64> = jacobian
-            .column_iter()
-            .map(|c| c.norm().max(f64::MIN_POSITIVE))
-            .collect();
+        let scale: Vec<f64> = jacobian.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();
         let mut scaled = jacobian;
         for (mut column, s) in scaled.column_iter_mut().zip(&scale) {
             column /= *s;
@@ -120,11 +106,8 @@ fn gauss_newton(start: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64> + Sync) ->
         let mut share = 1.0;
         let mut moved = None;
         for _ in 0..HALVINGS {
-            let trial: Vec<f64> = theta
-                .iter()
-                .zip(step.iter().zip(&scale))
-                .map(|(t, (d, s))| t + share * d / s)
-                .collect();
+            let trial: Vec<f64> =
+                theta.iter().zip(step.iter().zip(&scale)).map(|(t, (d, s))| t + share * d / s).collect();
             let there = DVector::from_vec(residuals(&trial));
             if there.norm_squared() <= here.norm_squared() {
                 moved = Some((trial, there));
@@ -159,9 +142,5 @@ fn differences(theta: &[f64], residuals: &(impl Fn(&[f64]) -> Vec<f64> + Sync), 
             (at(theta[k] + step) - at(theta[k] - step)) / (2.0 * step)
         })
         .collect();
-    if columns.is_empty() {
-        DMatrix::zeros(rows, 0)
-    } else {
-        DMatrix::from_columns(&columns)
-    }
+    if columns.is_empty() { DMatrix::zeros(rows, 0) } else { DMatrix::from_columns(&columns) }
 }

@@ -32,13 +32,7 @@ mod tests {
 
     #[test]
     fn a_sample_that_repeats_the_one_before_counts_once() {
-        let values = [
-            Vector3::x(),
-            Vector3::x(),
-            Vector3::y(),
-            Vector3::repeat(f64::NAN),
-            Vector3::x(),
-        ];
+        let values = [Vector3::x(), Vector3::x(), Vector3::y(), Vector3::repeat(f64::NAN), Vector3::x()];
         let cloud = cloud(&values, &[true, true, true, false, true]);
         assert_eq!(cloud.rows, [0, 2, 4]);
     }

@@ -18,8 +18,10 @@ pub const WINDOW: f64 = 1.0;
 const INITIAL: f64 = 3.0;
 /// A rest lasts at least this long, s.
 pub const SHORTEST: f64 = 1.0;
-/// Above this mean rate against the bias the sensor turns, however smoothly, rad/s (3°/s).
-const TURNING: f64 = 0.052;
+/// A mean rate this many robust standard deviations of the rests' from their median is a slow turn, or creep.
+const TURNING: f64 = 6.0;
+/// The rate allowed at rest is never below nor above these, rad/s (0.9 to 3°/s): hands tremble, biases wander.
+const TURNING_LIMITS: (f64, f64) = (0.015, 0.052);
 /// The initial stretch counts as a rest unless it is this many times noisier than the quietest tenth.
 const INITIAL_EXCESS: f64 = 8.0;
 /// Rows further apart than this are single shots, each a rest of its own, s.
@@ -75,14 +77,7 @@ impl<'a> RestDetector<'a> {
         let variance = windowed_variance(samples, half, GAP * interval);
         let rate = samples.gyr.map(|gyr| windowed_mean(gyr, samples.usable, half));
         let (noise, from_initial) = reference_noise(&variance, (INITIAL / interval).round() as usize, half);
-        Self {
-            samples,
-            variance,
-            rate,
-            noise,
-            from_initial,
-            interval,
-        }
+        Self { samples, variance, rate, noise, from_initial, interval }
     }
 
     /// Rows are single shots, seconds apart, each taken at rest.
@@ -98,23 +93,12 @@ impl<'a> RestDetector<'a> {
     /// The rests at a multiple of the reference variance.
     pub fn cut(&self, multiplier: f64) -> Segmentation {
         let threshold = multiplier * self.noise;
-        let rests = if self.is_shots() {
-            self.shots()
-        } else {
-            self.runs(threshold)
-        };
-        Segmentation {
-            multiplier,
-            threshold,
-            rests,
-        }
+        let rests = if self.is_shots() { self.shots() } else { self.runs(threshold) };
+        Segmentation { multiplier, threshold, rests }
     }
 
     fn shots(&self) -> Vec<Range<usize>> {
-        (0..self.samples.time.len())
-            .filter(|k| self.samples.usable[*k])
-            .map(|k| k..k + 1)
-            .collect()
+        (0..self.samples.time.len()).filter(|k| self.samples.usable[*k]).map(|k| k..k + 1).collect()
     }
 
     fn runs(&self, threshold: f64) -> Vec<Range<usize>> {
@@ -145,10 +129,7 @@ impl<'a> RestDetector<'a> {
     pub fn rest(&self, rows: &Range<usize>) -> Rest<f64> {
         let mut rest = Rest {
             time: 0.5 * (self.samples.time[rows.start] + self.samples.time[rows.end - 1]),
-            temperature: self
-                .samples
-                .temperature
-                .map_or(f64::NAN, |t| mean_of_measured(&t[rows.clone()])),
+            temperature: self.samples.temperature.map_or(f64::NAN, |t| mean_of_measured(&t[rows.clone()])),
             ..Rest::default()
         };
         for k in rows.clone().filter(|k| self.samples.usable[*k]) {
@@ -162,33 +143,21 @@ impl<'a> RestDetector<'a> {
 }
 
 fn mean_of_measured(values: &[f64]) -> f64 {
-    let (sum, count) = values
-        .iter()
-        .filter(|v| v.is_finite())
-        .fold((0.0, 0u32), |(sum, count), v| (sum + v, count + 1));
+    let (sum, count) =
+        values.iter().filter(|v| v.is_finite()).fold((0.0, 0u32), |(sum, count), v| (sum + v, count + 1));
     sum / f64::from(count)
 }
 
-/// Cuts out what turns so smoothly that the accelerometer does not notice (about the vertical).
+/// Cuts out what turns so smoothly that the accelerometer does not notice: about the vertical, or creeping.
 fn without_turning(quiet: Vec<bool>, rate: &[Vector3<f64>]) -> Vec<bool> {
-    let bias = median_rate(&quiet, rate);
-    quiet
-        .iter()
-        .zip(rate)
-        .map(|(still, w)| *still && (w - bias).norm() <= TURNING)
-        .collect()
-}
-
-fn median_rate(quiet: &[bool], rate: &[Vector3<f64>]) -> Vector3<f64> {
     // Windows overlap, so every tenth tells as much as all.
-    let chosen: Vec<&Vector3<f64>> = quiet
-        .iter()
-        .zip(rate)
-        .filter(|(still, _)| **still)
-        .map(|(_, w)| w)
-        .step_by(10)
-        .collect();
-    Vector3::from_fn(|axis, _| median(chosen.iter().map(|w| w[axis]).collect()).unwrap_or(0.0))
+    let chosen: Vec<&Vector3<f64>> =
+        quiet.iter().zip(rate).filter(|(still, _)| **still).map(|(_, w)| w).step_by(10).collect();
+    let of_axis = |value: &dyn Fn(&Vector3<f64>) -> f64| median(chosen.iter().map(|w| value(w)).collect());
+    let bias = Vector3::from_fn(|axis, _| of_axis(&|w| w[axis]).unwrap_or(0.0));
+    let spread = 1.4826 * of_axis(&|w| (w - bias).norm()).unwrap_or(0.0);
+    let limit = (TURNING * spread).clamp(TURNING_LIMITS.0, TURNING_LIMITS.1);
+    quiet.iter().zip(rate).map(|(still, w)| *still && (w - bias).norm() <= limit).collect()
 }
 
 /// Variance of the initial rest, or of the quietest tenth where the recording does not begin at rest.
@@ -197,18 +166,12 @@ fn reference_noise(variance: &[f64], initial_rows: usize, half: usize) -> (f64, 
     if finite.is_empty() {
         return (0.0, false);
     }
-    let initial = variance
-        .get(half..initial_rows.max(half + 1).min(variance.len()))
-        .unwrap_or(&finite);
+    let initial = variance.get(half..initial_rows.max(half + 1).min(variance.len())).unwrap_or(&finite);
     let initial = median(initial.to_vec()).unwrap_or(f64::INFINITY);
     let mut sorted = finite;
     let tenth = sorted.len() / 10;
     let quietest = *sorted.select_nth_unstable_by(tenth, f64::total_cmp).1;
-    if initial <= INITIAL_EXCESS * quietest {
-        (initial, true)
-    } else {
-        (quietest, false)
-    }
+    if initial <= INITIAL_EXCESS * quietest { (initial, true) } else { (quietest, false) }
 }
 
 /// Rows around each row that its window holds.
@@ -218,12 +181,7 @@ fn window(k: usize, half: usize, rows: usize) -> Range<usize> {
 
 fn windowed_variance(samples: Samples<'_>, half: usize, longest_gap: f64) -> Vec<f64> {
     let rows = samples.acc.len();
-    let origin = samples
-        .acc
-        .iter()
-        .find(|v| v.iter().all(|x| x.is_finite()))
-        .copied()
-        .unwrap_or_default();
+    let origin = samples.acc.iter().find(|v| v.iter().all(|x| x.is_finite())).copied().unwrap_or_default();
     // Running sums from a value near the data: differences of sums then lose no digits that matter.
     let mut sums = Vec::with_capacity(rows + 1);
     let (mut sum, mut square, mut broken) = (Vector3::zeros(), 0.0, 0u32);
@@ -274,9 +232,7 @@ fn windowed_mean(values: &[Vector3<f64>], usable: &[bool], half: usize) -> Vec<V
 
 /// Spread of a rest's mean that its own samples explain, per axis.
 pub fn mean_std(moments: &Moments<f64>) -> Vector3<f64> {
-    moments
-        .variance()
-        .map(|v| (v / f64::from(moments.count().max(1))).sqrt())
+    moments.variance().map(|v| (v / f64::from(moments.count().max(1))).sqrt())
 }
 
 #[cfg(test)]
@@ -290,11 +246,7 @@ mod tests {
         (0..1000)
             .map(|k| {
                 let noise = if k % 2 == 0 { 0.01 } else { -0.01 };
-                let shake = if (400..600).contains(&k) {
-                    (k as f64 * 0.3).sin()
-                } else {
-                    0.0
-                };
+                let shake = if (400..600).contains(&k) { (k as f64 * 0.3).sin() } else { 0.0 };
                 (k as f64 * DT, Vector3::new(noise + shake, noise, 9.8 - noise))
             })
             .unzip()
@@ -304,13 +256,7 @@ mod tests {
     fn two_rests_around_a_motion_are_found_and_hold_none_of_it() {
         let (time, acc) = shaken();
         let usable = vec![true; time.len()];
-        let samples = Samples {
-            time: &time,
-            acc: &acc,
-            gyr: None,
-            temperature: None,
-            usable: &usable,
-        };
+        let samples = Samples { time: &time, acc: &acc, gyr: None, temperature: None, usable: &usable };
         let cut = RestDetector::new(samples, DT).cut(4.0);
         assert_eq!(cut.rests.len(), 2, "{cut:?}");
         assert!(cut.rests[0].end <= 400 && cut.rests[1].start >= 600);
@@ -333,13 +279,7 @@ mod tests {
             })
             .collect();
         let usable = vec![true; time.len()];
-        let samples = Samples {
-            time: &time,
-            acc: &acc,
-            gyr: Some(&gyr),
-            temperature: None,
-            usable: &usable,
-        };
+        let samples = Samples { time: &time, acc: &acc, gyr: Some(&gyr), temperature: None, usable: &usable };
         let cut = RestDetector::new(samples, DT).cut(4.0);
         assert_eq!(cut.rests.len(), 2, "{cut:?}");
     }
@@ -350,18 +290,8 @@ mod tests {
         time.iter_mut().skip(200).for_each(|t| *t += 1.0);
         let mut usable = vec![true; time.len()];
         usable[800] = false;
-        let samples = Samples {
-            time: &time,
-            acc: &acc,
-            gyr: None,
-            temperature: None,
-            usable: &usable,
-        };
+        let samples = Samples { time: &time, acc: &acc, gyr: None, temperature: None, usable: &usable };
         let cut = RestDetector::new(samples, DT).cut(4.0);
-        assert!(
-            cut.rests
-                .iter()
-                .all(|r| !r.contains(&800) && !(r.contains(&199) && r.contains(&200)))
-        );
+        assert!(cut.rests.iter().all(|r| !r.contains(&800) && !(r.contains(&199) && r.contains(&200))));
     }
 }

@@ -34,25 +34,13 @@ pub struct TurnData {
 impl TurnData {
     /// The turn between two known directions, calibrated axes.
     pub fn between(&self, before: Vector3<f64>, after: Vector3<f64>) -> Turn<'_, f64> {
-        Turn {
-            blocks: &self.blocks,
-            durations: Durations::Each(&self.durations),
-            before,
-            after,
-        }
+        Turn { blocks: &self.blocks, durations: Durations::Each(&self.durations), before, after }
     }
 
     /// Blocks and durations as a device holds them.
     pub fn narrow(&self) -> (Vec<Block<f32>>, Vec<f32>) {
-        let blocks = self.blocks.iter().map(|b| Block {
-            s0: b.s0.cast(),
-            s1: b.s1.cast(),
-            c: b.c.cast(),
-        });
-        (
-            blocks.collect(),
-            self.durations.iter().map(|d| *d as f32).collect(),
-        )
+        let blocks = self.blocks.iter().map(|b| Block { s0: b.s0.cast(), s1: b.s1.cast(), c: b.c.cast() });
+        (blocks.collect(), self.durations.iter().map(|d| *d as f32).collect())
     }
 }
 
@@ -100,10 +88,7 @@ impl std::fmt::Display for TurnGap {
 /// Rows of the turn between two rests.
 fn turn_rows(time: &[f64], before: &Range<usize>, after: &Range<usize>) -> Range<usize> {
     let margin = |rest: &Range<usize>| MARGIN.min(0.25 * (time[rest.end - 1] - time[rest.start]));
-    let (leave, arrive) = (
-        time[before.end - 1] - margin(before),
-        time[after.start] + margin(after),
-    );
+    let (leave, arrive) = (time[before.end - 1] - margin(before), time[after.start] + margin(after));
     let first = before.start + time[before.clone()].partition_point(|t| *t < leave);
     let last = after.start + time[after.clone()].partition_point(|t| *t <= arrive);
     first..last
@@ -127,11 +112,7 @@ pub fn compress(
     if let Some(row) = rows.clone().find(|k| !usable[*k]) {
         return Err(TurnGap::Unusable { row });
     }
-    if let Some(row) = rows
-        .clone()
-        .skip(1)
-        .find(|k| time[*k] - time[k - 1] > GAP * interval)
-    {
+    if let Some(row) = rows.clone().skip(1).find(|k| time[*k] - time[k - 1] > GAP * interval) {
         return Err(TurnGap::Jump { row });
     }
     let count = rows.len() / usize::from(BLOCK) + 1;
@@ -153,14 +134,7 @@ pub fn compress(
     if builder.count() > 0 {
         keep(&mut builder);
     }
-    Ok(TurnData {
-        rest_before,
-        rest_after,
-        rows,
-        bias: *bias,
-        blocks,
-        durations,
-    })
+    Ok(TurnData { rest_before, rest_after, rows, bias: *bias, blocks, durations })
 }
 
 #[cfg(test)]
@@ -185,10 +159,7 @@ mod tests {
         let usable = vec![true; 600];
         // The rests as a coarse threshold would find them: the turn's ends are cut off.
         let (before, after) = (0..215, 385..600);
-        let path = BiasPath {
-            before: (1.0, bias),
-            after: (5.0, bias),
-        };
+        let path = BiasPath { before: (1.0, bias), after: (5.0, bias) };
         let data = compress(&time, &gyr, &usable, dt, (0, &before, 1, &after), &path).unwrap();
         let turn = data.between(Vector3::z(), Vector3::y());
         let c = attitude(&Triad::identity(), &turn);
@@ -201,10 +172,7 @@ mod tests {
         let gyr = vec![Vector3::zeros(); 300];
         let mut usable = vec![true; 300];
         usable[150] = false;
-        let path = BiasPath {
-            before: (0.5, Vector3::zeros()),
-            after: (2.5, Vector3::zeros()),
-        };
+        let path = BiasPath { before: (0.5, Vector3::zeros()), after: (2.5, Vector3::zeros()) };
         let result = compress(&time, &gyr, &usable, 0.01, (0, &(0..100), 1, &(200..300)), &path);
         assert_eq!(result.unwrap_err(), TurnGap::Unusable { row: 150 });
     }

@@ -27,11 +27,7 @@ pub fn calibration(calibration: &Calibration) -> Value {
 }
 
 fn rows(m: &Matrix3<f64>) -> Value {
-    json!(
-        (0..3)
-            .map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]])
-            .collect::<Vec<_>>()
-    )
+    json!((0..3).map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]]).collect::<Vec<_>>())
 }
 
 fn vector(v: &Vector3<f64>) -> Value {

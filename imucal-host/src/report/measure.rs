@@ -19,11 +19,7 @@ pub fn measure(value: f64, std: f64) -> String {
     if exponent == 0 {
         return format!("{value:.digits$} ± {std:.digits$}");
     }
-    format!(
-        "({:.digits$} ± {:.digits$})e{exponent}",
-        value / scale,
-        std / scale
-    )
+    format!("({:.digits$} ± {:.digits$})e{exponent}", value / scale, std / scale)
 }
 
 /// A value without an error, in four digits.

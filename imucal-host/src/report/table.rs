@@ -56,11 +56,7 @@ fn write_table(text: &mut String, calibration: &Calibration) -> fmt::Result {
 }
 
 fn write_segmentation(text: &mut String, segmentation: &SegmentationReport) -> fmt::Result {
-    let reference = if segmentation.from_initial_rest {
-        "the initial rest"
-    } else {
-        "the quietest tenth"
-    };
+    let reference = if segmentation.from_initial_rest { "the initial rest" } else { "the quietest tenth" };
     writeln!(
         text,
         "{} rests at {} times the variance of {reference}; over the thresholds tried, gains move by {:.2} % at most",
@@ -75,12 +71,7 @@ fn write_sensor(text: &mut String, outcome: &SensorOutcome) -> fmt::Result {
     match &outcome.verdict {
         Ok(()) => writeln!(text, "{name} ({}): accepted", outcome.model)?,
         Err(refused) => {
-            writeln!(
-                text,
-                "{name} ({}): REFUSED, {}",
-                outcome.model,
-                refused.refusal.reason()
-            )?;
+            writeln!(text, "{name} ({}): REFUSED, {}", outcome.model, refused.refusal.reason())?;
             writeln!(text, "  because: {}", refused.refusal)?;
             writeln!(text, "  to do:   {}", refused.advice)?;
         }
@@ -95,25 +86,14 @@ fn write_sensor(text: &mut String, outcome: &SensorOutcome) -> fmt::Result {
 fn write_fit(text: &mut String, kind: SensorKind, fit: &FitSummary) -> fmt::Result {
     let triad = fit.raw_triad();
     let (gain_std, bias_std) = fit.raw_std();
-    writeln!(
-        text,
-        "  calibrated [{}] = gain · (raw [{}] − bias)",
-        fit.unit_out, fit.unit_in
-    )?;
+    writeln!(text, "  calibrated [{}] = gain · (raw [{}] − bias)", fit.unit_out, fit.unit_in)?;
     for (row, axis) in ["x", "y", "z"].into_iter().enumerate() {
-        let gain: Vec<String> = (0..3)
-            .map(|column| measure(triad.gain[(row, column)], gain_std[(row, column)]))
-            .collect();
+        let gain: Vec<String> =
+            (0..3).map(|column| measure(triad.gain[(row, column)], gain_std[(row, column)])).collect();
         let bias = measure(triad.bias[row], bias_std[row]);
-        writeln!(
-            text,
-            "  {axis}  {:>26} {:>26} {:>26}   {bias:>22}",
-            gain[0], gain[1], gain[2]
-        )?;
+        writeln!(text, "  {axis}  {:>26} {:>26} {:>26}   {bias:>22}", gain[0], gain[1], gain[2])?;
     }
-    let held = fit
-        .held_out_rms
-        .map_or_else(|| "not known".into(), |rms| rms_text(kind, fit, rms));
+    let held = fit.held_out_rms.map_or_else(|| "not known".into(), |rms| rms_text(kind, fit, rms));
     writeln!(
         text,
         "  {} {}, {} parameters; rms {}, held out {held}",

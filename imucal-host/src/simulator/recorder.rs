@@ -9,7 +9,9 @@ use rand_distr::{Distribution, StandardNormal};
 use super::tumble::Tumble;
 use crate::recording::{
     Manifest, Recording, SensorKind, Unit,
-    manifest::{Counts, Identity, Rig, RigKind, Site},
+    manifest::{Counts, Identity},
+    rig::{Rig, RigKind},
+    site::Site,
 };
 
 /// One triad of a unit.
@@ -46,10 +48,7 @@ impl SimulatedUnit {
     pub fn mtx() -> Self {
         let sensor = |per_unit: f64, gain: Matrix3<f64>, bias: Vector3<f64>, noise| SimulatedSensor {
             truth: Triad { gain, bias }.in_unit(32_768.0, per_unit),
-            counts: Counts {
-                offset: 32_768.0,
-                per_unit,
-            },
+            counts: Counts { offset: 32_768.0, per_unit },
             noise,
         };
         Self {
@@ -99,14 +98,8 @@ impl SimulatedUnit {
             gravity: Some(tumble.gravity),
             field_ned_ut: Some(tumble.field_n.into()),
         };
-        manifest.rig = Some(Rig {
-            kind: RigKind::Hand,
-            axes: None,
-        });
-        manifest.sensor = Identity {
-            name: Some(self.name.clone()),
-            serial: Some(self.serial.clone()),
-        };
+        manifest.rig = Some(Rig { kind: RigKind::Hand, axes: None });
+        manifest.sensor = Identity { name: Some(self.name.clone()), serial: Some(self.serial.clone()) };
         manifest
     }
 }
@@ -119,10 +112,8 @@ pub fn record(name: &str, tumble: &Tumble, unit: &SimulatedUnit, seed: u64) -> R
     let mut columns = [const { Vec::new() }; 3];
     for t in &time {
         let truth = tumble.truth(*t);
-        for ((kind, value), column) in SensorKind::ALL
-            .into_iter()
-            .zip([truth.f_q, truth.w_iq_q, truth.b_q])
-            .zip(&mut columns)
+        for ((kind, value), column) in
+            SensorKind::ALL.into_iter().zip([truth.f_q, truth.w_iq_q, truth.b_q]).zip(&mut columns)
         {
             column.push(sample(unit.sensor(kind), &value, &mut rng));
         }

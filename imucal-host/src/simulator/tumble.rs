@@ -96,10 +96,7 @@ impl Tumble {
                 let turn = (self.attitudes[k].inverse() * self.attitudes[k + 1]).scaled_axis();
                 let progress = 0.5 * (1.0 - (PI * share).cos());
                 let speed = 0.5 * PI * (PI * share).sin() / self.durations.2;
-                (
-                    self.attitudes[k] * UnitQuaternion::from_scaled_axis(turn * progress),
-                    turn * speed,
-                )
+                (self.attitudes[k] * UnitQuaternion::from_scaled_axis(turn * progress), turn * speed)
             }
         };
         let earth_n = Vector3::new(self.latitude.cos(), 0.0, -self.latitude.sin()) * EARTH_RATE;

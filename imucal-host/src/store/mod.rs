@@ -217,42 +217,27 @@ impl StoredCalibration {
     /// # Errors
     /// [`LoadError`] names the file and what is wrong with it.
     pub fn load(path: &Path) -> Result<Self, LoadError> {
-        let bytes = std::fs::read(path).map_err(|source| LoadError::Io {
-            path: path.into(),
-            source,
-        })?;
+        let bytes = std::fs::read(path).map_err(|source| LoadError::Io { path: path.into(), source })?;
         if is_toml(path, &bytes) {
             Self::from_toml(path, &bytes)
         } else {
-            let record = record::decode(&bytes).map_err(|source| LoadError::Record {
-                path: path.into(),
-                source,
-            })?;
+            let record =
+                record::decode(&bytes).map_err(|source| LoadError::Record { path: path.into(), source })?;
             Ok(Self::from_record(&record))
         }
     }
 
     fn from_toml(path: &Path, bytes: &[u8]) -> Result<Self, LoadError> {
-        let wrong = |reason: String| LoadError::Toml {
-            path: path.into(),
-            reason,
-        };
+        let wrong = |reason: String| LoadError::Toml { path: path.into(), reason };
         let text = std::str::from_utf8(bytes).map_err(|e| wrong(e.to_string()))?;
         let stored: Self =
             toml::from_str(text).map_err(|e| wrong(e.to_string().trim().replace('\n', " ")))?;
         if stored.format != FORMAT {
-            return Err(LoadError::Format {
-                path: path.into(),
-                found: stored.format,
-            });
+            return Err(LoadError::Format { path: path.into(), found: stored.format });
         }
         for kind in SensorKind::ALL {
             if let Some(what) = stored.triad(kind).and_then(StoredTriad::defect) {
-                return Err(LoadError::Unusable {
-                    path: path.into(),
-                    sensor: kind,
-                    what,
-                });
+                return Err(LoadError::Unusable { path: path.into(), sensor: kind, what });
             }
         }
         Ok(stored)
@@ -275,26 +260,19 @@ impl StoredCalibration {
     pub fn save_record(&self, path: &Path) -> Result<(), SaveError> {
         let record = self.to_record(path)?;
         let mut buffer = [0; record::MAX_LEN];
-        let bytes = record::encode(&record, &mut buffer).map_err(|source| SaveError::Encode {
-            path: path.into(),
-            source,
-        })?;
+        let bytes = record::encode(&record, &mut buffer)
+            .map_err(|source| SaveError::Encode { path: path.into(), source })?;
         write_whole(path, bytes)
     }
 }
 
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), SaveError> {
-    AtomicFile::write_whole(path, bytes).map_err(|source| SaveError::File {
-        path: path.into(),
-        source,
-    })
+    AtomicFile::write_whole(path, bytes).map_err(|source| SaveError::File { path: path.into(), source })
 }
 
 /// A file is TOML by its name, or because it is text.
 fn is_toml(path: &Path, bytes: &[u8]) -> bool {
-    path.extension()
-        .is_some_and(|ext| ext.eq_ignore_ascii_case("toml"))
-        || bytes.starts_with(b"format")
+    path.extension().is_some_and(|ext| ext.eq_ignore_ascii_case("toml")) || bytes.starts_with(b"format")
 }
 
 impl StoredTriad {

@@ -32,12 +32,7 @@ fn text<const N: usize>(
     field: &'static str,
     text: &str,
 ) -> Result<heapless::String<N>, SaveError> {
-    text.parse().map_err(|_| SaveError::TooLong {
-        path: path.into(),
-        field,
-        text: text.into(),
-        limit: N,
-    })
+    text.parse().map_err(|_| SaveError::TooLong { path: path.into(), field, text: text.into(), limit: N })
 }
 
 impl StoredCalibration {
@@ -156,9 +151,7 @@ pub mod date_text {
     fn parse(text: &str) -> Option<Date> {
         let year: u32 = text.get(..4)?.parse().ok()?;
         let first = year.checked_sub(1970)?.checked_mul(365)?;
-        (first..first + 366 + year / 4)
-            .map(Date::from_days)
-            .find(|date| date.to_string() == text)
+        (first..first + 366 + year / 4).map(Date::from_days).find(|date| date.to_string() == text)
     }
 }
 
@@ -172,10 +165,7 @@ mod tests {
             format: FORMAT.into(),
             recording: String::new(),
             date: Date::from_days(20_778),
-            sensor: StoredSensor {
-                name: "MTx".into(),
-                serial: "00300512".into(),
-            },
+            sensor: StoredSensor { name: "MTx".into(), serial: "00300512".into() },
             acc: Some(StoredTriad {
                 model: "T9".into(),
                 unit_in: Unit::Counts,
