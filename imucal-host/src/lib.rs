@@ -1,1 +1,5 @@
 //! Calibrate IMU recordings through `imucal-core`.
+
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod recording;
