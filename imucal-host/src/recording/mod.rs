@@ -1,7 +1,7 @@
 //! Recordings: samples and manifest, read, checked and written.
 //!
 //! Outside of this module everything is in SI units (s, m/s², rad/s, µT, °C, rad); the files' units
-//! live in [`unit`] and the manifest alone.
+//! live in [`mod@unit`] and the manifest alone.
 
 use std::path::{Path, PathBuf};
 
