@@ -10,12 +10,13 @@ use serde::{Deserialize, Serialize};
 use super::manifest_check::{self, ManifestFault};
 use super::manifest_keys::KeyMap;
 use super::read_error::ReadError;
-use super::rig::Rig;
 use super::sensor_kind::SensorKind;
-use super::site::Site;
 use super::triple::{Nominal, Triple};
 use super::unit::{AngleUnit, TemperatureUnit, TimeUnit, Unit};
 use super::warning::Warning;
+
+pub use super::rig::{Axis, Rig, RigKind};
+pub use super::site::Site;
 
 /// The format string of a manifest.
 pub const FORMAT: &str = "imucal-recording/1";
@@ -302,7 +303,6 @@ impl Manifest {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rig::{Axis, RigKind};
     use super::*;
 
     #[test]

@@ -67,8 +67,10 @@ impl Triple {
     }
 }
 
-/// The middle value (the upper one of an even number); `None` of nothing. Reorders its argument.
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
+/// The middle value (the upper one of an even number); `None` of nothing. NaN sorts beyond every
+/// number, so take it out before.
+#[must_use]
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
     if values.is_empty() {
         return None;
     }
