@@ -168,7 +168,7 @@ impl Recording {
     /// Median of the intervals between rows, s; `None` below two rows.
     #[must_use]
     pub fn median_interval(&self) -> Option<f64> {
-        triple::median(self.time.windows(2).map(|pair| pair[1] - pair[0]).collect())
+        median(self.time.windows(2).map(|pair| pair[1] - pair[0]).collect())
     }
 
     /// The samples of a sensor, if it was recorded.
