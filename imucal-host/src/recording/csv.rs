@@ -1,0 +1,273 @@
+//! Reading samples as CSV, plain or gzipped.
+
+use std::path::Path;
+
+use ::csv::{ByteRecord, ReaderBuilder};
+
+use super::columns::{Layout, Table, Target};
+use super::content::Content;
+use super::number::{self, NotANumber};
+use super::place::{Place, Places};
+use super::read_error::ReadError;
+use super::warning::Warning;
+
+/// Reads the samples of a CSV file in file units.
+pub(crate) fn read(path: &Path) -> Result<Table, ReadError> {
+    let content = Content::read(path)?;
+    CsvReader::new(path, &content)?.read()
+}
+
+struct CsvReader<'a> {
+    path: &'a Path,
+    text: &'a [u8],
+    truncated: bool,
+    rows: ::csv::Reader<&'a [u8]>,
+    layout: Layout,
+    names: Vec<String>,
+}
+
+/// What is wrong with a field, before the place is known.
+struct BadField {
+    column: usize,
+    problem: NotANumber,
+}
+
+impl<'a> CsvReader<'a> {
+    fn new(path: &'a Path, content: &'a Content) -> Result<Self, ReadError> {
+        let text = content.text();
+        // The header is a row like any other, so that the reader does not keep a copy of it.
+        let mut rows = ReaderBuilder::new().flexible(true).has_headers(false).from_reader(text);
+        let mut record = ByteRecord::new();
+        rows.read_byte_record(&mut record).map_err(|cause| damaged(path, &cause))?;
+        let names: Result<Vec<&str>, _> = record.iter().map(std::str::from_utf8).collect();
+        let names = names.map_err(|_| ReadError::NotUtf8 { path: path.to_path_buf(), line: 1 })?;
+        let layout = Layout::new(&names, path)?;
+        let names = names.iter().map(|name| name.trim().to_owned()).collect();
+        Ok(Self { path, text, truncated: content.truncated, rows, layout, names })
+    }
+
+    fn read(mut self) -> Result<Table, ReadError> {
+        // A guess that is a little high; it spares the growing columns their copies.
+        let guess = self.text.len() / (self.names.len() * 7).max(1);
+        let mut table = self.layout.table(guess, Places::Lines(Vec::new()));
+        let mut lines = Vec::with_capacity(guess);
+        let mut record = ByteRecord::new();
+        while self.rows.read_byte_record(&mut record).map_err(|cause| damaged(self.path, &cause))? {
+            let line = self.line_of(&record);
+            let last = self.is_cut_line(&record);
+            if last && self.drop_cut_line(&record, line, &mut table) {
+                break;
+            }
+            if record.len() != self.names.len() {
+                return Err(self.field_count(&record, line));
+            }
+            self.push(&record, &mut table).map_err(|bad| self.bad_field(&record, line, &bad))?;
+            lines.push(line);
+        }
+        if self.truncated {
+            table
+                .warnings
+                .push(Warning::TruncatedStream { path: self.path.to_path_buf(), rows: lines.len() });
+        }
+        table.places = Places::Lines(lines);
+        Ok(table)
+    }
+
+    fn push(&self, record: &ByteRecord, table: &mut Table) -> Result<(), BadField> {
+        for (column, (field, target)) in record.iter().zip(&self.layout.targets).enumerate() {
+            match *target {
+                Target::Known(slot) => {
+                    let value = number::parse(field).map_err(|problem| BadField { column, problem })?;
+                    table.columns[slot].push(value);
+                }
+                Target::Extra(extra) => {
+                    table.extra[extra].values.push(String::from_utf8_lossy(field).into_owned());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Line of a record; its position is where the one before ended, ahead of blank lines.
+    fn line_of(&self, record: &ByteRecord) -> u64 {
+        let Some(position) = record.position() else {
+            return 0;
+        };
+        let rest = self.text.get(position.byte() as usize..).unwrap_or_default();
+        let blank = rest.iter().take_while(|byte| matches!(byte, b'\n' | b'\r'));
+        position.line() + blank.filter(|byte| **byte == b'\n').count() as u64
+    }
+
+    /// Whether this is the last line and has no line end. A stray quote swallows lines; that is no cut.
+    fn is_cut_line(&self, record: &ByteRecord) -> bool {
+        if self.text.last().is_none_or(|byte| matches!(byte, b'\n' | b'\r')) {
+            return false;
+        }
+        if self.rows.position().byte() < self.text.len() as u64 {
+            return false;
+        }
+        let start = record.position().map_or(0, |position| position.byte() as usize);
+        !self.text.get(start..).unwrap_or_default().trim_ascii().contains(&b'\n')
+    }
+
+    /// Notes what became of a cut line; true if it is to be dropped.
+    fn drop_cut_line(&self, record: &ByteRecord, line: u64, table: &mut Table) -> bool {
+        let last = record.len().saturating_sub(1);
+        let field = record.get(last).unwrap_or_default();
+        let whole = record.len() == self.names.len() && self.is_whole(last, field);
+        let path = self.path.to_path_buf();
+        let place = Place::Line(line);
+        if record.len() > self.names.len() {
+            return false;
+        }
+        table.warnings.push(if whole && !self.truncated {
+            let found = String::from_utf8_lossy(field).into_owned();
+            Warning::UnterminatedLine { path, place, column: self.names[last].clone(), found }
+        } else {
+            Warning::TruncatedLine { path, place, found: last, expected: self.names.len() }
+        });
+        !whole || self.truncated
+    }
+
+    fn is_whole(&self, column: usize, field: &[u8]) -> bool {
+        match self.layout.targets.get(column) {
+            Some(Target::Known(_)) => number::parse(field).is_ok_and(|value| !value.is_nan()),
+            _ => true,
+        }
+    }
+
+    fn field_count(&self, record: &ByteRecord, line: u64) -> ReadError {
+        ReadError::FieldCount {
+            path: self.path.to_path_buf(),
+            place: Place::Line(line),
+            found: record.len(),
+            expected: self.names.len(),
+        }
+    }
+
+    fn bad_field(&self, record: &ByteRecord, line: u64, bad: &BadField) -> ReadError {
+        let path = self.path.to_path_buf();
+        let place = Place::Line(line);
+        let column = self.names[bad.column].clone();
+        let text = String::from_utf8_lossy(record.get(bad.column).unwrap_or_default());
+        let found: String = text.chars().take(40).collect();
+        match bad.problem {
+            NotANumber::Unparsable => ReadError::NotANumber { path, place, column, found },
+            NotANumber::Infinite => ReadError::Infinite { path, place, column, found },
+        }
+    }
+}
+
+fn damaged(path: &Path, cause: &::csv::Error) -> ReadError {
+    ReadError::Damaged { path: path.to_path_buf(), found: cause.to_string(), expected: "rows of CSV" }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::super::fixture::{Fixture, assert_says, csv};
+
+    const HEADER: &str = "t,acc_x,acc_y,acc_z\n";
+
+    fn rows(lines: &str) -> String {
+        format!("{HEADER}{lines}")
+    }
+
+    #[test]
+    fn a_file_with_mark_blanks_and_windows_line_ends_is_read() {
+        let recording = csv("\u{feff}acc_x, t ,acc_y,acc_z\r\n1,0.5,2,9.5\r\n\r\n 1 , 1.5 ,NaN,9\r\n").read();
+        assert_eq!(recording.time, [0.5, 1.5]);
+        let acc = recording.acc.unwrap().values;
+        assert_eq!(acc[0], Vector3::new(1.0, 2.0, 9.5));
+        assert!(acc[1].y.is_nan() && acc[1].x == 1.0);
+        assert!(recording.warnings.is_empty());
+        assert_eq!(recording.name, "run.csv");
+    }
+
+    #[test]
+    fn gimbal_reference_segment_and_temperature_are_read() {
+        let header = "t,gimbal_outer,gimbal_middle,gimbal_inner,ref_qw,ref_qx,ref_qy,ref_qz,segment,temp";
+        let text = format!("{header}\n0,180,0,-90,1,0,0,0,3,21.5\n1,,,,,,,,,\n");
+        let recording = Fixture::new("run.csv", "[units]\ngimbal = \"deg\"\n", text).read();
+        let gimbal = recording.gimbal.unwrap();
+        assert!((gimbal[0][0] - std::f64::consts::PI).abs() < 1e-15 && gimbal[1][2].is_nan());
+        assert_eq!(recording.reference.unwrap()[0], [1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(recording.segment.unwrap(), [Some(3), None]);
+        assert_eq!(recording.temperature.unwrap()[0], 21.5);
+    }
+
+    #[test]
+    fn unknown_columns_are_kept_as_they_are_and_reported() {
+        let fixture = csv("t,acc_x,acc_y,acc_z,note\n0,0,0,9.8,\"a, b\"\n1,0,0,9.8,007\n");
+        assert_eq!(fixture.read().extra[0].values, ["a, b", "007"]);
+        assert_says(&fixture.warnings()[0], &["run.csv, column `note`", "kept as it is", "rename"]);
+    }
+
+    #[test]
+    fn text_in_a_number_column_names_line_column_and_text() {
+        let message = csv(rows("0,0,0,9.8\n1,0,zero,9.8\n2,0,0,9.8\n")).error();
+        assert_says(
+            &message,
+            &["run.csv, line 3, column `acc_y`", "`zero`", "expected a number", "correct it"],
+        );
+    }
+
+    #[test]
+    fn lines_are_counted_with_the_blank_ones() {
+        assert_says(&csv(rows("0,0,0,9.8\n\n\n1,0,x,9.8\n")).error(), &["line 5"]);
+        let windows = "t,acc_x,acc_y,acc_z\r\n0,0,0,9.8\r\n\r\n1,0,x,9.8\r\n";
+        assert_says(&csv(windows).error(), &["line 4"]);
+        assert_says(&csv(windows.replace("\r\n\r\n", "\r\n")).error(), &["line 3"]);
+    }
+
+    #[test]
+    fn infinity_is_refused() {
+        let message = csv(rows("0,0,0,9.8\n1,0,0,-inf\n")).error();
+        assert_says(&message, &["line 3, column `acc_z`", "`-inf`", "expected a finite", "leave it empty"]);
+    }
+
+    #[test]
+    fn a_line_with_another_number_of_fields_is_refused() {
+        let few = csv(rows("0,0,0,9.8\n1,0,0\n2,0,0,9.8\n")).error();
+        assert_says(&few, &["run.csv, line 3", "found 3 fields, expected 4", "correct or remove"]);
+        assert_says(&csv(rows("0,0,0,9.8,5\n")).error(), &["line 2", "found 5 fields"]);
+        // A line end says that the line was meant so.
+        assert_says(&csv(rows("0,0,0,9.8\n1,0\n")).error(), &["line 3", "found 2 fields"]);
+    }
+
+    #[test]
+    fn a_cut_last_line_is_dropped_with_a_warning() {
+        for cut in ["1,0", "1,0,0,", "1,0,0,-", "1", "1,0,0,9e"] {
+            let fixture = csv(rows(&format!("0,0,0,9.8\n{cut}")));
+            assert_eq!(fixture.read().rows(), 1, "{cut}");
+            assert_says(
+                &fixture.warnings()[0],
+                &["run.csv, line 3", "of 4 whole fields", "dropped", "again"],
+            );
+        }
+    }
+
+    #[test]
+    fn a_whole_last_line_without_line_end_is_kept_with_a_warning() {
+        let fixture = csv(rows("0,0,0,9.8\n1,0,0,9.8"));
+        assert_eq!(fixture.read().rows(), 2);
+        assert_says(&fixture.warnings()[0], &["line 3", "no line end", "`9.8`", "column `acc_z`"]);
+    }
+
+    #[test]
+    fn a_stray_quote_that_swallows_lines_is_no_cut_line() {
+        let message = csv(rows("0,0,0,9.8\n1,0,0,\"9.8\n2,0,0,9.8\n3,0,0,9.8")).error();
+        assert_says(&message, &["line 3"]);
+    }
+
+    #[test]
+    fn a_missing_file_and_another_ending_are_refused() {
+        let fixture = csv(rows("0,0,0,9.8\n"));
+        let read = |name: &str| {
+            super::super::Recording::read(&fixture.folder.path().join(name)).unwrap_err().to_string()
+        };
+        assert_says(&read("none.csv"), &["none.csv", "no such file", "check the path"]);
+        assert_says(&read("run.toml"), &["run.toml", "`.toml`", "expected .csv", "give the samples file"]);
+    }
+}

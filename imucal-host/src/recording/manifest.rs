@@ -1,0 +1,317 @@
+//! The manifest: what the samples of a recording are.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::manifest_check::{self, ManifestFault};
+use super::manifest_keys::KeyMap;
+use super::read_error::ReadError;
+use super::sensor_kind::SensorKind;
+use super::triple::{Nominal, Triple};
+use super::unit::{AngleUnit, TemperatureUnit, TimeUnit, Unit};
+use super::warning::Warning;
+
+pub use super::rig::{Axis, Rig, RigKind};
+pub use super::site::Site;
+
+/// The format string of a manifest.
+pub const FORMAT: &str = "imucal-recording/1";
+
+/// A least manifest, for messages.
+pub(crate) const MINIMAL: &str = "    format = \"imucal-recording/1\"
+    [units]
+    acc = \"m/s^2\"   # m/s^2 | g | mg | counts
+    gyr = \"rad/s\"   # rad/s | deg/s | counts
+    mag = \"uT\"      # uT | mG | G | nT | counts | a.u.";
+
+/// A recording's manifest; each section may be left out of the file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Always [`FORMAT`].
+    pub format: String,
+    /// Units of the file's columns.
+    #[serde(default)]
+    pub units: Units,
+    /// Where it was recorded.
+    #[serde(default, skip_serializing_if = "Site::is_empty")]
+    pub site: Site,
+    /// What turned the sensor; `None` is a field recording without a reference attitude.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rig: Option<Rig>,
+    /// Full scales.
+    #[serde(default, skip_serializing_if = "PerSensor::is_empty")]
+    pub ranges: PerSensor<f64>,
+    /// Nominal conversions of counts.
+    #[serde(default, skip_serializing_if = "PerSensor::is_empty")]
+    pub counts: PerSensor<Counts>,
+    /// Which unit was recorded.
+    #[serde(default, skip_serializing_if = "Identity::is_empty")]
+    pub sensor: Identity,
+}
+
+/// Units of a recording's columns. The default is the SI side.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Units {
+    /// Of `t`.
+    pub t: TimeUnit,
+    /// Of the accelerometer.
+    pub acc: Unit,
+    /// Of the gyroscope.
+    pub gyr: Unit,
+    /// Of the magnetometer.
+    pub mag: Unit,
+    /// Of `temp`.
+    pub temp: TemperatureUnit,
+    /// Of the encoder angles.
+    pub gimbal: AngleUnit,
+}
+
+impl Default for Units {
+    fn default() -> Self {
+        Self {
+            t: TimeUnit::Second,
+            acc: Unit::MetrePerSecondSquared,
+            gyr: Unit::RadianPerSecond,
+            mag: Unit::MicroTesla,
+            temp: TemperatureUnit::Celsius,
+            gimbal: AngleUnit::Radian,
+        }
+    }
+}
+
+impl Units {
+    /// Unit of a sensor's columns.
+    #[must_use]
+    pub fn of(&self, kind: SensorKind) -> Unit {
+        match kind {
+            SensorKind::Acc => self.acc,
+            SensorKind::Gyr => self.gyr,
+            SensorKind::Mag => self.mag,
+        }
+    }
+}
+
+/// Something of each sensor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PerSensor<T> {
+    /// Of the accelerometer.
+    #[serde(default = "none", skip_serializing_if = "Option::is_none")]
+    pub acc: Option<T>,
+    /// Of the gyroscope.
+    #[serde(default = "none", skip_serializing_if = "Option::is_none")]
+    pub gyr: Option<T>,
+    /// Of the magnetometer.
+    #[serde(default = "none", skip_serializing_if = "Option::is_none")]
+    pub mag: Option<T>,
+}
+
+fn none<T>() -> Option<T> {
+    None
+}
+
+impl<T> Default for PerSensor<T> {
+    fn default() -> Self {
+        Self { acc: None, gyr: None, mag: None }
+    }
+}
+
+impl<T: Copy> PerSensor<T> {
+    /// What is given for a sensor.
+    #[must_use]
+    pub fn of(&self, kind: SensorKind) -> Option<T> {
+        match kind {
+            SensorKind::Acc => self.acc,
+            SensorKind::Gyr => self.gyr,
+            SensorKind::Mag => self.mag,
+        }
+    }
+}
+
+impl<T> PerSensor<T> {
+    fn is_empty(&self) -> bool {
+        self.acc.is_none() && self.gyr.is_none() && self.mag.is_none()
+    }
+}
+
+/// Nominal conversion of counts: value = (raw − offset) / per_unit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Counts {
+    /// Counts at zero; finite.
+    #[serde(default)]
+    pub offset: f64,
+    /// Counts per m/s², rad/s or µT; finite, not zero.
+    pub per_unit: f64,
+}
+
+/// Which unit was recorded.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Name or type.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Serial number as text.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub serial: Option<String>,
+}
+
+impl Identity {
+    fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl Default for Manifest {
+    /// SI units and nothing known of site, rig and sensor.
+    fn default() -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            units: Units::default(),
+            site: Site::default(),
+            rig: None,
+            ranges: PerSensor::default(),
+            counts: PerSensor::default(),
+            sensor: Identity::default(),
+        }
+    }
+}
+
+impl Manifest {
+    /// The manifest's path beside a samples file: `NAME.toml` for `NAME.csv`, `NAME.csv.gz` and
+    /// `NAME.parquet`; `None` for a file of another ending.
+    #[must_use]
+    pub fn path_beside(samples: &Path) -> Option<PathBuf> {
+        let name = samples.file_name()?.to_str()?;
+        let stem = [".csv.gz", ".csv", ".parquet"].iter().find_map(|ending| {
+            let at = name.len().checked_sub(ending.len())?;
+            let (stem, end) = name.split_at_checked(at)?;
+            end.eq_ignore_ascii_case(ending).then_some(stem)
+        })?;
+        Some(samples.with_file_name(format!("{stem}.toml")))
+    }
+
+    /// Reads and checks a manifest; with it come warnings about keys it does not know.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError::ManifestMissing`] and the other manifest errors of [`ReadError`].
+    pub fn read(path: &Path) -> Result<(Self, Vec<Warning>), ReadError> {
+        let text = fs::read_to_string(path).map_err(|cause| match cause.kind() {
+            io::ErrorKind::NotFound => ReadError::ManifestMissing {
+                path: path.to_path_buf(),
+                recording: path.with_extension("").display().to_string(),
+            },
+            _ => ReadError::Unreadable { path: path.to_path_buf(), found: cause.to_string() },
+        })?;
+        Self::parse(&text, path)
+    }
+
+    /// Understands a manifest's text; `path` is for messages only.
+    ///
+    /// # Errors
+    ///
+    /// The manifest errors of [`ReadError`].
+    pub fn parse(text: &str, path: &Path) -> Result<(Self, Vec<Warning>), ReadError> {
+        let syntax = |error: &toml::de::Error| ReadError::ManifestSyntax {
+            path: path.to_path_buf(),
+            line: KeyMap::line_at(text, error.span().map_or(0, |span| span.start)),
+            found: error.message().replace('\n', ", "),
+        };
+        let keys = KeyMap::parse(text).map_err(|error| syntax(&error))?;
+        keys.check_format(FORMAT, path)?;
+        let manifest: Self = toml::from_str(text).map_err(|error| syntax(&error))?;
+        manifest.check().map_err(|fault| ReadError::Manifest {
+            path: path.to_path_buf(),
+            line: keys.line_of(fault.key().0, fault.key().1),
+            fault,
+        })?;
+        let mut warnings = keys.unknown(path);
+        if let Some(found) = manifest.site.gravity.filter(|g| !(9.76..=9.84).contains(g)) {
+            let line = keys.line_of("site", "gravity");
+            warnings.push(Warning::GravityUnusual { path: path.to_path_buf(), line, found });
+        }
+        Ok((manifest, warnings))
+    }
+
+    /// Looks for contradictions: a unit of another sensor, counts without a conversion, numbers out of
+    /// their range.
+    ///
+    /// # Errors
+    ///
+    /// The first one found.
+    pub fn check(&self) -> Result<(), ManifestFault> {
+        manifest_check::check(self)
+    }
+
+    /// The manifest as TOML text.
+    ///
+    /// # Errors
+    ///
+    /// Whatever the TOML writer objects to; a manifest of this type gives it no cause.
+    pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
+        toml::to_string(self)
+    }
+
+    /// Conversion between a sensor's columns and the SI side.
+    ///
+    /// # Errors
+    ///
+    /// [`ManifestFault::CountsWithoutConversion`].
+    pub fn nominal(&self, kind: SensorKind) -> Result<Nominal, ManifestFault> {
+        match (self.units.of(kind).per_si(), self.counts.of(kind)) {
+            (Some(per_unit), _) => Ok(Nominal { offset: 0.0, per_unit }),
+            (None, Some(counts)) => Ok(Nominal { offset: counts.offset, per_unit: counts.per_unit }),
+            (None, None) => Err(ManifestFault::CountsWithoutConversion { sensor: kind }),
+        }
+    }
+
+    /// Samples in SI units (m/s², rad/s, µT) with the unit, conversion and range this manifest gives.
+    ///
+    /// # Errors
+    ///
+    /// As [`Manifest::nominal`].
+    pub fn triple(&self, kind: SensorKind, values: Vec<Vector3<f64>>) -> Result<Triple, ManifestFault> {
+        Ok(Triple {
+            values,
+            unit: self.units.of(kind),
+            nominal: self.nominal(kind)?,
+            full_scale: self.ranges.of(kind),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_manifest_lies_beside_the_samples() {
+        for (samples, manifest) in [
+            ("d/a.csv", Some("d/a.toml")),
+            ("a.b.csv.gz", Some("a.b.toml")),
+            ("a.parquet", Some("a.toml")),
+            ("a.txt", None),
+        ] {
+            assert_eq!(Manifest::path_beside(Path::new(samples)), manifest.map(PathBuf::from));
+        }
+    }
+
+    #[test]
+    fn a_manifest_reads_back_what_it_writes() {
+        let mut manifest = Manifest::default();
+        manifest.units.acc = Unit::Counts;
+        manifest.counts.acc = Some(Counts { offset: 32768.0, per_unit: 415.0 });
+        manifest.site.field_ned_ut = Some([25.3, 2.6, 40.1]);
+        manifest.rig = Some(Rig { kind: RigKind::FlightMotionSimulator, axes: Some(vec![Axis::Z, Axis::Y]) });
+        manifest.sensor.serial = Some("00300512".to_owned());
+        for manifest in [manifest, Manifest::default()] {
+            let text = manifest.to_toml().unwrap();
+            let (back, warnings) = Manifest::parse(&text, Path::new("a.toml")).unwrap();
+            assert_eq!((back, warnings), (manifest, Vec::new()), "{text}");
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! Recordings: samples and manifest, read, checked and written.
+//!
+//! Outside of this module everything is in SI units (s, m/s², rad/s, µT, °C, rad); the files' units
+//! live in [`mod@unit`] and the manifest alone.
+
+use std::path::{Path, PathBuf};
+
+mod assembly;
+pub mod atomic_file;
+mod columns;
+mod content;
+mod csv;
+mod csv_writer;
+mod file_units;
+#[cfg(test)]
+mod fixture;
+mod format;
+pub mod gravity;
+pub mod imu_tk;
+pub mod integrity;
+pub mod manifest;
+pub mod manifest_check;
+mod manifest_keys;
+mod number;
+#[cfg(feature = "parquet")]
+mod parquet;
+mod place;
+mod read_error;
+mod rig;
+mod saturation;
+mod sensor_kind;
+mod site;
+mod spelling;
+mod stuck;
+mod triple;
+pub mod unit;
+mod unit_check;
+mod warning;
+mod write;
+mod write_error;
+
+pub use self::atomic_file::AtomicFile;
+pub use self::manifest::Manifest;
+pub use self::place::Place;
+pub use self::read_error::ReadError;
+pub use self::sensor_kind::SensorKind;
+pub use self::triple::{Nominal, Triple, median};
+pub use self::unit::Unit;
+pub use self::warning::Warning;
+pub use self::write_error::WriteError;
+
+use self::format::Format;
+
+/// A recording of an inertial measurement unit. All columns that are there have as many rows as `time`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Name of the samples file, without its directory.
+    pub name: String,
+    /// Path of the samples file.
+    pub path: PathBuf,
+    /// What the samples are.
+    pub manifest: Manifest,
+    /// Sample times on the sensor's clock, s, strictly increasing, finite.
+    pub time: Vec<f64>,
+    /// Accelerometer: specific force, m/s².
+    pub acc: Option<Triple>,
+    /// Gyroscope: rate, rad/s.
+    pub gyr: Option<Triple>,
+    /// Magnetometer: field, µT.
+    pub mag: Option<Triple>,
+    /// Temperature, °C; NaN where not measured.
+    pub temperature: Option<Vec<f64>>,
+    /// Encoder angles outer, middle, inner, rad; NaN where not measured.
+    pub gimbal: Option<Vec<[f64; 3]>>,
+    /// Reference attitude table → n as quaternion w, x, y, z, as the file has it; NaN where not measured.
+    pub reference: Option<Vec<[f64; 4]>>,
+    /// Labels of rests and motions.
+    pub segment: Option<Vec<Option<i64>>>,
+    /// Columns the contract does not know.
+    pub extra: Vec<ExtraColumn>,
+    /// What the reader noticed.
+    pub warnings: Vec<Warning>,
+}
+
+/// A column the contract does not know, kept as it is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ExtraColumn {
+    /// Name in the header.
+    pub name: String,
+    /// Text of each row.
+    pub values: Vec<String>,
+}
+
+impl Recording {
+    /// A recording with times (s, strictly increasing) and no sensor yet, to be filled and written.
+    #[must_use]
+    pub fn new(name: impl Into<String>, manifest: Manifest, time: Vec<f64>) -> Self {
+        let name = name.into();
+        Self {
+            path: PathBuf::from(&name),
+            name,
+            manifest,
+            time,
+            acc: None,
+            gyr: None,
+            mag: None,
+            temperature: None,
+            gimbal: None,
+            reference: None,
+            segment: None,
+            extra: Vec::new(),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Reads `NAME.csv`, `NAME.csv.gz` or, when built with the feature `parquet`, `NAME.parquet`, and
+    /// the manifest `NAME.toml` beside it. What is odd but harmless is in [`Recording::warnings`].
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`], when a file is missing, damaged or not what the contract says, or when its
+    /// samples are clearly in another unit than its manifest tells.
+    pub fn read(path: &Path) -> Result<Self, ReadError> {
+        let format =
+            Format::of(path).map_err(|found| ReadError::UnknownFormat { path: path.to_path_buf(), found })?;
+        if !path.exists() {
+            let found = "there is no such file".to_owned();
+            return Err(ReadError::Unreadable { path: path.to_path_buf(), found });
+        }
+        let manifest_path = Manifest::path_beside(path).unwrap_or_else(|| path.with_extension("toml"));
+        let (manifest, warnings) = Manifest::read(&manifest_path)?;
+        let mut table = match format {
+            Format::Csv | Format::CsvGz => csv::read(path)?,
+            #[cfg(feature = "parquet")]
+            Format::Parquet => parquet::read(path)?,
+            #[cfg(not(feature = "parquet"))]
+            Format::Parquet => {
+                return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() });
+            }
+        };
+        table.warnings.splice(0..0, warnings);
+        assembly::assemble(path, manifest, table)
+    }
+
+    /// Writes the samples, in the units of the manifest, as the ending of `path` says, and the manifest
+    /// beside them. Both files appear whole or not at all.
+    ///
+    /// # Errors
+    ///
+    /// [`WriteError`], when the recording contradicts itself or the system refuses.
+    pub fn write(&self, path: &Path) -> Result<(), WriteError> {
+        write::write(self, path)
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.time.len()
+    }
+
+    /// Median of the intervals between rows, s; `None` below two rows.
+    #[must_use]
+    pub fn median_interval(&self) -> Option<f64> {
+        median(self.time.windows(2).map(|pair| pair[1] - pair[0]).collect())
+    }
+
+    /// The samples of a sensor, if it was recorded.
+    #[must_use]
+    pub fn sensor(&self, kind: SensorKind) -> Option<&Triple> {
+        match kind {
+            SensorKind::Acc => self.acc.as_ref(),
+            SensorKind::Gyr => self.gyr.as_ref(),
+            SensorKind::Mag => self.mag.as_ref(),
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Why a recording could not be read.
+
+use std::path::PathBuf;
+
+use super::manifest_check::ManifestFault;
+use super::place::Place;
+use super::sensor_kind::SensorKind;
+use super::unit::Unit;
+
+/// A failure to read a recording; its text names the file, the place, what was found, what was
+/// expected and what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)] // The fields are those of each message: path, place, column, found, expected.
+pub enum ReadError {
+    /// The file is not there or not readable.
+    #[error("{path}: cannot be read ({found}); expected a readable file; check the path and its permissions")]
+    Unreadable { path: PathBuf, found: String },
+    /// The name says no format there is a reader for.
+    #[error(
+        "{path}: found the ending `{found}`, expected .csv, .csv.gz or .parquet; give the samples file, or bring other formats in with `imucal import`"
+    )]
+    UnknownFormat { path: PathBuf, found: String },
+    /// Parquet is not built in.
+    #[error(
+        "{path}: found a Parquet file, expected .csv or .csv.gz since this build is without Parquet; build with `--features parquet` or convert the file to CSV"
+    )]
+    ParquetNotBuilt { path: PathBuf },
+    /// The compressed or columnar container is damaged.
+    #[error("{path}: found a damaged file ({found}), expected {expected}; copy or record it again")]
+    Damaged { path: PathBuf, found: String, expected: &'static str },
+    /// Nothing in the file.
+    #[error("{path}: found an empty file, expected a header row and samples; record or copy it again")]
+    Empty { path: PathBuf },
+    /// A header and no sample.
+    #[error(
+        "{path}: found a header and no sample, expected at least one row below it; record or copy it again"
+    )]
+    NoRows { path: PathBuf },
+    /// Text in another encoding.
+    #[error(
+        "{path}, line {line}: found bytes that are not UTF-8, expected UTF-8 text; save the file as UTF-8"
+    )]
+    NotUtf8 { path: PathBuf, line: u64 },
+
+    /// No `t`.
+    #[error(
+        "{path}, line 1: found no column `t` among {found}, expected the sample time in a column named `t`; rename the time column, and separate columns by commas"
+    )]
+    NoTime { path: PathBuf, found: String },
+    /// Some, but not all columns that belong together.
+    #[error(
+        "{path}, line 1: column `{missing}` is missing, found {found}, expected all of {expected} or none; add the column (empty where not measured) or remove the others"
+    )]
+    IncompleteGroup { path: PathBuf, missing: &'static str, found: String, expected: String },
+    /// A name next to one of the contract's.
+    #[error(
+        "{path}, line 1: found the column `{found}`, expected `{expected}`; rename it so, or to something less like it if it is another quantity"
+    )]
+    MisspeltColumn { path: PathBuf, found: String, expected: &'static str },
+    /// A name twice.
+    #[error(
+        "{path}, line 1: found the column `{column}` twice, expected each name once; remove or rename one"
+    )]
+    DuplicateColumn { path: PathBuf, column: String },
+    /// Too many or too few fields.
+    #[error(
+        "{path}, {place}: found {found} fields, expected {expected} as in the header; correct or remove the line"
+    )]
+    FieldCount { path: PathBuf, place: Place, found: usize, expected: usize },
+    /// Text where a number should be.
+    #[error(
+        "{path}, {place}, column `{column}`: found `{found}`, expected a number with a decimal point; correct it, or leave it empty if it was not measured"
+    )]
+    NotANumber { path: PathBuf, place: Place, column: String, found: String },
+    /// An infinite number.
+    #[error(
+        "{path}, {place}, column `{column}`: found the infinite value `{found}`, expected a finite number; leave it empty if it was not measured"
+    )]
+    Infinite { path: PathBuf, place: Place, column: String, found: String },
+    /// A label that is no integer.
+    #[error(
+        "{path}, {place}, column `segment`: found {found}, expected an integer label or an empty field; correct it"
+    )]
+    SegmentNotInteger { path: PathBuf, place: Place, found: f64 },
+    /// A column of a type that has no numbers.
+    #[error(
+        "{path}, column `{column}`: found the type {found}, expected floating-point or integer numbers; write the column as f64"
+    )]
+    ColumnType { path: PathBuf, column: String, found: String },
+
+    /// A row without a time.
+    #[error(
+        "{path}, {place}, column `t`: found no time, expected a time in each row; fill it in or remove the row"
+    )]
+    TimeMissing { path: PathBuf, place: Place },
+    /// Time stands still or runs back.
+    #[error(
+        "{path}, {place}, column `t`: found {found} after {before}, expected strictly increasing times; {remedy}"
+    )]
+    TimeOrder { path: PathBuf, place: Place, found: f64, before: f64, remedy: String },
+    /// Two files of one recording disagree about a sample's time.
+    #[error(
+        "{path}, {place}: found the time {found} s beside {other_time} s in {other}, expected them within half an interval ({tolerance:.6} s); give two files of one run, or interpolate one onto the other's times"
+    )]
+    TimesDiffer { path: PathBuf, place: Place, found: f64, other: PathBuf, other_time: f64, tolerance: f64 },
+    /// Two files of one recording differ in length.
+    #[error(
+        "{path}: found {found} rows beside {expected} in {other}, expected as many; give two files of one run"
+    )]
+    RowsDiffer { path: PathBuf, found: usize, other: PathBuf, expected: usize },
+
+    /// No manifest.
+    #[error(
+        "{path}: not found, expected the manifest of {recording} there; write it, for example:\n{}",
+        super::manifest::MINIMAL
+    )]
+    ManifestMissing { path: PathBuf, recording: String },
+    /// A manifest that is not TOML or holds something of the wrong kind.
+    #[error(
+        "{path}, line {line}: found a manifest that cannot be understood ({found}), expected TOML as the recording format describes; correct the line"
+    )]
+    ManifestSyntax { path: PathBuf, line: usize, found: String },
+    /// A manifest of another format or version.
+    #[error(
+        "{path}, line {line}: found the format {found}, expected format = \"{}\"; write it so, or convert the recording",
+        super::manifest::FORMAT
+    )]
+    ManifestFormat { path: PathBuf, line: usize, found: String },
+    /// A manifest that contradicts itself.
+    #[error("{path}, line {line}: {fault}")]
+    Manifest { path: PathBuf, line: usize, fault: ManifestFault },
+
+    /// The samples cannot be in the unit the manifest says, and another unit explains them.
+    #[error(
+        "{path}, sensor {sensor}: the median length is {median_norm:.4} {si} when read as `{unit}`, expected {expected}; the samples look like `{suggestion}`: write {sensor} = \"{suggestion}\" below [units] in the manifest"
+    )]
+    UnitImplausible {
+        path: PathBuf,
+        sensor: SensorKind,
+        unit: Unit,
+        median_norm: f64,
+        si: &'static str,
+        expected: &'static str,
+        suggestion: Unit,
+    },
+    /// One axis is in another unit than its neighbours.
+    #[error(
+        "{path}, column `{column}`: found samples that look like `{found}` beside the other axes in `{expected}` (then the length is steady at {median_norm:.3} m/s², and else it is not); convert the column to `{expected}`"
+    )]
+    MixedUnits { path: PathBuf, column: &'static str, found: Unit, expected: Unit, median_norm: f64 },
+}

@@ -1,0 +1,211 @@
+//! Stretches in which an axis is at its limit.
+
+use std::ops::Range;
+
+use super::integrity::Saturation;
+use super::triple::{Triple, median};
+use super::unit::Unit;
+
+/// How near to the full scale counts as being there.
+const NEAR: f64 = 1e-3;
+/// An axis at its extreme for so many rows while another one moves …
+const LONG: usize = 10;
+/// … and so many times longer than it ever stays at another value is clipped.
+const LONGER: usize = 3;
+/// A run that is entered and left in steps of so many usual ones is clipped too, if it has this length.
+const STEEP: f64 = 8.0;
+const SHORT: usize = 3;
+/// Least number of rows at the extreme.
+const PILE: usize = 5;
+/// Least number of stretches at other values; an axis with fewer says nothing about itself.
+const WITNESSES: usize = 10;
+
+/// Saturated stretches of all axes, in order of axis and row.
+pub(crate) fn find(triple: &Triple) -> Vec<Saturation> {
+    (0..3).flat_map(|axis| AxisSamples::new(triple, axis).saturated()).collect()
+}
+
+/// One axis in SI units.
+struct AxisSamples<'a> {
+    triple: &'a Triple,
+    axis: usize,
+    values: Vec<f64>,
+    runs: Vec<Range<usize>>,
+}
+
+impl<'a> AxisSamples<'a> {
+    fn new(triple: &'a Triple, axis: usize) -> Self {
+        let values: Vec<f64> = triple.values.iter().map(|value| value[axis]).collect();
+        let runs = runs(&values);
+        Self { triple, axis, values, runs }
+    }
+
+    fn saturated(&self) -> Vec<Saturation> {
+        let finite = || self.values.iter().copied().filter(|value| value.is_finite());
+        let low = finite().fold(f64::INFINITY, f64::min);
+        let high = finite().fold(f64::NEG_INFINITY, f64::max);
+        if low >= high {
+            return Vec::new();
+        }
+        let clipped_low = self.is_limit(low) || self.is_clipped(low, [low, high]);
+        let clipped_high = self.is_limit(high) || self.is_clipped(high, [low, high]);
+        let full_scale = self.triple.full_scale_si().map(|scale| scale * (1.0 - NEAR));
+        let declared = |value: f64| full_scale.is_some_and(|scale| value.abs() >= scale);
+        let at_limit =
+            |value: f64| declared(value) || (clipped_low && value == low) || (clipped_high && value == high);
+        let stretches = stretches(&self.values, at_limit);
+        stretches
+            .into_iter()
+            .map(|rows| {
+                let value = self.values[rows.start];
+                Saturation { axis: self.axis, rows, value, declared: declared(value) }
+            })
+            .collect()
+    }
+
+    /// Whether a value is the end of a sixteen-bit converter's range.
+    fn is_limit(&self, si: f64) -> bool {
+        if self.triple.unit != Unit::Counts {
+            return false;
+        }
+        let raw = self.triple.nominal.to_raw(si).round();
+        let signed = self.triple.nominal.offset.abs() < 16384.0;
+        if signed { raw == -32768.0 || raw == 32767.0 } else { raw == 65535.0 }
+    }
+
+    /// Whether an extreme is a clip and not where a quantised rest happens to lie.
+    fn is_clipped(&self, extreme: f64, extremes: [f64; 2]) -> bool {
+        let at = |run: &&Range<usize>| self.values[run.start] == extreme;
+        let piled: usize = self.runs.iter().filter(at).map(Range::len).sum();
+        let inner =
+            || self.runs.iter().filter(|run| !extremes.contains(&self.values[run.start])).map(Range::len);
+        if piled < PILE || inner().count() < WITNESSES {
+            return false;
+        }
+        let longest_inner = inner().max().unwrap_or(1);
+        let usual = median(inner().map(|length| length as f64).collect()).unwrap_or(1.0) as usize;
+        let step = self.usual_step();
+        self.runs.iter().filter(at).any(|run| {
+            let stays = run.len() >= LONG.max(LONGER * longest_inner) && self.others_move(run);
+            let steep = run.len() >= SHORT * usual.max(1) && run.len() >= SHORT && self.is_steep(run, step);
+            stays || steep
+        })
+    }
+
+    /// Median size of the steps this axis makes.
+    fn usual_step(&self) -> f64 {
+        let steps = self.values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        median(steps.filter(|step| *step > 0.0).collect()).unwrap_or(f64::INFINITY)
+    }
+
+    fn is_steep(&self, run: &Range<usize>, step: f64) -> bool {
+        let extreme = self.values[run.start];
+        let side = |row: Option<usize>| {
+            let value = row.and_then(|row| self.values.get(row));
+            value.is_some_and(|value| (value - extreme).abs() > STEEP * step)
+        };
+        side(run.start.checked_sub(1)) && side(Some(run.end))
+    }
+
+    /// Whether another axis changes in these rows; if none does, the sensor is stuck, not clipped.
+    fn others_move(&self, run: &Range<usize>) -> bool {
+        let rows = &self.triple.values[run.clone()];
+        (0..3).filter(|axis| *axis != self.axis).any(|axis| {
+            rows.windows(2).filter(|pair| pair[0][axis] != pair[1][axis]).count() >= run.len() / 4
+        })
+    }
+}
+
+/// Maximal stretches of one value.
+fn runs(values: &[f64]) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for (row, value) in values.iter().enumerate() {
+        match runs.last_mut() {
+            Some(run) if run.end == row && values[run.start] == *value => run.end += 1,
+            _ if value.is_finite() => runs.push(row..row + 1),
+            _ => {}
+        }
+    }
+    runs
+}
+
+/// Maximal stretches of values for which something holds.
+fn stretches(values: &[f64], holds: impl Fn(f64) -> bool) -> Vec<Range<usize>> {
+    let mut stretches: Vec<Range<usize>> = Vec::new();
+    for (row, value) in values.iter().enumerate() {
+        if holds(*value) {
+            match stretches.last_mut() {
+                Some(stretch) if stretch.end == row => stretch.end += 1,
+                _ => stretches.push(row..row + 1),
+            }
+        }
+    }
+    stretches
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::super::triple::Nominal;
+    use super::*;
+
+    fn triple(values: Vec<Vector3<f64>>) -> Triple {
+        Triple { values, unit: Unit::RadianPerSecond, nominal: Nominal::IDENTITY, full_scale: None }
+    }
+
+    /// Integers −2 to 2, much alike at each call.
+    fn noise(row: usize) -> f64 {
+        ((row * 2_654_435_761) >> 7) as f64 % 5.0 - 2.0
+    }
+
+    /// A turn of the given height about x, with noise, clipped at `limit`.
+    fn turning(limit: f64) -> Triple {
+        let x = |row: usize| ((row as f64 * 0.02).sin() * 1000.0 + noise(row)).clamp(-limit, limit);
+        triple((0..2000).map(|row| Vector3::new(x(row), noise(row + 7), noise(row + 13))).collect())
+    }
+
+    #[test]
+    fn a_slow_signal_flat_at_its_extreme_is_clipped() {
+        let found = find(&turning(800.0));
+        assert!(found.len() > 10 && found.iter().all(|each| each.axis == 0 && each.value.abs() == 800.0));
+        assert!(found.iter().all(|each| !each.declared && each.rows.len() > 20), "{found:?}");
+        assert!(find(&turning(2000.0)).is_empty());
+    }
+
+    #[test]
+    fn a_spike_cut_flat_is_clipped_although_it_is_short() {
+        let mut values: Vec<_> = (0..500).map(|row| Vector3::new(noise(row), noise(row + 3), 0.0)).collect();
+        values[200..206].fill(Vector3::new(500.0, 3.0, 1.0));
+        let found = find(&triple(values));
+        assert_eq!((found[0].axis, found[0].rows.clone()), (0, 200..206));
+    }
+
+    #[test]
+    fn a_quantised_rest_on_the_extreme_is_not_clipped() {
+        let coarse = |row: usize| if noise(row / 9) > 1.0 { 1.0 } else { 0.0 };
+        let values = (0..3000).map(|row| Vector3::new(coarse(row), noise(row), noise(row + 1))).collect();
+        assert!(find(&triple(values)).is_empty());
+        assert!(find(&triple(vec![Vector3::new(1.0, 2.0, 3.0); 100])).is_empty());
+    }
+
+    #[test]
+    fn the_declared_full_scale_counts_within_a_thousandth() {
+        let mut clipped = turning(2000.0);
+        clipped.full_scale = Some(1000.0);
+        let found = find(&clipped);
+        assert!(!found.is_empty() && found.iter().all(|each| each.declared && each.value.abs() >= 999.0));
+    }
+
+    #[test]
+    fn the_ends_of_a_sixteen_bit_converter_are_limits() {
+        let mut values: Vec<_> = (0..100).map(|row| Vector3::repeat(noise(row))).collect();
+        values[50].x = 32767.0;
+        values[60].y = -32767.0;
+        let mut counts = triple(values);
+        counts.unit = Unit::Counts;
+        let found = find(&counts);
+        assert_eq!(found.len(), 1);
+        assert_eq!((found[0].axis, found[0].rows.clone()), (0, 50..51));
+    }
+}

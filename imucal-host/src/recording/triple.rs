@@ -1,0 +1,95 @@
+//! Samples of one triad and their relation to what the file holds.
+
+use nalgebra::Vector3;
+
+use super::unit::Unit;
+
+/// Nominal, affine conversion of one sensor: file value = offset + per_unit · SI value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nominal {
+    /// What the file holds at zero, in the file's unit; finite.
+    pub offset: f64,
+    /// File units per m/s², rad/s or µT; finite, not zero.
+    pub per_unit: f64,
+}
+
+impl Nominal {
+    /// The conversion of a file that is in SI units already.
+    pub const IDENTITY: Self = Self { offset: 0.0, per_unit: 1.0 };
+
+    /// From the file's unit to m/s², rad/s or µT. NaN stays NaN.
+    #[must_use]
+    pub fn to_si(self, raw: f64) -> f64 {
+        (raw - self.offset) / self.per_unit
+    }
+
+    /// From m/s², rad/s or µT to the file's unit. NaN stays NaN.
+    #[must_use]
+    pub fn to_raw(self, si: f64) -> f64 {
+        self.offset + self.per_unit * si
+    }
+}
+
+/// The samples of an accelerometer, gyroscope or magnetometer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Triple {
+    /// One vector a row, in the sensor's own axes: specific force in m/s², rate in rad/s or field in µT
+    /// (for the unit `a.u.` as the file has it). A NaN component was not measured; none is infinite.
+    pub values: Vec<Vector3<f64>>,
+    /// Unit of the file.
+    pub unit: Unit,
+    /// Conversion between the file and `values`.
+    pub nominal: Nominal,
+    /// Full scale of `[ranges]`, in the file's unit (for counts: from the nominal offset); positive.
+    pub full_scale: Option<f64>,
+}
+
+impl Triple {
+    /// Full scale on the SI side (m/s², rad/s, µT), positive.
+    #[must_use]
+    pub fn full_scale_si(&self) -> Option<f64> {
+        self.full_scale.map(|scale| scale / self.nominal.per_unit.abs())
+    }
+
+    /// Median length of the vectors in SI units, over the rows measured on all three axes; `None`
+    /// without such a row.
+    #[must_use]
+    pub fn median_norm(&self) -> Option<f64> {
+        let norms = self.values.iter().map(nalgebra::Matrix::norm).filter(|norm| norm.is_finite());
+        median(norms.collect())
+    }
+}
+
+/// The middle value (the upper one of an even number); `None` of nothing. NaN sorts beyond every
+/// number, so take it out before.
+#[must_use]
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let middle = values.len() / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nominal_conversion_goes_both_ways() {
+        let nominal = Nominal { offset: 32768.0, per_unit: 415.0 };
+        assert_eq!(nominal.to_si(32768.0 + 415.0), 1.0);
+        assert_eq!(nominal.to_raw(1.0), 33183.0);
+        assert!(nominal.to_si(f64::NAN).is_nan());
+    }
+
+    #[test]
+    fn the_median_norm_leaves_missing_rows_out() {
+        let values =
+            vec![Vector3::new(3.0, 4.0, 0.0), Vector3::new(f64::NAN, 0.0, 0.0), Vector3::new(5.0, 0.0, 0.0)];
+        let triple =
+            Triple { values, unit: Unit::MicroTesla, nominal: Nominal::IDENTITY, full_scale: Some(2.0) };
+        assert_eq!(triple.median_norm(), Some(5.0));
+        assert_eq!(triple.full_scale_si(), Some(2.0));
+    }
+}

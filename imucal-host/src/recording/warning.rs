@@ -1,0 +1,132 @@
+//! What a reader noticed that is worth telling but stops nothing.
+
+use std::path::PathBuf;
+
+use super::place::Place;
+use super::sensor_kind::SensorKind;
+use super::unit::{TimeUnit, Unit};
+
+/// Something noticed while reading; its text names the file, the place, what was found and what to do.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Warning {
+    /// A column the contract does not know.
+    #[error(
+        "{path}, column `{column}`: not a column of a recording; kept as it is and not used (rename it if it is meant as one)"
+    )]
+    UnknownColumn {
+        /// Samples file.
+        path: PathBuf,
+        /// Name in the header.
+        column: String,
+    },
+    /// A key of the manifest the contract does not know.
+    #[error("{path}, line {line}: unknown key `{key}` is ignored; {}", suggest(.nearest))]
+    UnknownKey {
+        /// Manifest.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Key with its section.
+        key: String,
+        /// The key probably meant.
+        nearest: Option<String>,
+    },
+    /// The last line was cut and has been dropped.
+    #[error(
+        "{path}, {place}: the last line is cut (found {found} of {expected} whole fields and no line end) and was dropped; record or copy the file again if more than a sample is missing"
+    )]
+    TruncatedLine {
+        /// Samples file.
+        path: PathBuf,
+        /// The dropped line.
+        place: Place,
+        /// Whole fields found.
+        found: usize,
+        /// Fields of the header.
+        expected: usize,
+    },
+    /// The last line is complete but has no line end, so that its last field may be cut.
+    #[error(
+        "{path}, {place}: the last line has no line end; it was kept, but its last field `{found}` (column `{column}`) may be cut; end the file with a line end"
+    )]
+    UnterminatedLine {
+        /// Samples file.
+        path: PathBuf,
+        /// The last line.
+        place: Place,
+        /// Its last column.
+        column: String,
+        /// That column's text.
+        found: String,
+    },
+    /// The compressed stream ends early; the whole rows before were kept.
+    #[error(
+        "{path}: the gzip stream ends early; {rows} whole rows were kept; copy the file again to have the rest"
+    )]
+    TruncatedStream {
+        /// Samples file.
+        path: PathBuf,
+        /// Rows kept.
+        rows: usize,
+    },
+    /// The samples' size is unusual for the sensor, and no other unit explains it.
+    #[error(
+        "{path}, sensor {sensor}: the median length is {found:.4} {si} when read as `{unit}`, expected {expected}; check {key} in the manifest"
+    )]
+    SizeUnusual {
+        /// Samples file.
+        path: PathBuf,
+        /// The sensor.
+        sensor: SensorKind,
+        /// Its unit in the manifest.
+        unit: Unit,
+        /// Median length on the SI side.
+        found: f64,
+        /// `m/s²`, `rad/s` or `µT`.
+        si: &'static str,
+        /// What is usual.
+        expected: String,
+        /// Key of the manifest to look at.
+        key: String,
+    },
+    /// The samples' interval is unusual, which a wrong unit of `t` causes.
+    #[error(
+        "{path}, column `t`: the median interval is {found:e} s when read as `{unit}`, expected 1e-5 to 2 s; check t of [units] in the manifest"
+    )]
+    IntervalUnusual {
+        /// Samples file.
+        path: PathBuf,
+        /// Unit of `t`.
+        unit: TimeUnit,
+        /// Median interval, s.
+        found: f64,
+    },
+    /// The file holds no sensor.
+    #[error(
+        "{path}: no sensor columns found, expected acc_x, acc_y, acc_z or those of gyr or mag; nothing can be calibrated from it"
+    )]
+    NoSensor {
+        /// Samples file.
+        path: PathBuf,
+    },
+    /// Gravity of the site that no place on Earth has.
+    #[error(
+        "{path}, line {line}: gravity {found} m/s² found, expected 9.76 to 9.84 on Earth; correct it or leave it out and give latitude_deg and height_m"
+    )]
+    GravityUnusual {
+        /// Manifest.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// The value, m/s².
+        found: f64,
+    },
+}
+
+fn suggest(nearest: &Option<String>) -> String {
+    match nearest {
+        Some(key) => format!("write `{key}` if that is meant, or remove it"),
+        None => "remove it".to_owned(),
+    }
+}

@@ -1,0 +1,46 @@
+//! Why a recording could not be written.
+
+use std::path::PathBuf;
+
+use super::manifest_check::ManifestFault;
+
+/// A failure to write a recording; its text names the file, what was found, what was expected and
+/// what to do. Nothing half-written is left.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)] // The fields are those of each message.
+pub enum WriteError {
+    /// The system refuses.
+    #[error(
+        "{path}: cannot be written ({found}), expected a writable place with room; check the directory, its permissions and the disk; nothing was changed"
+    )]
+    Unwritable { path: PathBuf, found: String },
+    /// The name says no format there is a writer for.
+    #[error(
+        "{path}: found the ending `{found}`, expected .csv, .csv.gz or .parquet; give the file such a name"
+    )]
+    UnknownFormat { path: PathBuf, found: String },
+    /// Parquet is not built in.
+    #[error(
+        "{path}: found the ending .parquet, expected .csv or .csv.gz since this build is without Parquet; build with `--features parquet` or write CSV"
+    )]
+    ParquetNotBuilt { path: PathBuf },
+    /// The manifest contradicts itself, so that nobody could read the recording.
+    #[error("{path}: the manifest to be written would be refused: {fault}")]
+    Manifest { path: PathBuf, fault: ManifestFault },
+    /// A column has not as many rows as the time.
+    #[error(
+        "{path}, column `{column}`: found {found} rows, expected {expected} as of `t`; correct the recording before writing it"
+    )]
+    RowsDiffer { path: PathBuf, column: String, found: usize, expected: usize },
+    /// Times that would be refused when read.
+    #[error(
+        "{path}, row {row}, column `t`: found {found} s after {before} s, expected strictly increasing finite times; sort the rows or remove duplicates before writing"
+    )]
+    TimeOrder { path: PathBuf, row: usize, found: f64, before: f64 },
+    /// An infinite value, which no reader takes.
+    #[error(
+        "{path}, row {row}, column `{column}`: found an infinite value, expected a finite one or NaN for not measured; correct the recording before writing it"
+    )]
+    Infinite { path: PathBuf, row: usize, column: String },
+}
