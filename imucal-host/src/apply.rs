@@ -2,7 +2,7 @@
 
 use imucal_core::{
     corrector::Corrector,
-    record::{CalibrationRecord, Match, TriadRecord},
+    record::{CalibrationRecord, Match},
 };
 
 use crate::{
@@ -101,7 +101,7 @@ pub fn apply(recording: &Recording, stored: &StoredCalibration, record: &Calibra
     let mut corrected = recording.clone();
     let temperature = recording.temperature.as_deref();
     for kind in SensorKind::ALL {
-        let (Some(stored), Some(triad)) = (stored.triad(kind), triad_record(record, kind)) else {
+        let (Some(stored), Some(triad)) = (stored.triad(kind), record.triad(kind.into())) else {
             continue;
         };
         let triple = match kind {
@@ -123,15 +123,6 @@ pub fn apply(recording: &Recording, stored: &StoredCalibration, record: &Calibra
         set_unit(&mut corrected, kind, stored.unit_out);
     }
     corrected
-}
-
-/// The device's part of a record for one sensor.
-pub fn triad_record(record: &CalibrationRecord, kind: SensorKind) -> Option<&TriadRecord> {
-    match kind {
-        SensorKind::Acc => record.acc.as_ref(),
-        SensorKind::Gyr => record.gyr.as_ref(),
-        SensorKind::Mag => record.mag.as_ref(),
-    }
 }
 
 /// Conversion of calibrated values; counts without their offset, which the calibration took out.

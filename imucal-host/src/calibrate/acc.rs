@@ -12,7 +12,7 @@ use imucal_core::{
 use nalgebra::Vector3;
 
 use super::{
-    norm_fit::{NormFit, NormProblem, raw_coverage},
+    norm_fit::{NormFit, NormProblem, dynamic, raw_coverage},
     outcome::{Evidence, FitSummary, Refused, SensorOutcome},
 };
 use crate::recording::{SensorKind, Triple, Unit};
@@ -146,6 +146,8 @@ fn summary<const P: usize>(
         triad: problem.form.triad(fit.solver.theta()),
         gain_std: std.gain,
         bias_std: std.bias,
+        covariance: dynamic(&covariance),
+        covariance_of: problem.form.entries().to_vec(),
         unit_in: sensor.unit,
         unit_out: Unit::MetrePerSecondSquared,
         nominal: sensor.nominal,

@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use std::ops::Range;
 
 use super::{
+    norm_fit::dynamic,
     outcome::{BiasWander, Evidence, FitSummary, KnownTurn, Refused, SensorOutcome},
     outlier::outliers,
     rows::{Residuals, Rows},
@@ -272,6 +273,8 @@ fn summarise(
         triad: Triad { gain, bias: turns.bias },
         gain_std,
         bias_std: turns.bias_std,
+        covariance: dynamic(&covariance),
+        covariance_of: FULL_GAIN.entries().to_vec(),
         unit_in: input.sensor.unit,
         unit_out: Unit::RadianPerSecond,
         nominal: input.sensor.nominal,

@@ -9,7 +9,7 @@ use imucal_core::{
 use nalgebra::{SMatrix, SVector};
 
 use super::{
-    norm_fit::{NormFit, NormProblem},
+    norm_fit::{NormFit, NormProblem, dynamic},
     outcome::{Evidence, FitSummary, Refused, SensorOutcome},
 };
 use crate::{
@@ -90,11 +90,14 @@ fn summarise(
     sensor: &Triple,
     inflation: &SVector<f64, 9>,
 ) -> FitSummary {
-    let std = problem.form.triad(&fit.covariance(inflation).diagonal().map(f64::sqrt));
+    let covariance = fit.covariance(inflation);
+    let std = problem.form.triad(&covariance.diagonal().map(f64::sqrt));
     FitSummary {
         triad: problem.form.triad(fit.solver.theta()),
         gain_std: std.gain,
         bias_std: std.bias,
+        covariance: dynamic(&covariance),
+        covariance_of: problem.form.entries().to_vec(),
         unit_in: sensor.unit,
         unit_out: Unit::MicroTesla,
         nominal: sensor.nominal,
@@ -137,7 +140,9 @@ fn to_unit_determinant(
         let moved = (by.gain - gain * ((inverse * by.gain).trace() / 3.0)) / d;
         problem.form.theta(&Triad { gain: moved, bias: by.bias })
     }));
-    let std = problem.form.triad(&(jacobian * covariance * jacobian.transpose()).diagonal().map(f64::sqrt));
+    let covariance = jacobian * covariance * jacobian.transpose();
+    let std = problem.form.triad(&covariance.diagonal().map(f64::sqrt));
+    summary.covariance = dynamic(&covariance);
     summary.triad.gain = gain / d;
     (summary.gain_std, summary.bias_std) = (std.gain, std.bias);
     summary.field_norm = Some(problem.norm / d * sensor.nominal.per_unit.abs());

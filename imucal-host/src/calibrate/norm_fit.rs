@@ -11,7 +11,7 @@ use imucal_core::{
     solver::{LevenbergMarquardt, SolveReport, lm::Settings},
     triad::Triad,
 };
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
 use super::{
@@ -177,6 +177,11 @@ impl<const P: usize> NormFit<P> {
             .covariance()
             .map_or_else(|| SMatrix::repeat(f64::INFINITY), |classical| scale * classical * scale)
     }
+}
+
+/// A matrix of a run-time size, for reports.
+pub fn dynamic<const P: usize>(matrix: &SMatrix<f64, P, P>) -> DMatrix<f64> {
+    DMatrix::from_column_slice(P, P, matrix.as_slice())
 }
 
 /// Directions before there is a fit: from the points' own middle, for a refusal of too little data.

@@ -1,7 +1,7 @@
 //! What a calibration came to: for each sensor a fit with its figures, accepted or refused with a reason.
 
 use imucal_core::{accept::Refusal, observation::ShellPoint, solver::Termination, triad::Triad};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use crate::{
     observe::turn::TurnData,
@@ -87,6 +87,10 @@ pub struct FitSummary {
     pub gain_std: Matrix3<f64>,
     /// Standard errors of the bias, nominal SI.
     pub bias_std: Vector3<f64>,
+    /// Covariance of the estimated entries, nominal SI, in the order of `covariance_of`.
+    pub covariance: DMatrix<f64>,
+    /// Entries (gain by rows 0 to 8, bias 9 to 11) that are estimated.
+    pub covariance_of: Vec<u8>,
     /// Unit of the recording and the raw input.
     pub unit_in: Unit,
     /// Unit of the calibrated output.
@@ -151,6 +155,18 @@ impl FitSummary {
         (gain, self.bias_std * per)
     }
 
+    /// Covariance of the estimated entries of [`raw_triad`](Self::raw_triad), as `covariance`.
+    pub fn raw_covariance(&self) -> DMatrix<f64> {
+        let per = self.nominal.per_unit;
+        let factor = |entry: u8| match entry {
+            0..9 if self.in_raw_scale() => 1.0,
+            0..9 => 1.0 / per,
+            _ => per,
+        };
+        let scale: Vec<f64> = self.covariance_of.iter().map(|entry| factor(*entry)).collect();
+        DMatrix::from_fn(scale.len(), scale.len(), |i, j| self.covariance[(i, j)] * scale[i] * scale[j])
+    }
+
     /// A magnetometer without a known field keeps the recording's unit: its gain has determinant 1.
     fn in_raw_scale(&self) -> bool {
         self.field_norm.is_some()
@@ -204,6 +220,16 @@ impl SensorOutcome {
     /// The fit of an accepted sensor.
     pub fn accepted(&self) -> Option<&FitSummary> {
         self.verdict.is_ok().then_some(self.fit.as_ref()).flatten()
+    }
+}
+
+/// Name of a triad's entry: `gain_xy`, `bias_z`.
+pub fn entry_name(entry: u8) -> String {
+    let axis = |k: u8| ["x", "y", "z"][usize::from(k % 3)];
+    if entry < 9 {
+        format!("gain_{}{}", axis(entry / 3), axis(entry))
+    } else {
+        format!("bias_{}", axis(entry))
     }
 }
 

@@ -30,7 +30,7 @@ pub fn outliers(residuals: &[f64]) -> Vec<(usize, f64)> {
         .iter()
         .enumerate()
         .map(|(k, r)| (k, r.abs() / std))
-        .filter(|(_, size)| !(*size <= GROSS))
+        .filter(|(_, size)| *size > GROSS || size.is_nan())
         .collect();
     if found.len() as f64 > MOST * residuals.len() as f64 { Vec::new() } else { found }
 }

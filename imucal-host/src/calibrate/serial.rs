@@ -14,25 +14,25 @@ const LEAST_BLOCKS: usize = 20;
 
 /// Factor on each parameter's standard error, at least 1. `unscaled` is (JᵀJ)⁻¹; rows are in time order.
 pub fn inflation<const P: usize>(rows: &Rows<P>, unscaled: &SMatrix<f64, P, P>) -> SVector<f64, P> {
-    let influence: Vec<SVector<f64, P>> =
-        rows.residuals.iter().zip(&rows.jacobian).map(|(r, j)| unscaled * j * *r).collect();
-    SVector::from_fn(|k, _| blocked_ratio(influence.iter().map(|v| v[k]).collect()).max(1.0).sqrt())
+    let influence = rows.residuals.iter().zip(&rows.jacobian).map(|(r, j)| unscaled * j * *r).collect();
+    blocked_ratio(influence).map(|ratio| ratio.max(1.0).sqrt())
 }
 
-/// Variance of a series' sum over that of an independent series of the same spread.
-fn blocked_ratio(mut sums: Vec<f64>) -> f64 {
-    let spread = mean_square(&sums) * sums.len() as f64;
-    if spread <= 0.0 || !spread.is_finite() {
-        return 1.0;
-    }
-    let mut ratio = 1.0;
+/// Variance of each series' sum over that of an independent series of the same spread. All share one length of
+/// block, so that the settling of one is not left to the chance of its own few blocks.
+fn blocked_ratio<const P: usize>(mut sums: Vec<SVector<f64, P>>) -> SVector<f64, P> {
+    let single = squares(&sums);
+    let mut ratio = SVector::<f64, P>::repeat(1.0);
     while sums.len() >= 2 * LEAST_BLOCKS {
         sums = sums.chunks_exact(2).map(|pair| pair[0] + pair[1]).collect();
         let blocks = sums.len() as f64;
         // The sums add up to nothing at the optimum, which takes one of their degrees of freedom.
-        let wider = mean_square(&sums) * blocks / spread * blocks / (blocks - 1.0);
-        let settled = wider <= ratio * (1.0 + (2.0 / blocks).sqrt());
-        ratio = ratio.max(wider);
+        let wider = squares(&sums).component_div(&single) * (blocks / (blocks - 1.0));
+        if !wider.iter().all(|w| w.is_finite()) {
+            break;
+        }
+        let settled = wider.mean() <= ratio.mean() * (1.0 + (2.0 / (blocks * P as f64)).sqrt());
+        ratio = wider;
         if settled {
             break;
         }
@@ -40,8 +40,8 @@ fn blocked_ratio(mut sums: Vec<f64>) -> f64 {
     ratio
 }
 
-fn mean_square(values: &[f64]) -> f64 {
-    values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64
+fn squares<const P: usize>(values: &[SVector<f64, P>]) -> SVector<f64, P> {
+    values.iter().map(|v| v.component_mul(v)).sum()
 }
 
 #[cfg(test)]
@@ -50,27 +50,27 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
-    fn autoregression(rho: f64, count: usize) -> Vec<f64> {
+    fn autoregression(rho: f64, count: usize) -> Vec<SVector<f64, 1>> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let mut state = 0.0;
         (0..count)
             .map(|_| {
                 let e: f64 = StandardNormal.sample(&mut rng);
                 state = rho * state + e;
-                state
+                SVector::from([state])
             })
             .collect()
     }
 
     #[test]
     fn white_residuals_are_hardly_inflated() {
-        assert!((blocked_ratio(autoregression(0.0, 5000)) - 1.0).abs() < 0.1);
+        assert!((blocked_ratio(autoregression(0.0, 5000)).x - 1.0).abs() < 0.1);
     }
 
     #[test]
     fn an_autoregression_has_its_known_variance() {
         // (1 + ρ)/(1 − ρ) = 19 for ρ = 0.9.
-        let ratio = blocked_ratio(autoregression(0.9, 20_000));
+        let ratio = blocked_ratio(autoregression(0.9, 20_000)).x;
         assert!((15.0..23.0).contains(&ratio), "{ratio}");
     }
 }

@@ -104,17 +104,14 @@ fn ending(calibration: &Calibration, named: &[SensorKind]) -> Ending {
 }
 
 fn print(arguments: &Arguments, calibration: &Calibration) -> anyhow::Result<()> {
-    match &arguments.json {
-        Some(path) => {
-            let text = serde_json::to_string_pretty(&report::json::calibration(calibration))? + "\n";
-            if path.as_os_str() == "-" {
-                print!("{text}");
-                return Ok(());
-            }
-            AtomicFile::write_whole(path, text.as_bytes())
-                .with_context(|| format!("{}: cannot be written; check the folder", path.display()))?;
+    if let Some(path) = &arguments.json {
+        let text = serde_json::to_string_pretty(&report::json::calibration(calibration))? + "\n";
+        if path.as_os_str() == "-" {
+            print!("{text}");
+            return Ok(());
         }
-        None => {}
+        AtomicFile::write_whole(path, text.as_bytes())
+            .with_context(|| format!("{}: cannot be written; check the folder", path.display()))?;
     }
     print!("{}", report::table::table(calibration));
     Ok(())

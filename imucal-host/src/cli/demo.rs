@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::{Ending, calibrate::today};
 use crate::{
-    apply::{apply, triad_record},
+    apply::apply,
     calibrate::{Calibration, Options, calibrate},
     equivalence::{FitEquivalence, SampleEquivalence, fits, samples},
     recording::SensorKind,
@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     println!("\n4. Apply the record through the f32 core and compare with the f64 reference.\n");
     let device = stored.to_record(out)?;
     let equal = SensorKind::ALL.into_iter().all(|kind| {
-        let compared = recording.sensor(kind).zip(stored.triad(kind)).zip(triad_record(&device, kind));
+        let compared = recording.sensor(kind).zip(stored.triad(kind)).zip(device.triad(kind.into()));
         compared.is_some_and(|((triple, stored), record)| {
             let result = samples::compare(kind, triple, stored, record);
             print_samples(&result);

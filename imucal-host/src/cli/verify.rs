@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{Ending, progress::Progress, read, warn};
 use crate::{
-    apply::{self, triad_record},
+    apply,
     calibrate::{AccModel, Options, calibrate},
     equivalence::{FitEquivalence, SampleEquivalence, fits, samples},
     recording::{Recording, SensorKind},
@@ -43,7 +43,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         .into_iter()
         .filter_map(|kind| {
             let (triple, triad) = (recording.sensor(kind)?, stored.triad(kind)?);
-            Some(samples::compare(kind, triple, triad, triad_record(&record, kind)?))
+            Some(samples::compare(kind, triple, triad, record.triad(kind.into())?))
         })
         .collect();
     progress.stage("fitting again, by the core and by the reference");

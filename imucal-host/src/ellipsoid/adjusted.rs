@@ -68,11 +68,11 @@ impl Moments {
     /// Moment of the unbiased monomial x^a y^b z^c under noise of variance `s`.
     fn unbiased(&self, [a, b, c]: [usize; 3], s: f64) -> f64 {
         let mut sum = 0.0;
-        for i in 0..=a / 2 {
-            for j in 0..=b / 2 {
-                for k in 0..=c / 2 {
-                    let factor = UNBIASED[a][i] * UNBIASED[b][j] * UNBIASED[c][k];
-                    sum += factor * s.powi((i + j + k) as i32) * self.sums[a - 2 * i][b - 2 * j][c - 2 * k];
+        for (i, x) in UNBIASED[a].iter().enumerate().take(a / 2 + 1) {
+            for (j, y) in UNBIASED[b].iter().enumerate().take(b / 2 + 1) {
+                for (k, z) in UNBIASED[c].iter().enumerate().take(c / 2 + 1) {
+                    let raw = self.sums[a - 2 * i][b - 2 * j][c - 2 * k];
+                    sum += x * y * z * s.powi((i + j + k) as i32) * raw;
                 }
             }
         }

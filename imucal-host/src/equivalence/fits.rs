@@ -18,7 +18,7 @@ use super::{
     ulp,
 };
 use crate::{
-    calibrate::outcome::{Evidence, FitSummary, KnownTurn, SensorOutcome},
+    calibrate::outcome::{Evidence, FitSummary, KnownTurn, SensorOutcome, entry_name},
     recording::{Recording, SensorKind},
 };
 
@@ -171,13 +171,4 @@ fn differences(
             scale: *scale,
         })
         .collect()
-}
-
-fn entry_name(entry: u8) -> String {
-    let axis = |k: u8| ["x", "y", "z"][usize::from(k % 3)];
-    if entry < 9 {
-        format!("gain {}{}", axis(entry / 3), axis(entry))
-    } else {
-        format!("bias {}", axis(entry))
-    }
 }

@@ -1,10 +1,10 @@
 //! The calibration as JSON, by the contract `imucal-calibration/1`.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 use serde_json::{Value, json};
 
 use crate::{
-    calibrate::{Calibration, FitSummary, SegmentationReport, SensorOutcome},
+    calibrate::{Calibration, FitSummary, SegmentationReport, SensorOutcome, outcome::entry_name},
     recording::SensorKind,
     store::FORMAT,
 };
@@ -28,6 +28,10 @@ pub fn calibration(calibration: &Calibration) -> Value {
 
 fn rows(m: &Matrix3<f64>) -> Value {
     json!((0..3).map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]]).collect::<Vec<_>>())
+}
+
+fn covariance_rows(m: &DMatrix<f64>) -> Value {
+    json!(m.row_iter().map(|row| row.iter().copied().collect::<Vec<f64>>()).collect::<Vec<_>>())
 }
 
 fn vector(v: &Vector3<f64>) -> Value {
@@ -75,6 +79,8 @@ fn fit_value(kind: SensorKind, fit: &FitSummary) -> Value {
         "bias": vector(&triad.bias),
         "gain_std": rows(&gain_std),
         "bias_std": vector(&bias_std),
+        "covariance": covariance_rows(&fit.raw_covariance()),
+        "covariance_of": fit.covariance_of.iter().map(|entry| entry_name(*entry)).collect::<Vec<_>>(),
         "unit_in": fit.unit_in.to_string(),
         "unit_out": fit.unit_out.to_string(),
         "observations": fit.observations,

@@ -9,9 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::tumble::Tumble;
 use crate::recording::{
     Manifest, Recording, SensorKind, Unit,
-    manifest::{Counts, Identity},
-    rig::{Rig, RigKind},
-    site::Site,
+    manifest::{Counts, Identity, Rig, RigKind, Site},
 };
 
 /// One triad of a unit.

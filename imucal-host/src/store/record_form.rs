@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use imucal_core::{
-    record::{CalibrationRecord, FitQuality, RawUnit, SensorIdentity, TriadRecord},
+    record::{CalibrationRecord, FitQuality, RawUnit, Sensor, SensorIdentity, TriadRecord},
     temperature::TemperatureTerms,
 };
 
 use super::{FORMAT, SaveError, StoredCalibration, StoredSensor, StoredTemperature, StoredTriad};
-use crate::recording::Unit;
+use crate::recording::{SensorKind, Unit};
 
 fn narrow<const N: usize>(values: [f64; N]) -> [f32; N] {
     values.map(|v| v as f32)
@@ -25,6 +25,16 @@ fn raw_unit(unit: Unit) -> RawUnit {
 
 fn unit(unit: RawUnit) -> Unit {
     unit.symbol().parse().unwrap_or(Unit::Arbitrary)
+}
+
+impl From<SensorKind> for Sensor {
+    fn from(kind: SensorKind) -> Self {
+        match kind {
+            SensorKind::Acc => Self::Accelerometer,
+            SensorKind::Gyr => Self::Gyroscope,
+            SensorKind::Mag => Self::Magnetometer,
+        }
+    }
 }
 
 fn text<const N: usize>(
@@ -199,6 +209,15 @@ mod tests {
         let text = toml::to_string(&original).unwrap();
         assert!(text.contains("date = \"2026-11-21\""), "{text}");
         assert_eq!(toml::from_str::<StoredCalibration>(&text).unwrap(), original);
+    }
+
+    #[test]
+    fn every_unit_of_a_recording_is_one_of_the_record_and_back() {
+        for kind in SensorKind::ALL {
+            for each in Unit::of(kind) {
+                assert_eq!(unit(raw_unit(*each)), *each);
+            }
+        }
     }
 
     #[test]
