@@ -1,3 +1,4 @@
 //! Shared fixtures of the cross-crate tests.
 
+pub mod data;
 pub mod firmware;
