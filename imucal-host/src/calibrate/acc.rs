@@ -152,7 +152,7 @@ fn summary<const P: usize>(
         unit_out: Unit::MetrePerSecondSquared,
         nominal: sensor.nominal,
         rms: fit.rms(),
-        held_out_rms: problem.held_out_rms(fit, fit.points.len()),
+        held_out_rms: problem.leave_one_out_rms(fit),
         observations: fit.points.len(),
         parameters: P,
         condition: fit.report.condition,

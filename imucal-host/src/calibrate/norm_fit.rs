@@ -1,5 +1,7 @@
 //! A norm fit with all that a demanding user asks of it: outliers, held-out error, acceptance.
 
+use std::slice::from_ref;
+
 use imucal_core::{
     accept::{self, Limits, Refusal},
     coverage::Coverage,
@@ -96,8 +98,20 @@ impl<const P: usize> NormProblem<'_, P> {
         }
     }
 
-    /// Rms residual of observations left out of the fit, `folds` contiguous parts in turn; `None` where a part
-    /// cannot be fitted.
+    /// Rms residual of single observations left out of the fit in turn. Each time the fit takes one Gauss–Newton
+    /// step from the optimum of all; `None` where the others do not determine it.
+    pub fn leave_one_out_rms(&self, fit: &NormFit<P>) -> Option<f64> {
+        let rows = Rows::of(&self.model(&fit.points), fit.solver.theta());
+        let mut sum = 0.0;
+        for (k, point) in fit.points.iter().enumerate() {
+            let theta = fit.solver.theta() + rows.step_without(k..k + 1)?;
+            sum += Residuals::of(&self.model(from_ref(point)), &theta).iter().map(|r| r * r).sum::<f64>();
+        }
+        Some((sum / fit.points.len() as f64).sqrt())
+    }
+
+    /// Rms residual of observations left out of the fit, `folds` contiguous parts in turn, each time fitted anew;
+    /// `None` where a fit does not converge.
     pub fn held_out_rms(&self, fit: &NormFit<P>, folds: usize) -> Option<f64> {
         let count = fit.points.len();
         let errors: Option<Vec<f64>> = (0..folds.min(count))

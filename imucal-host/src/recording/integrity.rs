@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::sensor_kind::SensorKind;
 use super::triple::Triple;
 use super::{Recording, saturation, stuck};
@@ -70,7 +72,7 @@ impl Integrity {
 #[must_use]
 pub fn inspect(recording: &Recording) -> Integrity {
     let sensors = SensorKind::ALL
-        .into_iter()
+        .into_par_iter()
         .filter_map(|kind| recording.sensor(kind).map(|triple| inspect_sensor(recording, kind, triple)))
         .collect();
     Integrity { gaps: gaps(recording), sensors }
