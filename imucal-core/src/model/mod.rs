@@ -4,6 +4,7 @@
 //! | --- | --- | --- |
 //! | [`norm`] | distance of a point from the shell that calibration maps to a sphere | raw (nominal SI) |
 //! | [`turn`] | gravity's direction carried through a turn by the gyroscope, against the accelerometer's | rad |
+//! | [`unified`] | output of a triad on a rig, against what it put out | raw (nominal SI) |
 //!
 //! Values are run-time data, shapes are types: the number of parameters `P` is const, the number of observations
 //! is whatever the caller's slice holds.
@@ -14,7 +15,9 @@ use crate::scalar::Scalar;
 
 pub mod norm;
 pub mod parameterisation;
+pub mod rig;
 pub mod turn;
+pub mod unified;
 
 pub use parameterisation::Parameterisation;
 

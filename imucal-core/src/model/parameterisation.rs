@@ -51,17 +51,26 @@ impl<const P: usize> Parameterisation<P> {
     /// The estimated entries of a derivative by all twelve.
     #[inline]
     pub fn select<T: Scalar>(&self, all: &SVector<T, ENTRIES>) -> SVector<T, P> {
-        let mut some = SVector::<T, P>::zeros();
-        for (slot, entry) in some.iter_mut().zip(self.entries.iter()) {
-            *slot = all.get(usize::from(*entry)).copied().unwrap_or_else(T::zero);
-        }
-        some
+        select(&self.entries, all)
     }
 
     /// Index of each parameter among the twelve entries.
     pub fn entries(&self) -> &[u8; P] {
         &self.entries
     }
+}
+
+/// Those of `all` that a list of indices names.
+#[inline]
+pub(super) fn select<T: Scalar, const N: usize, const P: usize>(
+    entries: &[u8; P],
+    all: &SVector<T, N>,
+) -> SVector<T, P> {
+    let mut some = SVector::<T, P>::zeros();
+    for (slot, entry) in some.iter_mut().zip(entries.iter()) {
+        *slot = all.get(usize::from(*entry)).copied().unwrap_or_else(T::zero);
+    }
+    some
 }
 
 #[cfg(test)]

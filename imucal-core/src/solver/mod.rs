@@ -4,6 +4,7 @@
 //! question: see [`crate::accept`].
 
 pub mod condition;
+pub mod gauge;
 pub mod jacobian_check;
 pub mod lm;
 pub mod report;
