@@ -2,6 +2,7 @@
 //!
 //! | model | residual | unit |
 //! | --- | --- | --- |
+//! | [`dip`] | cosine between gravity and field, against one value for all poses | – |
 //! | [`norm`] | distance of a point from the shell that calibration maps to a sphere | raw (nominal SI) |
 //! | [`turn`] | gravity's direction carried through a turn by the gyroscope, against the accelerometer's | rad |
 //! | [`unified`] | output of a triad on a rig, against what it put out | raw (nominal SI) |
@@ -13,6 +14,7 @@ use nalgebra::SVector;
 
 use crate::scalar::Scalar;
 
+pub mod dip;
 pub mod norm;
 pub mod parameterisation;
 pub mod rig;

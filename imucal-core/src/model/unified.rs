@@ -193,6 +193,16 @@ impl<const P: usize> Terms<P> {
         &self.entries
     }
 
+    /// Order in which parameter `k` is taken when the gauge is sought: K and b, what belongs to the machine, and
+    /// last the field.
+    pub fn class(&self, k: usize) -> u8 {
+        match self.entries.get(k) {
+            Some(0..=11 | 23..=31) => 0,
+            Some(14..=16) => 2,
+            _ => 1,
+        }
+    }
+
     /// The parameter vector of these entries.
     pub fn theta<T: Scalar>(&self, parameters: &UnifiedParameters<T>) -> SVector<T, P> {
         select(&self.entries, &parameters.to_vector())

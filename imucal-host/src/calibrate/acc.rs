@@ -171,6 +171,7 @@ fn summary<const P: usize>(
             .collect(),
         gain_spread: None,
         bias_wander: None,
+        rig: None,
     }
 }
 

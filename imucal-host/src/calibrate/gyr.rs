@@ -292,6 +292,7 @@ fn summarise(
         left_out: turns.left_out.clone(),
         gain_spread: None,
         bias_wander: Some(turns.wander),
+        rig: None,
     }
 }
 

@@ -119,6 +119,7 @@ fn summarise(
             .collect(),
         gain_spread: None,
         bias_wander: None,
+        rig: None,
     }
 }
 

@@ -14,11 +14,15 @@ use crate::{
 };
 
 pub mod acc;
+pub mod alignment;
 pub mod gyr;
+pub mod ladder;
 pub mod mag;
 pub mod norm_fit;
 pub mod outcome;
 pub mod outlier;
+pub mod rig;
+pub mod rig_fit;
 pub mod rows;
 pub mod segmentation;
 pub mod serial;

@@ -125,6 +125,21 @@ pub struct FitSummary {
     pub gain_spread: Option<f64>,
     /// How the gyroscope's bias moved between rests.
     pub bias_wander: Option<BiasWander>,
+    /// What belongs to the rig and not to the sensor, where there was one.
+    pub rig: Option<RigFindings>,
+}
+
+/// What a fit on a rig found of the machine: reported, and never stored in a sensor's record.
+#[derive(Clone, Debug, Default)]
+pub struct RigFindings {
+    /// Levelling tilt α, β of the base and their standard errors, rad; `None` where it was not estimated.
+    pub tilt: Option<([f64; 2], [f64; 2])>,
+    /// Hard iron on the outer and the middle gimbal, µT, with standard errors; zero where held.
+    pub sources: Option<[(Vector3<f64>, Vector3<f64>); 2]>,
+    /// Earth's field in n, µT, where it was estimated.
+    pub field_n: Option<Vector3<f64>>,
+    /// Parameters that the poses cannot tell, and what each is like.
+    pub not_told: Vec<String>,
 }
 
 /// How a bias moved from rest to rest.

@@ -1,5 +1,6 @@
 //! From samples to observations: rests, turns between them, and clouds.
 
 pub mod cloud;
+pub mod pose;
 pub mod rest;
 pub mod turn;

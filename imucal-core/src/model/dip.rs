@@ -1,0 +1,94 @@
+//! The rotation from a magnetometer's axes to an accelerometer's, from the dip of the field, which is the same in
+//! every pose.
+//!
+//! ```text
+//! r = u_fᵀ R u_b − s,   R = exp([φ]×)
+//! ```
+//!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | u_f, u_b | directions of specific force and field at rest, each in its own sensor's calibrated axes |
+//! | φ | rotation from the magnetometer's axes to the accelerometer's, rad |
+//! | s | cosine of the angle between both: minus the sine of the dip, as specific force points up |
+//!
+//! A norm is blind to rotation, so an ellipsoid leaves the magnetometer in axes of its own; the angle to gravity is
+//! what ties them. Source: Kok & Schön 2016 (IEEE Sensors J. 16(14)), there within one likelihood. Not observed: a
+//! rotation about the field, from poses that all keep gravity at one place; not modelled: a field that varies over
+//! the poses.
+
+use nalgebra::{SVector, Vector3};
+
+use super::{Model, RowSink};
+use crate::{rotation::exp_with_jacobian, scalar::Scalar};
+
+/// Directions of one pose, unit vectors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DirectionPair<T: Scalar> {
+    /// Specific force, calibrated accelerometer axes.
+    pub u_f: Vector3<T>,
+    /// Field, calibrated magnetometer axes.
+    pub u_b: Vector3<T>,
+}
+
+/// Poses with both directions; parameters φ (3) and s.
+#[derive(Clone, Copy, Debug)]
+pub struct DipModel<'a, T: Scalar> {
+    /// The poses.
+    pub pairs: &'a [DirectionPair<T>],
+}
+
+impl<T: Scalar> Model<T, 4> for DipModel<'_, T> {
+    fn rows<S: RowSink<T, 4>>(&self, theta: &SVector<T, 4>, sink: &mut S) {
+        let (rotation, jacobian) = exp_with_jacobian(&theta.xyz());
+        for pair in self.pairs {
+            let turned = rotation * pair.u_b;
+            let by_phi = jacobian.tr_mul(&turned.cross(&pair.u_f));
+            let row = SVector::<T, 4>::new(by_phi.x, by_phi.y, by_phi.z, -T::one());
+            sink.row(pair.u_f.dot(&turned) - theta.w, &row);
+        }
+    }
+
+    fn independent_rows(&self) -> usize {
+        self.pairs.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        rotation::exp,
+        solver::{LevenbergMarquardt, jacobian_check::largest_jacobian_error},
+    };
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn direction(k: u32) -> Vector3<f64> {
+        let k = f64::from(k);
+        Vector3::new((1.3 * k).sin(), (2.1 * k + 0.4).cos(), (0.7 * k + 1.0).sin()).normalize()
+    }
+
+    proptest! {
+        #[test]
+        fn the_analytic_jacobian_is_the_numerical_one(v in prop::array::uniform4(-1.0f64..1.0)) {
+            let pairs: Vec<_> = (0..5).map(|k| DirectionPair { u_f: direction(k), u_b: direction(k + 9) }).collect();
+            let model = DipModel { pairs: &pairs };
+            prop_assert!(largest_jacobian_error(&model, &SVector::from(v)) < 1e-8);
+        }
+    }
+
+    #[test]
+    fn a_known_rotation_and_dip_are_found() {
+        let (phi, field_n) = (Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.5, 0.05, 0.85).normalize());
+        let pairs: Vec<_> = (0..20)
+            .map(|k| {
+                let c_n_s = exp(&(direction(k) * f64::from(k)));
+                DirectionPair { u_f: c_n_s * -Vector3::z(), u_b: exp(&-phi) * (c_n_s * field_n) }
+            })
+            .collect();
+        let mut fit = LevenbergMarquardt::new(SVector::zeros(), Default::default());
+        assert!(fit.run(&DipModel { pairs: &pairs }).termination.was_successful());
+        assert!((fit.theta().xyz() - phi).norm() < 1e-9);
+        assert!((fit.theta().w + field_n.z).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,174 @@
+//! A magnetometer brought into the accelerometer's axes: the rotation that makes the dip the same in every rest.
+
+use imucal_core::{
+    model::dip::{DipModel, DirectionPair},
+    rotation::{cross_matrix, exp_with_jacobian},
+    solver::{LevenbergMarquardt, lm::Settings},
+    triad::Triad,
+};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use super::rows::{Residuals, Rows};
+
+/// Rests at least: four parameters, and some to check them.
+const LEAST_RESTS: usize = 8;
+/// Largest condition of the fit, and largest standard error of the rotation, rad (2°).
+const LIMITS: (f64, f64) = (60.0, 0.035);
+
+/// Where the magnetometer's axes lie against the accelerometer's.
+#[derive(Clone, Copy, Debug)]
+pub struct Alignment {
+    /// Rotation from the magnetometer's axes to the accelerometer's.
+    pub rotation: Matrix3<f64>,
+    /// Rotation vector of it, rad.
+    pub phi: Vector3<f64>,
+    /// Covariance of the rotation's error, accelerometer axes, rad².
+    pub covariance: Matrix3<f64>,
+    /// Dip of the field, rad, positive down, and its standard error.
+    pub dip: (f64, f64),
+    /// Rms of the dip over the rests, rad.
+    pub rms: f64,
+    /// The same for rests left out in turn.
+    pub held_out_rms: Option<f64>,
+    /// Rests used.
+    pub rests: usize,
+}
+
+/// Finds the rotation from calibrated pairs (specific force, field); `None` where the rests cannot tell it.
+pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Alignment> {
+    let pairs: Vec<DirectionPair<f64>> = pairs
+        .iter()
+        .map(|(f, b)| DirectionPair { u_f: f.normalize(), u_b: b.normalize() })
+        .filter(|pair| pair.u_f.iter().chain(pair.u_b.iter()).all(|x| x.is_finite()))
+        .collect();
+    if pairs.len() < LEAST_RESTS {
+        return None;
+    }
+    let model = DipModel { pairs: &pairs };
+    let solver = best(&model);
+    let report = solver.report();
+    let covariance = solver.covariance()?;
+    let (rotation, jacobian) = exp_with_jacobian(&solver.theta().xyz());
+    let own = jacobian * covariance.fixed_view::<3, 3>(0, 0) * jacobian.transpose();
+    if !report.termination.was_successful()
+        || report.condition > LIMITS.0
+        || own.diagonal().max().sqrt() > LIMITS.1
+    {
+        return None;
+    }
+    let cos = solver.theta().w.clamp(-1.0, 1.0);
+    // An error of the cosine is one of the angle, by the sine between gravity and field.
+    let per_angle = (1.0 - cos * cos).sqrt().max(1e-3);
+    Some(Alignment {
+        rotation,
+        phi: solver.theta().xyz(),
+        covariance: own,
+        dip: ((-cos).asin(), covariance[(3, 3)].sqrt() / per_angle),
+        rms: solver.variance()?.sqrt() / per_angle,
+        held_out_rms: held_out(&model, solver.theta()).map(|rms| rms / per_angle),
+        rests: pairs.len(),
+    })
+}
+
+/// The best of fits from the 24 ways in which axes can be relabelled without a mirror: a magnetometer may lie any way
+/// round on its board.
+fn best(model: &DipModel<'_, f64>) -> LevenbergMarquardt<f64, 4> {
+    let fit = |start: SVector<f64, 4>| {
+        let mut solver = LevenbergMarquardt::new(start, Settings::default());
+        solver.run(model);
+        solver
+    };
+    let mut chosen = fit(SVector::zeros());
+    for rotation in relabellings() {
+        let phi = nalgebra::Rotation3::from_matrix_unchecked(rotation).scaled_axis();
+        let other = fit(SVector::<f64, 4>::new(phi.x, phi.y, phi.z, 0.0));
+        // The nearest to no rotation wins a tie: only rounding tells them apart.
+        if other.report().cost < 0.99 * chosen.report().cost {
+            chosen = other;
+        }
+    }
+    chosen
+}
+
+fn relabellings() -> impl Iterator<Item = Matrix3<f64>> {
+    let axes = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z(), -Vector3::z()];
+    axes.into_iter()
+        .flat_map(move |a| axes.into_iter().map(move |b| (a, b)))
+        .filter(|(a, b)| a.dot(b) == 0.0)
+        .map(|(a, b)| Matrix3::from_columns(&[a, b, a.cross(&b)]))
+}
+
+fn held_out(model: &DipModel<'_, f64>, theta: &SVector<f64, 4>) -> Option<f64> {
+    let rows = Rows::of(model, theta);
+    let mut sum = 0.0;
+    for k in 0..model.pairs.len() {
+        let there = theta + rows.step_without(k..k + 1)?;
+        sum += Residuals::of(&DipModel { pairs: &model.pairs[k..=k] }, &there)
+            .iter()
+            .map(|r| r * r)
+            .sum::<f64>();
+    }
+    Some((sum / model.pairs.len() as f64).sqrt())
+}
+
+impl Alignment {
+    /// The triad in the accelerometer's axes, and the covariance of its twelve entries (gain by rows, bias).
+    /// `covariance` is that of the entries `of` before. By `dG' = R dG + [δ]× R G`.
+    pub fn turn(
+        &self,
+        triad: &Triad<f64>,
+        covariance: &nalgebra::DMatrix<f64>,
+        of: &[u8],
+    ) -> (Triad<f64>, SMatrix<f64, 12, 12>) {
+        let gain = self.rotation * triad.gain;
+        let mut by_entries = nalgebra::DMatrix::zeros(12, of.len());
+        for (column, entry) in of.iter().enumerate() {
+            match usize::from(*entry) {
+                k @ 0..9 => {
+                    for row in 0..3 {
+                        by_entries[(3 * row + k % 3, column)] = self.rotation[(row, k / 3)];
+                    }
+                }
+                k => by_entries[(k, column)] = 1.0,
+            }
+        }
+        let mut by_rotation = SMatrix::<f64, 12, 3>::zeros();
+        for axis in 0..3 {
+            let moved = cross_matrix(&Vector3::ith(axis, 1.0)) * gain;
+            for k in 0..9 {
+                by_rotation[(k, axis)] = moved[(k / 3, k % 3)];
+            }
+        }
+        let own = &by_entries * covariance * by_entries.transpose();
+        let turned = by_rotation * self.covariance * by_rotation.transpose();
+        let total = SMatrix::<f64, 12, 12>::from_fn(|i, j| own[(i, j)] + turned[(i, j)]);
+        (Triad { gain, bias: triad.bias }, total)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use imucal_core::rotation::exp;
+
+    #[test]
+    fn a_magnetometer_mounted_upside_down_is_found_so() {
+        let mounted =
+            Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0)) * exp(&Vector3::new(0.02, -0.03, 0.01));
+        let pairs: Vec<_> = (0..20)
+            .map(|k| {
+                let k = f64::from(k);
+                let c_n_s =
+                    exp(&Vector3::new(2.0 * (1.3 * k).sin(), 2.5 * (2.1 * k).cos(), 1.5 * (0.7 * k).sin()));
+                let noise = Vector3::new((7.0 * k).sin(), (11.0 * k).sin(), (13.0 * k).sin()) * 1e-3;
+                (
+                    c_n_s * Vector3::new(0.0, 0.0, -9.8),
+                    mounted.transpose() * (c_n_s * Vector3::new(25.0, 2.0, 40.0)) + noise,
+                )
+            })
+            .collect();
+        let alignment = align(&pairs).unwrap();
+        assert!((alignment.rotation - mounted).norm() < 1e-3, "{}", alignment.rotation);
+        assert!((alignment.dip.0 - (40.0f64 / 25.0f64.hypot(2.0)).atan()).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,154 @@
+//! A triad on a rig: a rung of its ladder made a calibration, with what belongs to the machine kept apart.
+
+use imucal_core::{
+    accept::{self, Limits, Refusal},
+    coverage::Coverage,
+};
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use super::{
+    ladder::Rung,
+    outcome::{FitSummary, Refused, RigFindings, SensorOutcome, entry_name},
+    rig_fit::RigFit,
+};
+use crate::{
+    observe::pose::Poses,
+    recording::{SensorKind, Triple, Unit},
+};
+
+/// Poses at least: the affine part has twelve parameters, and each pose tells three.
+const LEAST_POSES: usize = 6;
+
+/// The outcome of one rung.
+pub fn outcome(kind: SensorKind, rung: &Rung, poses: &Poses, sensor: &Triple, norm: f64) -> SensorOutcome {
+    let summary = rung.fit.triad().map(|(triad, covariance)| {
+        let directions = poses.poses.iter().map(|pose| triad.correct(&pose.value).normalize());
+        let coverage = Coverage::of(directions);
+        let unit_out = Unit::of(kind)[0];
+        (summarise(rung, sensor, unit_out, triad, covariance, coverage.share), coverage)
+    });
+    let Some((summary, coverage)) = summary else {
+        return refused(kind, rung.name, Refusal::NotFinite, None);
+    };
+    match judge(&rung.fit, &summary, &coverage, norm) {
+        Ok(()) => {
+            SensorOutcome { kind, model: rung.name, verdict: Ok(()), fit: Some(summary), evidence: None }
+        }
+        Err(refusal) => refused(kind, rung.name, refusal, Some(summary)),
+    }
+}
+
+/// A refusal with what to do.
+pub fn refused(
+    kind: SensorKind,
+    model: &'static str,
+    refusal: Refusal,
+    fit: Option<FitSummary>,
+) -> SensorOutcome {
+    let advice = match refusal {
+        Refusal::NoRest | Refusal::TooFewObservations { .. } => {
+            "hold the table still for 2 s or more in 24 poses, faces and oblique ones"
+        }
+        Refusal::PoorCoverage { .. } | Refusal::IllConditioned { .. } | Refusal::NotRedundant { .. } => {
+            "add poses upside down and oblique ones; turn all three gimbals"
+        }
+        Refusal::Implausible { .. } => {
+            "check [units], [rig] axes, the encoders' unit and signs, and [site] of the recording's TOML"
+        }
+        _ => "check the recording for motion during poses, clipping and wrong units",
+    };
+    SensorOutcome {
+        kind,
+        model,
+        verdict: Err(Refused { refusal, advice: advice.into() }),
+        fit,
+        evidence: None,
+    }
+}
+
+fn judge(fit: &RigFit, summary: &FitSummary, coverage: &Coverage<f64>, norm: f64) -> Result<(), Refusal> {
+    let limits =
+        Limits { observations: LEAST_POSES, directions: LEAST_POSES, ..Limits::for_norm(12, LEAST_POSES) };
+    accept::check_observations(coverage, fit.free(), &limits)?;
+    if fit.residuals <= fit.free() {
+        let need = fit.free() / 3 + 1;
+        return Err(Refusal::TooFewObservations { have: fit.residuals / 3, need });
+    }
+    accept::check_report(&fit.report, &limits)?;
+    accept::check_plausibility(&summary.triad, true, fit.rms / norm, &limits)
+}
+
+fn summarise(
+    rung: &Rung,
+    sensor: &Triple,
+    unit_out: Unit,
+    triad: imucal_core::triad::Triad<f64>,
+    covariance: DMatrix<f64>,
+    coverage: f64,
+) -> FitSummary {
+    let fit = &rung.fit;
+    let std = |k: usize| covariance[(k, k)].sqrt();
+    FitSummary {
+        triad,
+        gain_std: Matrix3::from_fn(|i, j| std(3 * i + j)),
+        bias_std: Vector3::from_fn(|i, _| std(9 + i)),
+        covariance,
+        covariance_of: (0..12).collect(),
+        unit_in: sensor.unit,
+        unit_out,
+        nominal: sensor.nominal,
+        rms: fit.rms,
+        held_out_rms: fit.held_out_rms,
+        observations: fit.residuals / 3,
+        parameters: fit.free(),
+        condition: fit.report.condition,
+        coverage,
+        nonlinearity: 0.0,
+        inflation: 1.0,
+        iterations: fit.report.iterations,
+        termination: fit.report.termination,
+        field_norm: None,
+        left_out: Vec::new(),
+        gain_spread: None,
+        bias_wander: None,
+        rig: Some(findings(fit)),
+    }
+}
+
+fn findings(fit: &RigFit) -> RigFindings {
+    let three = |from: u8| Vector3::from_fn(|k, _| fit.std(from + k as u8).unwrap_or(0.0));
+    let now = &fit.parameters;
+    RigFindings {
+        tilt: fit.std(12).zip(fit.std(13)).map(|(alpha, beta)| (now.tilt, [alpha, beta])),
+        sources: fit
+            .entries
+            .contains(&17)
+            .then(|| [(now.outer_source, three(17)), (now.middle_source, three(20))]),
+        field_n: fit.entries.contains(&14).then_some(now.vector_n),
+        not_told: fit
+            .held
+            .iter()
+            .map(|(entry, like)| match like {
+                Some(like) => format!("{} (like {})", unified_name(*entry), unified_name(*like)),
+                None => unified_name(*entry),
+            })
+            .collect(),
+    }
+}
+
+/// Name of an entry of the unified model.
+pub fn unified_name(entry: u8) -> String {
+    let axis = |from: u8| ["x", "y", "z"][usize::from((entry - from) % 3)];
+    match entry {
+        0..9 => entry_name(entry).replace("gain", "K"),
+        9..12 => entry_name(entry),
+        12 => "tilt_x".into(),
+        13 => "tilt_y".into(),
+        14..17 => format!("field_{}", axis(14)),
+        17..20 => format!("outer_hard_iron_{}", axis(17)),
+        20..23 => format!("middle_hard_iron_{}", axis(20)),
+        23..26 => format!("quadratic_{}", axis(23)),
+        26..29 => format!("cubic_{}", axis(26)),
+        _ => format!("cross_product_{}", axis(29)),
+    }
+}

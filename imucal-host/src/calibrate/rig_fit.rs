@@ -1,0 +1,134 @@
+//! A fit of the unified model to poses on a rig: gauge, standard errors, held-out residuals.
+
+use imucal_core::{
+    model::unified::{Terms, UnifiedModel, UnifiedParameters},
+    solver::{LevenbergMarquardt, SolveReport, gauge::Gauge, lm::Settings},
+    triad::Triad,
+};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+use super::rows::{Residuals, Rows};
+use crate::observe::pose::Poses;
+
+/// A column that its predecessors leave less than this share of is told by them: far below what noise leaves of an
+/// observable one, far above rounding.
+const TOLERANCE: f64 = 1e-5;
+
+/// One rung of a ladder, fitted.
+#[derive(Clone, Debug)]
+pub struct RigFit {
+    /// Parameters at the optimum.
+    pub parameters: UnifiedParameters<f64>,
+    /// Entries estimated.
+    pub entries: Vec<u8>,
+    /// Those of them that the poses cannot tell, with the entry each is like.
+    pub held: Vec<(u8, Option<u8>)>,
+    /// The solver's report.
+    pub report: SolveReport<f64>,
+    /// Covariance of the estimated entries; zero where held.
+    pub covariance: DMatrix<f64>,
+    /// Rms residual of an axis, with the degrees of freedom left.
+    pub rms: f64,
+    /// Rms residual of poses left out in turn, all three axes of one at a time.
+    pub held_out_rms: Option<f64>,
+    /// Sum of squared residuals.
+    pub squared_sum: f64,
+    /// Residuals used, three a pose.
+    pub residuals: usize,
+}
+
+/// Fits `terms` from `base`.
+pub fn fit<const P: usize>(poses: &Poses, base: &UnifiedParameters<f64>, terms: Terms<P>) -> RigFit {
+    let free = UnifiedModel { poses: &poses.poses, axes: poses.axes, base: *base, terms, held: 0 };
+    let mut solver = LevenbergMarquardt::new(terms.theta(base), Settings::default());
+    solver.run(&free);
+    let gauge = Gauge::of(solver.factor().r(), TOLERANCE, |k| terms.class(k));
+    let model = UnifiedModel { held: gauge.held, ..free };
+    if gauge.held != 0 {
+        let mut start = *solver.theta();
+        let at = terms.theta(base);
+        for k in (0..P).filter(|k| gauge.is_held(*k)) {
+            start[k] = at[k];
+        }
+        solver = LevenbergMarquardt::new(start, Settings::default());
+        solver.run(&model);
+    }
+    summarise(&model, &solver, &gauge)
+}
+
+fn summarise<const P: usize>(
+    model: &UnifiedModel<'_, f64, P>,
+    solver: &LevenbergMarquardt<f64, P>,
+    gauge: &Gauge<f64, P>,
+) -> RigFit {
+    let entries = model.terms.entries();
+    let held: Vec<usize> = (0..P).filter(|k| gauge.is_held(*k)).collect();
+    let mut covariance = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
+    for k in &held {
+        covariance.column_mut(*k).fill(0.0);
+        covariance.row_mut(*k).fill(0.0);
+    }
+    RigFit {
+        parameters: model.terms.parameters(&model.base, solver.theta()),
+        entries: entries.to_vec(),
+        held: held
+            .iter()
+            .map(|k| (entries[*k], gauge.like[*k].map(|like| entries[usize::from(like)])))
+            .collect(),
+        report: solver.report(),
+        covariance: DMatrix::from_column_slice(P, P, covariance.as_slice()),
+        rms: solver.variance().map_or(f64::NAN, f64::sqrt),
+        held_out_rms: held_out(model, solver.theta()),
+        squared_sum: 2.0 * solver.report().cost,
+        residuals: 3 * model.poses.len(),
+    }
+}
+
+/// Each pose left out in turn, one Gauss–Newton step from the optimum of all.
+fn held_out<const P: usize>(model: &UnifiedModel<'_, f64, P>, theta: &SVector<f64, P>) -> Option<f64> {
+    let rows = Rows::of(model, theta);
+    let mut sum = 0.0;
+    for k in 0..model.poses.len() {
+        let there = theta + rows.step_without(3 * k..3 * k + 3)?;
+        let alone = UnifiedModel { poses: &model.poses[k..=k], held: 0, ..*model };
+        sum += Residuals::of(&alone, &there).iter().map(|r| r * r).sum::<f64>();
+    }
+    Some((sum / (3 * model.poses.len()) as f64).sqrt())
+}
+
+impl RigFit {
+    /// Parameters that were estimated and not held.
+    pub fn free(&self) -> usize {
+        self.entries.len() - self.held.len()
+    }
+
+    /// Standard error of an entry; `None` where it was not estimated.
+    pub fn std(&self, entry: u8) -> Option<f64> {
+        let k = self.entries.iter().position(|e| *e == entry)?;
+        Some(self.covariance[(k, k)].sqrt())
+    }
+
+    /// Gain and bias of the triad, nominal SI in, table axes out, and their covariance in the order gain by rows,
+    /// bias. By `dG = −G dK G`.
+    pub fn triad(&self) -> Option<(Triad<f64>, DMatrix<f64>)> {
+        let gain = self.parameters.sensitivity.try_inverse()?;
+        let mut jacobian = DMatrix::zeros(12, self.entries.len());
+        for (column, entry) in self.entries.iter().enumerate() {
+            match usize::from(*entry) {
+                k @ 0..9 => {
+                    let by = -(gain.column(k / 3) * gain.row(k % 3));
+                    jacobian.set_column(column, &pad(&by));
+                }
+                k @ 9..12 => jacobian[(k, column)] = 1.0,
+                _ => {}
+            }
+        }
+        let covariance = &jacobian * &self.covariance * jacobian.transpose();
+        Some((Triad { gain, bias: self.parameters.bias }, covariance))
+    }
+}
+
+/// A gain's derivative by rows, and nothing of the bias.
+fn pad(by: &nalgebra::Matrix3<f64>) -> DVector<f64> {
+    DVector::from_iterator(12, by.transpose().iter().copied().chain([0.0; 3]))
+}

@@ -1,0 +1,152 @@
+//! Poses on a rig: rests during which the encoders stood still.
+
+use std::ops::Range;
+
+use imucal_core::{
+    model::rig::{Axis, GimbalPose, RigAxes},
+    observation::Moments,
+};
+use nalgebra::Vector3;
+
+use crate::recording::{
+    Recording, Triple,
+    manifest::{Axis as FileAxis, Rig},
+};
+
+/// Encoders that move more than this during a rest belong to no pose, rad (0.1°).
+const STILL: f64 = 1.7e-3;
+
+/// A pose lasts at least this long, s.
+const SHORTEST: f64 = 1.0;
+/// The table settles for this long after it stops, s.
+const SETTLING: f64 = 0.5;
+
+/// Why a recording gives no poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoPoses {
+    /// No encoder columns.
+    #[error("the recording has no encoder columns gimbal_outer, gimbal_middle and gimbal_inner")]
+    NoEncoders,
+    /// The manifest does not name three axes.
+    #[error(
+        "the manifest's [rig] axes must name three axes, outermost first, for example [\"z\", \"y\", \"x\"]"
+    )]
+    NoAxes,
+    /// Two neighbouring axes are the same: the rig cannot turn about a third.
+    #[error("the manifest's [rig] axes repeat a neighbour, which no three-gimbal rig does")]
+    RepeatedAxis,
+}
+
+/// Poses of one sensor and the rests they come from.
+#[derive(Clone, Debug)]
+pub struct Poses {
+    /// Mean output and encoder angles.
+    pub poses: Vec<GimbalPose<f64>>,
+    /// The rig's axes.
+    pub axes: RigAxes,
+}
+
+/// The rig's axes, of three gimbals.
+///
+/// # Errors
+/// [`NoPoses`] where the manifest does not say them, or says axes that no rig has.
+pub fn rig_axes(rig: Option<&Rig>) -> Result<RigAxes, NoPoses> {
+    let named = rig.and_then(|rig| rig.axes.as_deref()).ok_or(NoPoses::NoAxes)?;
+    let [outer, middle, inner]: [FileAxis; 3] = named.try_into().map_err(|_| NoPoses::NoAxes)?;
+    if outer == middle || middle == inner {
+        return Err(NoPoses::RepeatedAxis);
+    }
+    let axis = |axis| match axis {
+        FileAxis::X => Axis::X,
+        FileAxis::Y => Axis::Y,
+        FileAxis::Z => Axis::Z,
+    };
+    Ok(RigAxes([axis(outer), axis(middle), axis(inner)]))
+}
+
+/// Stretches in which all encoders stand still, as half-open row ranges; the table's settling is left out.
+///
+/// # Errors
+/// [`NoPoses::NoEncoders`].
+pub fn still_stretches(recording: &Recording) -> Result<Vec<Range<usize>>, NoPoses> {
+    let gimbal = recording.gimbal.as_deref().ok_or(NoPoses::NoEncoders)?;
+    let time = &recording.time;
+    let mut stretches = Vec::new();
+    let mut from = 0;
+    for k in 1..=gimbal.len() {
+        let still = gimbal.get(k).is_some_and(|angles| turned(angles, &gimbal[from]).amax() <= STILL);
+        if !still {
+            let settled = from + time[from..k].partition_point(|t| *t < time[from] + SETTLING);
+            if settled < k && time[k - 1] - time[settled] >= SHORTEST {
+                stretches.push(settled..k);
+            }
+            from = k;
+        }
+    }
+    Ok(stretches)
+}
+
+/// From one reading of the encoders to another, through the wrap; NaN where either is missing.
+fn turned(to: &[f64; 3], from: &[f64; 3]) -> Vector3<f64> {
+    // `amax` passes over NaN, which must count as having moved.
+    Vector3::from_fn(|axis, _| wrapped(to[axis] - from[axis]))
+        .map(|a| if a.is_nan() { f64::INFINITY } else { a })
+}
+
+/// The poses of a sensor: the means over stretches in which the encoders stand still.
+///
+/// # Errors
+/// [`NoPoses`] where there are no encoders or the manifest does not name the rig's axes.
+pub fn poses(recording: &Recording, sensor: &Triple, usable: &[bool]) -> Result<Poses, NoPoses> {
+    let axes = rig_axes(recording.manifest.rig.as_ref())?;
+    let gimbal = recording.gimbal.as_deref().ok_or(NoPoses::NoEncoders)?;
+    let mut poses = Vec::new();
+    for rows in still_stretches(recording)? {
+        let Some(angles) = mean_angles(&gimbal[rows.clone()]) else { continue };
+        let mut moments = Moments::default();
+        rows.filter(|k| usable[*k]).for_each(|k| moments.push(&sensor.values[k]));
+        if moments.count() > 0 {
+            poses.push(GimbalPose::new(moments.mean(), &angles));
+        }
+    }
+    Ok(Poses { poses, axes })
+}
+
+/// Mean encoder angles of a stretch, through the wrap at ±π; `None` where none is measured.
+fn mean_angles(rows: &[[f64; 3]]) -> Option<Vector3<f64>> {
+    let first = rows.first()?;
+    let sum: Vector3<f64> = rows.iter().map(|row| turned(row, first)).sum();
+    let mean = Vector3::from(*first) + sum / rows.len() as f64;
+    mean.iter().all(|angle| angle.is_finite()).then_some(mean)
+}
+
+/// An angle in (−π, π].
+fn wrapped(angle: f64) -> f64 {
+    let turn = std::f64::consts::TAU;
+    angle - turn * (angle / turn).round()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_on_both_sides_of_the_wrap_have_their_mean_there() {
+        let pi = std::f64::consts::PI;
+        let rows = [[pi - 1e-4, 0.0, 1.0], [-pi + 1e-4, 0.0, 1.0]];
+        let mean = mean_angles(&rows).unwrap();
+        assert!((wrapped(mean.x - pi)).abs() < 1e-12, "{mean}");
+    }
+
+    #[test]
+    fn a_stretch_ends_where_an_encoder_moves_or_is_missing() {
+        let time: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.01).collect();
+        let mut recording = Recording::new("x.csv", crate::recording::Manifest::default(), time);
+        let mut gimbal = vec![[0.5, 0.0, 0.0]; 1000];
+        gimbal[400..].fill([0.9, 0.0, 0.0]);
+        gimbal[700] = [f64::NAN; 3];
+        recording.gimbal = Some(gimbal);
+        // Half a second of settling is left out of each.
+        assert_eq!(still_stretches(&recording).unwrap(), [50..400, 450..700, 751..1000]);
+    }
+}
