@@ -9,16 +9,16 @@
 //! | I23 | cross-axis products (3) | | |
 //!
 //! Source: models.md 2 and 4. Rungs are compared by the F-test of what the added terms explain, and by the residual of
-//! poses left out.
+//! poses left out ([`super::compare`]).
 
 use imucal_core::model::unified::{Terms, UnifiedParameters};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use nalgebra::Vector3;
 
-use super::rig_fit::{RigFit, fit};
+use super::{
+    compare::Step,
+    rig_fit::{RigFit, fit},
+};
 use crate::observe::pose::Poses;
-
-/// A rung is taken where chance would explain its gain less often than this.
-pub const SIGNIFICANT: f64 = 1e-3;
 
 /// A rung and its fit.
 #[derive(Clone, Debug)]
@@ -27,13 +27,25 @@ pub struct Rung {
     pub name: &'static str,
     /// What it adds, in words.
     pub adds: &'static str,
-    /// Name of the rung it is compared with.
-    pub below: Option<&'static str>,
     /// Its fit.
     pub fit: RigFit,
-    /// Probability that chance alone explains as much more as its added terms do; `None` for the first.
-    pub p_value: Option<f64>,
 }
+
+/// Models of an accelerometer on a rig, lowest first, with what each adds.
+pub const ACCELEROMETER: [(&str, &str); 5] = [
+    ("T12", "bias and K, base taken as level"),
+    ("I14", "levelling of the base"),
+    ("I17", "quadratic terms"),
+    ("I20", "cubic terms"),
+    ("I23", "cross-axis products"),
+];
+/// Models of a magnetometer on a rig.
+pub const MAGNETOMETER: [(&str, &str); 4] = [
+    ("M12", "bias and K, field known"),
+    ("M15", "direction of the field"),
+    ("X18", "hard iron on the gimbals, field known"),
+    ("X21", "hard iron on the gimbals and direction of the field"),
+];
 
 const K_AND_B: [u8; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 
@@ -65,89 +77,38 @@ pub const X18: Terms<18> = with(&[17, 18, 19, 20, 21, 22]);
 /// Bias, K, hard iron on two gimbals and the field (21).
 pub const X21: Terms<21> = with(&[17, 18, 19, 20, 21, 22, 14, 15, 16]);
 
-/// Every rung of the accelerometer's ladder that the poses have residuals for.
-pub fn accelerometer(poses: &Poses, gravity: f64) -> Vec<Rung> {
-    let base = UnifiedParameters::nominal(nalgebra::Vector3::new(0.0, 0.0, -gravity));
-    let mut ladder = Ladder::new(poses);
-    ladder.climb("T12", "bias and K, base taken as level", None, || fit(poses, &base, T12), 12);
-    ladder.climb("I14", "levelling of the base", Some("T12"), || fit(poses, &base, I14), 14);
-    ladder.climb("I17", "quadratic terms", Some("I14"), || fit(poses, &base, I17), 17);
-    ladder.climb("I20", "cubic terms", Some("I17"), || fit(poses, &base, I20), 20);
-    ladder.climb("I23", "cross-axis products", Some("I20"), || fit(poses, &base, I23), 23);
-    ladder.rungs
+/// One rung of either ladder; `vector_n` is gravity's or the field's, n, SI. `None` for a name that is on no ladder,
+/// or where the poses leave no residual to judge it by.
+pub fn rung(name: &str, poses: &Poses, vector_n: Vector3<f64>) -> Option<Rung> {
+    let (name, adds) = ACCELEROMETER.into_iter().chain(MAGNETOMETER).find(|(known, _)| *known == name)?;
+    let base = UnifiedParameters::nominal(vector_n);
+    let enough = |parameters: usize| 3 * poses.poses.len() > parameters + 3;
+    let fit = match name {
+        "T12" | "M12" if enough(12) => fit(poses, &base, T12),
+        "I14" if enough(14) => fit(poses, &base, I14),
+        "I17" if enough(17) => fit(poses, &base, I17),
+        "I20" if enough(20) => fit(poses, &base, I20),
+        "I23" if enough(23) => fit(poses, &base, I23),
+        "M15" if enough(15) => fit(poses, &base, M15),
+        "X18" if enough(18) => fit(poses, &base, X18),
+        "X21" if enough(21) => fit(poses, &base, X21),
+        _ => return None,
+    };
+    Some(Rung { name, adds, fit })
 }
 
-/// Every rung of the magnetometer's ladder; `field_n` is Earth's field in n, µT.
-pub fn magnetometer(poses: &Poses, field_n: nalgebra::Vector3<f64>) -> Vec<Rung> {
-    let base = UnifiedParameters::nominal(field_n);
-    let mut ladder = Ladder::new(poses);
-    ladder.climb("M12", "bias and K, field known", None, || fit(poses, &base, T12), 12);
-    ladder.climb("M15", "direction of the field", Some("M12"), || fit(poses, &base, M15), 15);
-    ladder.climb("X18", "hard iron on the gimbals, field known", Some("M12"), || fit(poses, &base, X18), 18);
-    ladder.climb(
-        "X21",
-        "direction of the field beside hard iron",
-        Some("X18"),
-        || fit(poses, &base, X21),
-        21,
-    );
-    ladder.rungs
-}
-
-struct Ladder {
-    residuals: usize,
-    rungs: Vec<Rung>,
-}
-
-impl Ladder {
-    fn new(poses: &Poses) -> Self {
-        Self { residuals: 3 * poses.poses.len(), rungs: Vec::new() }
-    }
-
-    fn climb(
-        &mut self,
-        name: &'static str,
-        adds: &'static str,
-        below: Option<&'static str>,
-        fit: impl FnOnce() -> RigFit,
-        parameters: usize,
-    ) {
-        // With fewer residuals than that there is nothing to compare.
-        if self.residuals <= parameters + 3 {
-            return;
-        }
-        let fit = fit();
-        let p_value =
-            self.rungs.iter().find(|rung| Some(rung.name) == below).and_then(|rung| p_value(&rung.fit, &fit));
-        self.rungs.push(Rung { name, adds, below, fit, p_value });
-    }
-}
-
-/// F-test of the upper rung against the lower; `None` where it adds nothing.
-fn p_value(lower: &RigFit, upper: &RigFit) -> Option<f64> {
-    let added = upper.free().checked_sub(lower.free()).filter(|n| *n > 0)?;
-    let left = upper.residuals.checked_sub(upper.free()).filter(|n| *n > 0)?;
-    let gained = (lower.squared_sum - upper.squared_sum).max(0.0) / added as f64;
-    let f = gained / (upper.squared_sum / left as f64);
-    Some(FisherSnedecor::new(added as f64, left as f64).ok()?.sf(f))
-}
-
-/// The rung to use: the best at predicting poses left out, among those whose added terms are significant against
-/// every chosen rung below.
-pub fn choose(rungs: &[Rung]) -> Option<&Rung> {
-    let mut chosen = rungs.first()?;
-    for rung in &rungs[1..] {
-        let predicts_better =
-            rung.fit.held_out_rms.zip(chosen.fit.held_out_rms).is_some_and(|(new, old)| new < old);
-        let p_value = if contains(rung, chosen) { p_value(&chosen.fit, &rung.fit) } else { rung.p_value };
-        if predicts_better && p_value.is_some_and(|p| p < SIGNIFICANT) {
-            chosen = rung;
+impl Rung {
+    /// The rung as a comparison takes it.
+    pub fn step(&self) -> Step {
+        Step {
+            name: self.name,
+            adds: self.adds,
+            entries: self.fit.entries.clone(),
+            free: self.fit.free(),
+            residuals: self.fit.residuals,
+            squared_sum: self.fit.squared_sum,
+            rms: self.fit.rms,
+            held_out_rms: self.fit.held_out_rms,
         }
     }
-    Some(chosen)
-}
-
-/// Every entry of `lower` is one of `upper`.
-fn contains(upper: &Rung, lower: &Rung) -> bool {
-    lower.fit.entries.iter().all(|entry| upper.fit.entries.contains(entry))
 }

@@ -15,6 +15,7 @@ use crate::{
 
 pub mod acc;
 pub mod alignment;
+pub mod compare;
 pub mod gyr;
 pub mod ladder;
 pub mod mag;
