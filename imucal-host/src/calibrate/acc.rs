@@ -12,6 +12,7 @@ use imucal_core::{
 use nalgebra::Vector3;
 
 use super::{
+    compare::{self, Comparison, Step},
     norm_fit::{NormFit, NormProblem, dynamic, raw_coverage},
     outcome::{Evidence, FitSummary, Refused, SensorOutcome},
 };
@@ -67,6 +68,40 @@ pub fn trial(rests: &[Rest<f64>], gravity: f64) -> Option<(Triad<f64>, f64)> {
         let fit = problem.fit(&Triad::identity());
         (UPPER_TRIANGULAR.triad(fit.solver.theta()), fit.rms())
     })
+}
+
+/// The ladder of the field form, T6 and T9; `None` where there are too few rests for either.
+pub fn compare(rests: &[Rest<f64>], gravity: f64) -> Option<Comparison> {
+    let points = points(rests);
+    let mut steps = Vec::new();
+    if points.len() > 7 {
+        steps.push(step("T6", "bias and scale", &points, gravity, DIAGONAL));
+    }
+    if points.len() > 10 {
+        steps.push(step("T9", "non-orthogonality", &points, gravity, UPPER_TRIANGULAR));
+    }
+    compare::climb(SensorKind::Acc, steps)
+}
+
+fn step<const P: usize>(
+    name: &'static str,
+    adds: &'static str,
+    points: &[ShellPoint<f64>],
+    gravity: f64,
+    form: Parameterisation<P>,
+) -> Step {
+    let problem = NormProblem { points, norm: gravity, form, serial: false };
+    let fit = problem.fit(&Triad::identity());
+    Step {
+        name,
+        adds,
+        entries: form.entries().to_vec(),
+        free: P,
+        residuals: fit.points.len(),
+        squared_sum: 2.0 * fit.report.cost,
+        rms: fit.rms(),
+        held_out_rms: problem.leave_one_out_rms(&fit),
+    }
 }
 
 /// Calibrates from rests; `gravity` is the local one, m/s².

@@ -41,11 +41,24 @@ pub struct Options {
     pub skip: Vec<SensorKind>,
     /// Multiples of the initial rest's variance to try.
     pub multipliers: Vec<f64>,
+    /// The accelerometer's rung of [`ladder::ACCELEROMETER`] where the recording has a rig; `None` for the field form.
+    pub rig_acc: Option<&'static str>,
+    /// The magnetometer's rung of [`ladder::MAGNETOMETER`]; `None` for the field form.
+    pub rig_mag: Option<&'static str>,
+    /// Climb the ladders and say which rung to use.
+    pub compare: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { acc: AccModel::T9, skip: Vec::new(), multipliers: segmentation::MULTIPLIERS.to_vec() }
+        Self {
+            acc: AccModel::T9,
+            skip: Vec::new(),
+            multipliers: segmentation::MULTIPLIERS.to_vec(),
+            rig_acc: Some("I14"),
+            rig_mag: Some("X18"),
+            compare: false,
+        }
     }
 }
 
@@ -59,6 +72,7 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         serial: recording.manifest.sensor.serial.clone().unwrap_or_default(),
         sensors: Vec::new(),
         segmentation: None,
+        comparisons: Vec::new(),
         warnings: Vec::new(),
     };
     integrity_warnings(&integrity, &mut calibration.warnings);
@@ -67,7 +81,8 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         progress("fitting the magnetometer");
         let field = recording.manifest.site.field_ned_ut.map(|f| Vector3::from(f).norm());
         let usable = usable(&integrity, SensorKind::Mag, recording.rows());
-        calibration.sensors.push(mag::calibrate(mag, &usable, field));
+        let on_rig = rig::magnetometer(recording, mag, &usable, options, &mut calibration);
+        calibration.sensors.push(on_rig.unwrap_or_else(|| mag::calibrate(mag, &usable, field)));
     }
     calibration
 }
@@ -144,7 +159,14 @@ fn inertial(
     };
 
     progress("fitting the accelerometer");
-    let result = acc::calibrate(&chosen.rests, acc, gravity, options.acc);
+    let on_rig = rig::accelerometer(recording, acc, &usable, gravity, options, calibration);
+    let result = on_rig.map_or_else(
+        || acc::calibrate(&chosen.rests, acc, gravity, options.acc),
+        |outcome| acc::AccResult { outcome, used: (0..chosen.rests.len()).collect() },
+    );
+    if options.compare && recording.gimbal.is_none() {
+        calibration.comparisons.extend(acc::compare(&chosen.rests, gravity));
+    }
     let mut trials: Vec<_> = cuts.iter().map(Cut::trial).collect();
     let mut acc_outcome = result.outcome;
     if let Some(fit) = &mut acc_outcome.fit {

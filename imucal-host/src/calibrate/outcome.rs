@@ -3,6 +3,7 @@
 use imucal_core::{accept::Refusal, observation::ShellPoint, solver::Termination, triad::Triad};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
+use super::compare::Comparison;
 use crate::{
     observe::turn::TurnData,
     recording::{Nominal, SensorKind, Unit},
@@ -21,6 +22,8 @@ pub struct Calibration {
     pub sensors: Vec<SensorOutcome>,
     /// How the recording was cut into rests; `None` without an accelerometer.
     pub segmentation: Option<SegmentationReport>,
+    /// The ladders, where they were climbed.
+    pub comparisons: Vec<Comparison>,
     /// What the user should know besides.
     pub warnings: Vec<String>,
 }

@@ -7,20 +7,99 @@ use imucal_core::{
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{
-    ladder::Rung,
-    outcome::{FitSummary, Refused, RigFindings, SensorOutcome, entry_name},
+    Options, compare,
+    ladder::{self, Rung},
+    outcome::{Calibration, FitSummary, Refused, RigFindings, SensorOutcome, entry_name},
     rig_fit::RigFit,
 };
 use crate::{
-    observe::pose::Poses,
-    recording::{SensorKind, Triple, Unit},
+    observe::pose::{self, Poses},
+    recording::{Recording, SensorKind, Triple, Unit},
 };
 
 /// Poses at least: the affine part has twelve parameters, and each pose tells three.
 const LEAST_POSES: usize = 6;
 
+/// The accelerometer on a rig; `None` where there is none, or the field form is asked for.
+pub fn accelerometer(
+    recording: &Recording,
+    sensor: &Triple,
+    usable: &[bool],
+    gravity: f64,
+    options: &Options,
+    calibration: &mut Calibration,
+) -> Option<SensorOutcome> {
+    let name = options.rig_acc?;
+    let poses = poses(recording, sensor, usable, calibration)?;
+    let down = Vector3::new(0.0, 0.0, -gravity);
+    if options.compare {
+        let steps = ladder::ACCELEROMETER.iter().filter_map(|(name, _)| ladder::rung(name, &poses, down));
+        calibration
+            .comparisons
+            .extend(compare::climb(SensorKind::Acc, steps.map(|rung| rung.step()).collect()));
+    }
+    let Some(mut rung) = ladder::rung(name, &poses, down) else {
+        return Some(too_few(SensorKind::Acc, name, &poses));
+    };
+    let tilt_held = rung.fit.held.iter().any(|(entry, _)| matches!(entry, 12 | 13));
+    if tilt_held && let Some(lower) = ladder::rung("T12", &poses, down) {
+        calibration.warnings.push(format!(
+            "acc: the poses cannot tell the base's tilt from K; kept T12 instead of {name}, base taken as level"
+        ));
+        rung = lower;
+    }
+    Some(outcome(SensorKind::Acc, &rung, &poses, sensor, gravity))
+}
+
+/// The magnetometer on a rig whose site has a known field; `None` otherwise, or where the field form is asked for.
+pub fn magnetometer(
+    recording: &Recording,
+    sensor: &Triple,
+    usable: &[bool],
+    options: &Options,
+    calibration: &mut Calibration,
+) -> Option<SensorOutcome> {
+    let name = options.rig_mag?;
+    let field = Vector3::from(recording.manifest.site.field_ned_ut?);
+    let poses = poses(recording, sensor, usable, calibration)?;
+    if options.compare {
+        let steps = ladder::MAGNETOMETER.iter().filter_map(|(name, _)| ladder::rung(name, &poses, field));
+        calibration
+            .comparisons
+            .extend(compare::climb(SensorKind::Mag, steps.map(|rung| rung.step()).collect()));
+    }
+    let Some(rung) = ladder::rung(name, &poses, field) else {
+        return Some(too_few(SensorKind::Mag, name, &poses));
+    };
+    Some(outcome(SensorKind::Mag, &rung, &poses, sensor, field.norm()))
+}
+
+/// The poses of a recording that has encoders; what is wrong with them is said once.
+fn poses(
+    recording: &Recording,
+    sensor: &Triple,
+    usable: &[bool],
+    calibration: &mut Calibration,
+) -> Option<Poses> {
+    recording.gimbal.as_ref()?;
+    match pose::poses(recording, sensor, usable) {
+        Ok(poses) => Some(poses),
+        Err(why) => {
+            let warning = format!("the rig is not used: {why}");
+            if !calibration.warnings.contains(&warning) {
+                calibration.warnings.push(warning);
+            }
+            None
+        }
+    }
+}
+
+fn too_few(kind: SensorKind, name: &'static str, poses: &Poses) -> SensorOutcome {
+    refused(kind, name, Refusal::TooFewObservations { have: poses.poses.len(), need: LEAST_POSES }, None)
+}
+
 /// The outcome of one rung.
-pub fn outcome(kind: SensorKind, rung: &Rung, poses: &Poses, sensor: &Triple, norm: f64) -> SensorOutcome {
+fn outcome(kind: SensorKind, rung: &Rung, poses: &Poses, sensor: &Triple, norm: f64) -> SensorOutcome {
     let summary = rung.fit.triad().map(|(triad, covariance)| {
         let directions = poses.poses.iter().map(|pose| triad.correct(&pose.value).normalize());
         let coverage = Coverage::of(directions);
@@ -39,7 +118,7 @@ pub fn outcome(kind: SensorKind, rung: &Rung, poses: &Poses, sensor: &Triple, no
 }
 
 /// A refusal with what to do.
-pub fn refused(
+fn refused(
     kind: SensorKind,
     model: &'static str,
     refusal: Refusal,

@@ -21,8 +21,11 @@ const SHORTEST: f64 = 1.0;
 /// The table settles for this long after it stops, s.
 const SETTLING: f64 = 0.5;
 
+/// Encoders that do not wrap may count a turn; no gimbal shows more, rad.
+const LARGEST: f64 = 6.6;
+
 /// Why a recording gives no poses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoPoses {
     /// No encoder columns.
     #[error("the recording has no encoder columns gimbal_outer, gimbal_middle and gimbal_inner")]
@@ -32,6 +35,14 @@ pub enum NoPoses {
         "the manifest's [rig] axes must name three axes, outermost first, for example [\"z\", \"y\", \"x\"]"
     )]
     NoAxes,
+    /// Angles that no encoder in radians shows.
+    #[error(
+        "encoder angles reach {largest:.1}, expected −π to π: the file is in degrees; say [units] gimbal = \"deg\""
+    )]
+    Degrees {
+        /// Largest angle, rad as the file claims.
+        largest: f64,
+    },
     /// Two neighbouring axes are the same: the rig cannot turn about a third.
     #[error("the manifest's [rig] axes repeat a neighbour, which no three-gimbal rig does")]
     RepeatedAxis,
@@ -100,6 +111,10 @@ fn turned(to: &[f64; 3], from: &[f64; 3]) -> Vector3<f64> {
 pub fn poses(recording: &Recording, sensor: &Triple, usable: &[bool]) -> Result<Poses, NoPoses> {
     let axes = rig_axes(recording.manifest.rig.as_ref())?;
     let gimbal = recording.gimbal.as_deref().ok_or(NoPoses::NoEncoders)?;
+    let largest = gimbal.iter().flatten().filter(|a| a.is_finite()).fold(0.0f64, |most, a| most.max(a.abs()));
+    if largest > LARGEST {
+        return Err(NoPoses::Degrees { largest });
+    }
     let mut poses = Vec::new();
     for rows in still_stretches(recording)? {
         let Some(angles) = mean_angles(&gimbal[rows.clone()]) else { continue };

@@ -4,7 +4,11 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 use serde_json::{Value, json};
 
 use crate::{
-    calibrate::{Calibration, FitSummary, SegmentationReport, SensorOutcome, outcome::entry_name},
+    calibrate::{
+        Calibration, FitSummary, SegmentationReport, SensorOutcome,
+        compare::Comparison,
+        outcome::{RigFindings, entry_name},
+    },
     recording::SensorKind,
     store::FORMAT,
 };
@@ -22,6 +26,7 @@ pub fn calibration(calibration: &Calibration) -> Value {
         "sensor": {"name": calibration.sensor_name, "serial": calibration.serial},
         "sensors": sensors,
         "segmentation": calibration.segmentation.as_ref().map(segmentation),
+        "compare": calibration.comparisons.iter().map(comparison).collect::<Vec<_>>(),
         "warnings": calibration.warnings,
     })
 }
@@ -69,11 +74,7 @@ fn fit_value(kind: SensorKind, fit: &FitSummary) -> Value {
         SensorKind::Gyr => "rad".into(),
         _ => fit.unit_out.to_string(),
     };
-    let rig = match kind {
-        SensorKind::Acc => json!({"tilt_x": null, "tilt_y": null, "tilt_std": null}),
-        SensorKind::Gyr => Value::Null,
-        SensorKind::Mag => json!({"outer_hard_iron": null, "middle_hard_iron": null}),
-    };
+    let rig = rig(kind, fit.rig.as_ref());
     json!({
         "gain": rows(&triad.gain),
         "bias": vector(&triad.bias),
@@ -100,6 +101,52 @@ fn fit_value(kind: SensorKind, fit: &FitSummary) -> Value {
         "bias_interpolated": fit.bias_wander.map(|w| w.interpolated),
         "rig": rig,
     })
+}
+
+/// What belongs to the machine; null where it was not estimated.
+fn rig(kind: SensorKind, found: Option<&RigFindings>) -> Value {
+    let not_told = found.map(|rig| &rig.not_told);
+    match kind {
+        SensorKind::Acc => {
+            let tilt = found.and_then(|rig| rig.tilt);
+            json!({
+                "tilt_x": tilt.map(|(tilt, _)| tilt[0]),
+                "tilt_y": tilt.map(|(tilt, _)| tilt[1]),
+                "tilt_std": tilt.map(|(_, std)| std),
+                "not_told": not_told,
+            })
+        }
+        SensorKind::Gyr => Value::Null,
+        SensorKind::Mag => {
+            let sources = found.and_then(|rig| rig.sources);
+            json!({
+                "outer_hard_iron": sources.map(|[outer, _]| vector(&outer.0)),
+                "outer_hard_iron_std": sources.map(|[outer, _]| vector(&outer.1)),
+                "middle_hard_iron": sources.map(|[_, middle]| vector(&middle.0)),
+                "middle_hard_iron_std": sources.map(|[_, middle]| vector(&middle.1)),
+                "field_n": found.and_then(|rig| rig.field_n).as_ref().map(vector),
+                "not_told": not_told,
+            })
+        }
+    }
+}
+
+fn comparison(comparison: &Comparison) -> Value {
+    let rungs: Vec<Value> = comparison
+        .rungs
+        .iter()
+        .map(|(step, p_value)| {
+            json!({
+                "model": step.name,
+                "adds": step.adds,
+                "parameters": step.free,
+                "rms": step.rms,
+                "held_out_rms": step.held_out_rms,
+                "p_value": p_value,
+            })
+        })
+        .collect();
+    json!({"sensor": comparison.kind.prefix(), "rungs": rungs, "use": comparison.chosen, "why": comparison.why})
 }
 
 fn segmentation(segmentation: &SegmentationReport) -> Value {

@@ -4,7 +4,9 @@ use std::fmt::{self, Write};
 
 use super::measure::{measure, plain};
 use crate::{
-    calibrate::{Calibration, FitSummary, SegmentationReport, SensorOutcome},
+    calibrate::{
+        Calibration, FitSummary, SegmentationReport, SensorOutcome, compare::Comparison, outcome::RigFindings,
+    },
     recording::SensorKind,
 };
 
@@ -52,7 +54,30 @@ fn write_table(text: &mut String, calibration: &Calibration) -> fmt::Result {
         writeln!(text)?;
         write_sensor(text, outcome)?;
     }
-    Ok(())
+    calibration.comparisons.iter().try_for_each(|comparison| write_comparison(text, comparison))
+}
+
+fn write_comparison(text: &mut String, comparison: &Comparison) -> fmt::Result {
+    writeln!(text)?;
+    writeln!(text, "{}: models compared", words(comparison.kind))?;
+    writeln!(
+        text,
+        "  {:<5} {:<52} {:>10} {:>10} {:>10} {:>9}",
+        "model", "adds", "parameters", "rms", "held out", "chance"
+    )?;
+    for (step, p_value) in &comparison.rungs {
+        writeln!(
+            text,
+            "  {:<5} {:<52} {:>10} {:>10} {:>10} {:>9}",
+            step.name,
+            step.adds,
+            step.free,
+            plain(step.rms),
+            step.held_out_rms.map_or_else(|| "-".into(), plain),
+            p_value.map_or_else(|| "-".into(), |p| format!("{p:.1e}"))
+        )?;
+    }
+    writeln!(text, "  use {}: {}", comparison.chosen, comparison.why)
 }
 
 fn write_segmentation(text: &mut String, segmentation: &SegmentationReport) -> fmt::Result {
@@ -143,8 +168,26 @@ fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {
             wander.spread.norm().to_degrees() / 3f64.sqrt()
         )?;
     }
+    if let Some(rig) = &fit.rig {
+        write_rig(text, rig)?;
+    }
     for left in &fit.left_out {
         writeln!(text, "  left out: {left}")?;
+    }
+    Ok(())
+}
+
+fn write_rig(text: &mut String, rig: &RigFindings) -> fmt::Result {
+    if let Some((tilt, std)) = rig.tilt {
+        let degrees = |k: usize| measure(tilt[k].to_degrees(), std[k].to_degrees());
+        writeln!(text, "  of the rig: base tilted by {}° about x and {}° about y", degrees(0), degrees(1))?;
+    }
+    for (name, (source, std)) in ["outer", "middle"].into_iter().zip(rig.sources.iter().flatten()) {
+        let parts: Vec<String> = (0..3).map(|k| measure(source[k], std[k])).collect();
+        writeln!(text, "  of the rig: hard iron on the {name} gimbal {} uT", parts.join(", "))?;
+    }
+    if !rig.not_told.is_empty() {
+        writeln!(text, "  not told by these poses, held: {}", rig.not_told.join(", "))?;
     }
     Ok(())
 }
