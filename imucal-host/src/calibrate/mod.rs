@@ -139,7 +139,11 @@ fn inertial(
     };
 
     progress("fitting the accelerometer");
-    let result = acc::calibrate(&chosen.rests, acc, gravity, options.acc);
+    let result = if never_moved(&chosen.rows, recording.rows()) {
+        acc::never_moved(options.acc)
+    } else {
+        acc::calibrate(&chosen.rests, acc, gravity, options.acc)
+    };
     let mut trials: Vec<_> = cuts.iter().map(Cut::trial).collect();
     let mut acc_outcome = result.outcome;
     if let Some(fit) = &mut acc_outcome.fit {
@@ -170,6 +174,12 @@ fn inertial(
         gain_spread: spreads.fold(0.0, f64::max),
         trials,
     });
+}
+
+/// One rest that is all but the whole recording: the windows at its ends take a little.
+fn never_moved(rests: &[std::ops::Range<usize>], rows: usize) -> bool {
+    const ALL: f64 = 0.9;
+    matches!(rests, [only] if only.len() as f64 > ALL * rows as f64)
 }
 
 /// What all of a gyroscope's fits share.
