@@ -267,7 +267,7 @@ fn ellipsoids_of_stored_clouds_are_scipy_s_down_to_a_tenth_of_the_sphere() {
     }
 }
 
-/// One term of the departures below, by name, so that a failure says which.
+/// Residuals of a model, in its order.
 struct Residuals(Vec<f64>);
 
 impl RowSink<f64, 9> for Residuals {
