@@ -247,9 +247,21 @@ pub fn check_report<T: Scalar>(report: &SolveReport<T>, limits: &Limits) -> Resu
     Ok(())
 }
 
+/// Where the cost's rounding is a larger share of the rise that is looked for, the rise tells nothing: the residuals
+/// are hardly more than rounding themselves, and standard errors that small stay on the parabola.
+const ROUNDING_SHARE: f64 = 0.1;
+
+/// How far rounding moves the sum of squares: 2 Σ r e, with e the rounding of the terms that a residual is made of.
+fn rounding_of_cost<T: Scalar, const P: usize>(fit: &LevenbergMarquardt<T, P>, variance: T) -> T {
+    let here = fit.factor().squared_sum();
+    let rows = here / variance + T::of(P as f64);
+    let terms = fit.theta().component_mul(&fit.factor().column_norms()).norm_squared();
+    (here * terms / rows).root() * T::EPSILON * T::of(2.0)
+}
+
 /// How far the cost departs from its parabola one standard error along the weakest direction, relative to the
 /// parabola's own rise: 0 for a linear model. `inflation` multiplies the standard error (for residuals that are
-/// not independent). Infinite where there is no redundancy.
+/// not independent). Infinite where there is no redundancy; 0 where the residuals are no more than rounding.
 ///
 /// Two passes over the observations. On clouds over parts of a sphere this is what parts answers whose standard
 /// errors hold from those where they do not; the condition number alone does not know the noise.
@@ -262,7 +274,7 @@ pub fn nonlinearity<T: Scalar, const P: usize>(
         return T::LARGEST;
     };
     let here = fit.factor().squared_sum();
-    if variance <= T::EPSILON * T::EPSILON * here || here == T::zero() {
+    if here == T::zero() {
         return T::zero();
     }
     let Some(unit) = weakest_direction(fit.factor().r()) else {
@@ -272,6 +284,9 @@ pub fn nonlinearity<T: Scalar, const P: usize>(
     let rise = (fit.factor().r() * unit).norm_squared().root();
     let step: SVector<T, P> = unit * (variance.root() * inflation / rise);
     let expected = variance * inflation * inflation;
+    if rounding_of_cost(fit, variance) > expected * T::of(ROUNDING_SHARE) {
+        return T::zero();
+    }
     let mut worst = T::zero();
     for trial in [fit.theta() + step, fit.theta() - step] {
         let mut sum = SquaredSum(T::zero());
@@ -339,7 +354,11 @@ pub fn check_plausibility<T: Scalar>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Matrix3;
+    use crate::{
+        model::{norm::NormModel, parameterisation::UPPER_TRIANGULAR},
+        observation::ShellPoint,
+    };
+    use nalgebra::{Matrix3, Vector3};
 
     fn coverage(observations: usize, share: f64, flatness: f64, distinct: usize) -> Coverage<f64> {
         Coverage { observations, share, flatness, distinct }
@@ -359,8 +378,26 @@ mod tests {
     }
 
     #[test]
+    fn a_cloud_without_noise_is_not_judged_by_its_rounding() {
+        let points: std::vec::Vec<_> = (0..200u32)
+            .map(|k| {
+                let z = 1.0 - (2.0 * f64::from(k) + 1.0) / 200.0;
+                let (r, a) = ((1.0 - z * z).sqrt(), 2.399_963 * f64::from(k));
+                let on_shell = Vector3::new(1.1 * r * a.cos(), 0.9 * r * a.sin(), z);
+                ShellPoint::new(on_shell + Vector3::new(1.3, -0.7, 0.9))
+            })
+            .collect();
+        let model = NormModel { points: &points, norm: 1.0, form: UPPER_TRIANGULAR };
+        let near = Triad { gain: Matrix3::identity(), bias: Vector3::new(1.0, -0.5, 0.7) };
+        let mut fit = LevenbergMarquardt::new(UPPER_TRIANGULAR.theta(&near), Default::default());
+        assert!(fit.run(&model).termination.was_successful());
+        assert!(fit.variance().unwrap() > 0.0, "rounding leaves something");
+        assert_eq!(nonlinearity(&fit, &model, 1.0), 0.0);
+    }
+
+    #[test]
     fn a_gain_of_three_times_nominal_is_implausible() {
-        let triad = Triad { gain: Matrix3::identity() * 3.0f32, bias: nalgebra::Vector3::zeros() };
+        let triad = Triad { gain: Matrix3::identity() * 3.0f32, bias: Vector3::zeros() };
         let verdict = check_plausibility(&triad, true, 0.0, &Limits::for_norm(9, 10));
         assert_eq!(verdict.unwrap_err().reason(), "implausible");
         assert!(check_plausibility(&triad, false, 0.0, &Limits::for_norm(9, 10)).is_ok());

@@ -1,4 +1,6 @@
 //! Shared fixtures of the cross-crate tests.
 
+pub mod clouds;
 pub mod data;
 pub mod firmware;
+pub mod golden;

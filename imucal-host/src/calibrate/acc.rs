@@ -104,6 +104,24 @@ fn step<const P: usize>(
     }
 }
 
+/// The outcome where the sensor lay still from beginning to end.
+pub fn never_moved(model: AccModel) -> AccResult {
+    refused(Refusal::NoMotion, None, model)
+}
+
+fn refused(refusal: Refusal, fit: Option<FitSummary>, model: AccModel) -> AccResult {
+    AccResult {
+        outcome: SensorOutcome {
+            kind: SensorKind::Acc,
+            model: model.name(),
+            verdict: Err(Refused { advice: advice(&refusal, model), refusal }),
+            fit,
+            evidence: None,
+        },
+        used: Vec::new(),
+    }
+}
+
 /// Calibrates from rests; `gravity` is the local one, m/s².
 pub fn calibrate(rests: &[Rest<f64>], sensor: &Triple, gravity: f64, model: AccModel) -> AccResult {
     match model {
@@ -121,16 +139,7 @@ fn with_form<const P: usize>(
 ) -> AccResult {
     let points = points(rests);
     let limits = Limits::for_norm(P, model.directions());
-    let refuse = |refusal: Refusal, fit: Option<FitSummary>| AccResult {
-        outcome: SensorOutcome {
-            kind: SensorKind::Acc,
-            model: model.name(),
-            verdict: Err(Refused { advice: advice(&refusal, model), refusal }),
-            fit,
-            evidence: None,
-        },
-        used: Vec::new(),
-    };
+    let refuse = |refusal: Refusal, fit: Option<FitSummary>| refused(refusal, fit, model);
     if points.is_empty() {
         return refuse(Refusal::NoRest, None);
     }
@@ -217,6 +226,9 @@ fn advice(refusal: &Refusal, model: AccModel) -> String {
             "record at least ten poses that differ by 15° or more, oblique ones among them; six faces support the \
              six parameters of --model acc=T6"
                 .into()
+        }
+        Refusal::NoMotion => {
+            "lay the sensor still for 2 s in each of ten poses or more, turned by 15° or more from each other".into()
         }
         Refusal::TooFewObservations { .. } | Refusal::NotRedundant { .. } => {
             "record more poses at rest, each turned by 15° or more from the others".into()

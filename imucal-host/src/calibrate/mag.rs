@@ -9,7 +9,7 @@ use imucal_core::{
 use nalgebra::{SMatrix, SVector};
 
 use super::{
-    norm_fit::{NormFit, NormProblem, dynamic},
+    norm_fit::{NormFit, NormProblem, dynamic, raw_coverage},
     outcome::{Evidence, FitSummary, Refused, SensorOutcome},
 };
 use crate::{
@@ -56,14 +56,20 @@ fn fit(points: &[ShellPoint<f64>], sensor: &Triple, field: Option<f64>) -> Resul
         return Err(Refusal::TooFewObservations { have: points.len(), need: limits.observations });
     }
     // Without a known field the radius is a gauge: that of a sphere through the cloud keeps gains near one.
-    let flat = Refusal::PoorCoverage {
-        coverage: 0.0,
-        flatness: 0.0,
+    let poor = |coverage: f64, flatness: f64| Refusal::PoorCoverage {
+        coverage,
+        flatness,
         need_coverage: limits.coverage,
         need_flatness: limits.flatness,
     };
-    let radius = sphere::start(points, 1.0).map(|t| 1.0 / t.gain.m11).ok_or(flat)?;
-    let norm = field.unwrap_or(radius);
+    let flat = poor(0.0, 0.0);
+    let sphere = sphere::start(points, 1.0).ok_or(flat)?;
+    // A circle with a little noise has an ellipsoid as thin as the noise, seen from which it covers every direction.
+    let seen = raw_coverage(points, &sphere.bias);
+    if seen.flatness < limits.flatness {
+        return Err(poor(seen.share, seen.flatness));
+    }
+    let norm = field.unwrap_or(1.0 / sphere.gain.m11);
     let problem = NormProblem { points, norm, form: UPPER_TRIANGULAR, serial: true };
     let fit = best_fit(&problem).ok_or(flat)?;
     let coverage = problem.coverage(&fit);
@@ -112,15 +118,27 @@ fn summarise(
         iterations: fit.report.iterations,
         termination: fit.report.termination,
         field_norm: None,
-        left_out: fit
-            .left_out
-            .iter()
-            .map(|(k, size)| format!("point {}: {size:.1} robust standard deviations", k + 1))
-            .collect(),
+        left_out: stretches(&fit.left_out),
         gain_spread: None,
         bias_wander: None,
         rig: None,
     }
+}
+
+/// Points left out, those in a row as one: a magnet near by takes hundreds.
+fn stretches(left_out: &[(usize, f64)]) -> Vec<String> {
+    left_out
+        .chunk_by(|a, b| b.0 == a.0 + 1)
+        .map(|stretch| {
+            let (first, last) = (stretch[0].0 + 1, stretch[stretch.len() - 1].0 + 1);
+            let most = stretch.iter().map(|(_, size)| *size).fold(0.0, f64::max);
+            if first == last {
+                format!("point {first}: {most:.1} robust standard deviations")
+            } else {
+                format!("points {first} to {last}: up to {most:.1} robust standard deviations")
+            }
+        })
+        .collect()
 }
 
 /// Gauge of a magnetometer alone: gain of determinant 1, so that the field's length is what the cloud shows.
@@ -164,4 +182,21 @@ fn advice(refusal: &Refusal) -> String {
         _ => "check the recording for clipping, and for iron that moved",
     }
     .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_left_out_in_a_row_are_one_stretch() {
+        let words = stretches(&[(3, 8.0), (4, 9.5), (5, 7.5), (9, 7.2)]);
+        assert_eq!(
+            words,
+            [
+                "points 4 to 6: up to 9.5 robust standard deviations",
+                "point 10: 7.2 robust standard deviations"
+            ]
+        );
+    }
 }

@@ -160,10 +160,11 @@ fn inertial(
 
     progress("fitting the accelerometer");
     let on_rig = rig::accelerometer(recording, acc, &usable, gravity, options, calibration);
-    let result = on_rig.map_or_else(
-        || acc::calibrate(&chosen.rests, acc, gravity, options.acc),
-        |outcome| acc::AccResult { outcome, used: (0..chosen.rests.len()).collect() },
-    );
+    let result = match on_rig {
+        Some(outcome) => acc::AccResult { outcome, used: (0..chosen.rests.len()).collect() },
+        None if never_moved(&chosen.rows, recording.rows()) => acc::never_moved(options.acc),
+        None => acc::calibrate(&chosen.rests, acc, gravity, options.acc),
+    };
     if options.compare && recording.gimbal.is_none() {
         calibration.comparisons.extend(acc::compare(&chosen.rests, gravity));
     }
@@ -197,6 +198,12 @@ fn inertial(
         gain_spread: spreads.fold(0.0, f64::max),
         trials,
     });
+}
+
+/// One rest that is all but the whole recording: the windows at its ends take a little.
+fn never_moved(rests: &[std::ops::Range<usize>], rows: usize) -> bool {
+    const ALL: f64 = 0.9;
+    matches!(rests, [only] if only.len() as f64 > ALL * rows as f64)
 }
 
 /// What all of a gyroscope's fits share.

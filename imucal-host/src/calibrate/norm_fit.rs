@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
 use super::{
-    outlier::outliers,
+    outlier::{MOST, outliers},
     rows::{Residuals, Rows},
     serial,
 };
@@ -64,16 +64,27 @@ impl<const P: usize> NormProblem<'_, P> {
         solver
     }
 
-    /// Fits from `start`, leaving out gross outliers.
+    /// Fits from `start`, leaving out gross outliers; where all rounds together would leave out more than [`MOST`],
+    /// none is.
     pub fn fit(&self, start: &Triad<f64>) -> NormFit<P> {
+        let fit = self.fit_leaving_out(start, ROUNDS);
+        let too_many = fit.left_out.len() as f64 > MOST * self.points.len() as f64;
+        if too_many { self.fit_leaving_out(start, 0) } else { fit }
+    }
+
+    /// Fits with up to so many rounds of leaving out.
+    fn fit_leaving_out(&self, start: &Triad<f64>, rounds: usize) -> NormFit<P> {
         let mut used: Vec<usize> = (0..self.points.len()).collect();
         let mut points = self.points.to_vec();
         let mut left_out = Vec::new();
         let mut solver = self.solve(&points, self.form.theta(start));
-        for _ in 0..ROUNDS {
+        for round in 0..=rounds {
             if self.serial {
                 self.expect_curvature(&mut points, &solver);
                 solver = self.solve(&points, *solver.theta());
+            }
+            if round == rounds {
+                break;
             }
             let found = outliers(&Residuals::of(&self.model(&points), solver.theta()));
             if found.is_empty() {

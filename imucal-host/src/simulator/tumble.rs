@@ -59,9 +59,15 @@ impl Tumble {
                 attitudes[attitudes.len() - 1] * UnitQuaternion::from_axis_angle(&axis, angle.to_radians());
             attitudes.push(turned);
         }
+        Self::through(attitudes, (10.0, 3.0, 2.0))
+    }
+
+    /// Rests in the attitudes given, `C_q_n`, at least one; durations of the first rest, of the others and of turns, s.
+    pub fn through(attitudes: Vec<UnitQuaternion<f64>>, durations: (f64, f64, f64)) -> Self {
+        debug_assert!(!attitudes.is_empty());
         Self {
             attitudes,
-            durations: (10.0, 3.0, 2.0),
+            durations,
             gravity: 9.7997,
             latitude: 39.87f64.to_radians(),
             field_n: Vector3::new(25.3, 2.6, 40.1),
