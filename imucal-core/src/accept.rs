@@ -341,12 +341,20 @@ pub fn check_plausibility<T: Scalar>(
             limit: most / least,
         });
     }
-    if relative_rms.wide() > limits.rms {
-        return Err(Refusal::Implausible {
-            what: Quantity::Residual,
-            value: relative_rms.wide(),
-            limit: limits.rms,
-        });
+    check_residual(relative_rms, limits)
+}
+
+/// The residual is small against the norm: what was measured is one vector of one length, and not a magnet or a hand.
+///
+/// # Errors
+/// not-finite or implausible.
+pub fn check_residual<T: Scalar>(relative_rms: T, limits: &Limits) -> Result<(), Refusal> {
+    let value = relative_rms.wide();
+    if !relative_rms.finite() {
+        return Err(Refusal::NotFinite);
+    }
+    if value > limits.rms {
+        return Err(Refusal::Implausible { what: Quantity::Residual, value, limit: limits.rms });
     }
     Ok(())
 }

@@ -164,7 +164,7 @@ pub fn without_accelerometer(refusal: Refusal) -> SensorOutcome {
 /// Calibrates from turns between rests.
 pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
     let mut turns = input.turns();
-    if let Err(refusal) = check_turns(input, &turns.data) {
+    if let Err(refusal) = check_turns(input, &turns) {
         return refuse(refusal, None);
     }
     let mut solver = solve(&input.with_directions(&turns.data), identity());
@@ -205,13 +205,14 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
 }
 
 /// Turns that move a direction, and enough of them.
-fn check_turns(input: &GyrInput<'_>, data: &[TurnData]) -> Result<(), Refusal> {
-    let telling = data
+fn check_turns(input: &GyrInput<'_>, turns: &Turns) -> Result<(), Refusal> {
+    let telling = turns
+        .data
         .iter()
         .filter(|t| input.direction(t.rest_before).angle(&input.direction(t.rest_after)) > LEAST_ANGLE)
         .count();
     match telling {
-        0 => Err(Refusal::NoMotion),
+        0 if turns.left_out.is_empty() => Err(Refusal::NoMotion),
         have if have < LEAST_TURNS => Err(Refusal::TooFewObservations { have, need: LEAST_TURNS }),
         _ => Ok(()),
     }

@@ -7,6 +7,7 @@ use imucal_core::{
     triad::Triad,
 };
 use nalgebra::{SMatrix, SVector};
+use rayon::prelude::*;
 
 use super::{
     norm_fit::{NormFit, NormProblem, dynamic, raw_coverage},
@@ -42,10 +43,12 @@ fn outcome(
     SensorOutcome { kind: SensorKind::Mag, model: MODEL, verdict, fit, evidence }
 }
 
-/// Fits from the start with the lower cost: an algebraic ellipsoid can be far off on a small part of the sphere.
+/// Fits from the start that ends lower: an algebraic ellipsoid can be far off on a small part of the sphere.
 fn best_fit(problem: &NormProblem<'_, 9>) -> Option<NormFit<9>> {
     let starts = [adjusted::start(problem.points, problem.norm), sphere::start(problem.points, problem.norm)];
-    starts.iter().flatten().map(|triad| problem.fit(triad)).min_by(|a, b| a.rms().total_cmp(&b.rms()))
+    let ends = starts.par_iter().flatten().map(|start| problem.ends(start));
+    let (_, lowest) = ends.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(problem.fit(&lowest))
 }
 
 type Judged = (FitSummary, Result<Evidence, Refusal>);

@@ -64,6 +64,13 @@ impl<const P: usize> NormProblem<'_, P> {
         solver
     }
 
+    /// Cost of a plain fit from `start`, and where it ended: for choosing among starts.
+    pub fn ends(&self, start: &Triad<f64>) -> (f64, Triad<f64>) {
+        let solver = self.solve(self.points, self.form.theta(start));
+        let cost = solver.report().cost;
+        (if cost.is_finite() { cost } else { f64::INFINITY }, self.form.triad(solver.theta()))
+    }
+
     /// Fits from `start`, leaving out gross outliers; where all rounds together would leave out more than [`MOST`],
     /// none is.
     pub fn fit(&self, start: &Triad<f64>) -> NormFit<P> {
@@ -177,10 +184,15 @@ impl<const P: usize> NormProblem<'_, P> {
         limits: &Limits,
     ) -> Result<(), Refusal> {
         let triad = self.form.triad(fit.solver.theta());
+        let relative_rms = fit.rms() / mean_radius(&triad, self.norm);
         accept::check_observations(coverage, P, limits)?;
+        // Before what depends on the noise: a residual that is no noise would be blamed on the poses.
+        if fit.report.termination.was_successful() {
+            accept::check_residual(relative_rms, limits)?;
+        }
         accept::check_report(&fit.report, limits)?;
         accept::check_nonlinearity(bend, limits)?;
-        accept::check_plausibility(&triad, nominal, fit.rms() / mean_radius(&triad, self.norm), limits)
+        accept::check_plausibility(&triad, nominal, relative_rms, limits)
     }
 }
 

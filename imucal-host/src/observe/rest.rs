@@ -24,6 +24,8 @@ const TURNING: f64 = 6.0;
 const TURNING_LIMITS: (f64, f64) = (0.015, 0.052);
 /// The initial stretch counts as a rest unless it is this many times noisier than the quietest tenth.
 const INITIAL_EXCESS: f64 = 8.0;
+/// Noisier than this nothing is at rest, however long it lasts, (m/s²)²: ten times what a trembling hand shows.
+const NOISIEST: f64 = 0.25;
 /// Rows further apart than this are single shots, each a rest of its own, s.
 const SHOT_INTERVAL: f64 = 0.2;
 /// A gap longer than this many usual intervals ends a rest.
@@ -92,7 +94,7 @@ impl<'a> RestDetector<'a> {
 
     /// The rests at a multiple of the reference variance.
     pub fn cut(&self, multiplier: f64) -> Segmentation {
-        let threshold = multiplier * self.noise;
+        let threshold = (multiplier * self.noise).min(NOISIEST);
         let rests = if self.is_shots() { self.shots() } else { self.runs(threshold) };
         Segmentation { multiplier, threshold, rests }
     }
