@@ -2,3 +2,5 @@
 
 pub mod data;
 pub mod firmware;
+pub mod program;
+pub mod simulated;
