@@ -66,10 +66,11 @@ pub fn check(
     let warning = match record.made_for(serial) {
         Ok(Match::Confirmed) => None,
         Ok(Match::Unknown) => Some(format!(
-            "{}: no serial on one side, so nobody can tell whether the calibration is this sensor's",
+            "{}: no serial on one side, so nobody can tell whether the calibration is this sensor's; name it below \
+             [sensor] before calibrating",
             recording.name
         )),
-        Err(wrong) if force => Some(format!("{wrong}; applied by --force")),
+        Err(wrong) if force => Some(format!("{}: {wrong}; taken all the same by --force", recording.name)),
         Err(wrong) => {
             return Err(ApplyError::WrongSensor {
                 recording: recording.name.clone(),

@@ -4,3 +4,5 @@ pub mod clouds;
 pub mod data;
 pub mod firmware;
 pub mod golden;
+pub mod program;
+pub mod simulated;

@@ -7,8 +7,12 @@ use std::{
 
 use clap::Args;
 
-use super::{Ending, read, warn};
-use crate::{apply, store::StoredCalibration};
+use super::{
+    Ending, load,
+    output::{self, say},
+    read, refuse, warn,
+};
+use crate::apply;
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
@@ -26,28 +30,34 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let out = arguments.out.clone().unwrap_or_else(|| beside(&arguments.recording));
+    let mut inputs = output::files_of(&arguments.recording);
+    inputs.push(arguments.calibration.clone());
+    output::check(&inputs, &output::files_of(&out))?;
     let recording = read(&arguments.recording)?;
-    let stored = StoredCalibration::load(&arguments.calibration)?;
+    let stored = match load(&arguments.calibration)? {
+        Ok(stored) => stored,
+        Err(damaged) => return Ok(refuse(&damaged)),
+    };
     let record = stored.to_record(&arguments.calibration)?;
     let warning = match apply::check(&recording, &stored, &record, arguments.force) {
         Ok(warning) => warning,
-        Err(refusal) => {
-            eprintln!("imucal: refused: {refusal}");
-            return Ok(Ending::Refused);
-        }
+        Err(refusal) => return Ok(refuse(&refusal)),
     };
     if let Some(warning) = warning {
         warn(&warning);
     }
-    let out = arguments.out.clone().unwrap_or_else(|| beside(&arguments.recording));
     apply::apply(&recording, &stored, &record).write(&out)?;
-    println!("{}: {} rows corrected into {}", recording.name, recording.rows(), out.display());
+    say!("{}: {} rows corrected into {}", recording.name, recording.rows(), out.display());
     Ok(Ending::Done)
 }
 
 /// `NAME-calibrated.csv.gz` for `NAME.csv.gz`.
 fn beside(path: &Path) -> PathBuf {
     let name = path.file_name().and_then(OsStr::to_str).unwrap_or("recording.csv");
-    let (stem, ending) = name.split_once('.').unwrap_or((name, "csv"));
-    path.with_file_name(format!("{stem}-calibrated.{ending}"))
+    let lower = name.to_ascii_lowercase();
+    let ending = [".csv.gz", ".csv", ".parquet"].into_iter().find(|ending| lower.ends_with(ending));
+    // Endings are ASCII, so that the lengths agree and the cut is between characters.
+    let (stem, ending) = name.split_at(name.len() - ending.map_or(0, str::len));
+    path.with_file_name(format!("{stem}-calibrated{ending}"))
 }

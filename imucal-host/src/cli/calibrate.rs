@@ -2,14 +2,13 @@
 
 use std::{path::PathBuf, time::SystemTime};
 
-use anyhow::Context;
 use clap::Args;
 use imucal_core::record::Date;
 
-use super::{Ending, progress::Progress, read, warn};
+use super::{Ending, output, progress::Progress, read, warn};
 use crate::{
     calibrate::{AccModel, Calibration, Options, calibrate, gyr, mag},
-    recording::{AtomicFile, Recording, SensorKind},
+    recording::{Recording, SensorKind},
     report,
     store::StoredCalibration,
 };
@@ -61,8 +60,10 @@ fn multiple(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let recording = read(&arguments.recording)?;
     let named: Vec<SensorKind> = arguments.model.iter().map(|(kind, _)| *kind).collect();
+    check_models(&named)?;
+    output::check(&output::files_of(&arguments.recording), &outputs(arguments))?;
+    let recording = read(&arguments.recording)?;
     check_named(&recording, &named)?;
     let progress = Progress::start();
     let calibration = calibrate(&recording, &options(arguments), &|stage| progress.stage(stage));
@@ -70,6 +71,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     print(arguments, &calibration)?;
     write(arguments, &calibration)?;
     Ok(ending(&calibration, &named))
+}
+
+/// The files asked for; `--json -` is none.
+fn outputs(arguments: &Arguments) -> Vec<PathBuf> {
+    let json = arguments.json.iter().filter(|path| path.as_os_str() != "-");
+    arguments.out.iter().chain(&arguments.record).chain(json).cloned().collect()
 }
 
 fn options(arguments: &Arguments) -> Options {
@@ -83,6 +90,14 @@ fn options(arguments: &Arguments) -> Options {
         options.multipliers = vec![threshold];
     }
     options
+}
+
+/// Each sensor has one model.
+fn check_models(named: &[SensorKind]) -> anyhow::Result<()> {
+    let twice = named.iter().enumerate().find(|(index, kind)| named[..*index].contains(kind));
+    twice.map_or(Ok(()), |(_, kind)| {
+        anyhow::bail!("--model: found {kind} twice, expected one model a sensor; leave one out")
+    })
 }
 
 fn check_named(recording: &Recording, named: &[SensorKind]) -> anyhow::Result<()> {
@@ -107,14 +122,11 @@ fn print(arguments: &Arguments, calibration: &Calibration) -> anyhow::Result<()>
     if let Some(path) = &arguments.json {
         let text = serde_json::to_string_pretty(&report::json::calibration(calibration))? + "\n";
         if path.as_os_str() == "-" {
-            print!("{text}");
-            return Ok(());
+            return output::text(&text);
         }
-        AtomicFile::write_whole(path, text.as_bytes())
-            .with_context(|| format!("{}: cannot be written; check the folder", path.display()))?;
+        output::file(path, &text)?;
     }
-    print!("{}", report::table::table(calibration));
-    Ok(())
+    output::text(&report::table::table(calibration))
 }
 
 fn write(arguments: &Arguments, calibration: &Calibration) -> anyhow::Result<()> {

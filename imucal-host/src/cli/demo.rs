@@ -5,7 +5,11 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 
-use super::{Ending, calibrate::today};
+use super::{
+    Ending,
+    calibrate::today,
+    output::{self, say},
+};
 use crate::{
     apply::apply,
     calibrate::{Calibration, Options, calibrate},
@@ -30,58 +34,68 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let out = &arguments.out;
-    std::fs::create_dir_all(out).with_context(|| format!("{}: cannot be made", out.display()))?;
+    std::fs::create_dir_all(out).with_context(|| {
+        format!(
+            "{}: found no folder and cannot make one, expected a place to write to; give another --out",
+            out.display()
+        )
+    })?;
     let unit = SimulatedUnit::mtx();
-    println!("1. Record: a simulated MTx, tumbled by hand through {RESTS} attitudes.");
+    say!("1. Record: a simulated MTx, tumbled by hand through {RESTS} attitudes.");
     let recording = record("tumble.csv.gz", &Tumble::new(RESTS, SEEDS.0), &unit, SEEDS.1);
     recording.write(&out.join("tumble.csv.gz"))?;
 
-    println!("\n2. Calibrate.\n");
+    say!("\n2. Calibrate.\n");
     let calibration = calibrate(&recording, &Options::default(), &|_| {});
-    print!("{}", report::table::table(&calibration));
+    output::text(&report::table::table(&calibration))?;
     let stored = StoredCalibration::of(&calibration, today());
     stored.save_toml(&out.join("calibration.toml"))?;
     stored.save_record(&out.join("calibration.bin"))?;
-    let json = serde_json::to_string_pretty(&report::json::calibration(&calibration))?;
-    crate::recording::AtomicFile::write_whole(&out.join("calibration.json"), json.as_bytes())?;
+    let json = serde_json::to_string_pretty(&report::json::calibration(&calibration))? + "\n";
+    output::file(&out.join("calibration.json"), &json)?;
 
-    println!("\n3. Compare with the truth, which the calibration never saw.\n");
-    let found = against_truth(&calibration, &unit);
+    say!("\n3. Compare with the truth, which the calibration never saw.\n");
+    let found = against_truth(&calibration, &unit)?;
 
-    println!("\n4. Apply the record through the f32 core and compare with the f64 reference.\n");
+    say!("\n4. Apply the record through the f32 core and compare with the f64 reference.\n");
     let device = stored.to_record(out)?;
-    let equal = SensorKind::ALL.into_iter().all(|kind| {
+    let mut equal = true;
+    for kind in SensorKind::ALL {
         let compared = recording.sensor(kind).zip(stored.triad(kind)).zip(device.triad(kind.into()));
-        compared.is_some_and(|((triple, stored), record)| {
-            let result = samples::compare(kind, triple, stored, record);
-            print_samples(&result);
-            result.passes()
-        })
-    });
-    let refitted = calibration
-        .sensors
-        .iter()
-        .all(|outcome| fits::compare(&recording, outcome).is_some_and(|fit| print_fit(&fit)));
+        let result =
+            compared.map(|((triple, stored), record)| samples::compare(kind, triple, stored, record));
+        result.iter().try_for_each(print_samples)?;
+        equal &= result.is_some_and(|samples| samples.passes());
+    }
+    for outcome in &calibration.sensors {
+        let fit = fits::compare(&recording, outcome);
+        fit.iter().try_for_each(print_fit)?;
+        equal &= fit.is_some_and(|fit| fit.passes());
+    }
     apply(&recording, &stored, &device).write(&out.join("tumble-calibrated.csv.gz"))?;
 
-    println!("\nWritten to {}:", out.display());
+    say!("\nWritten to {}:", out.display());
     for (file, what) in [
-        ("tumble.csv.gz, .toml", "the recording"),
+        ("tumble.csv.gz", "the recording"),
+        ("tumble.toml", "its manifest: units, site, sensor"),
         ("calibration.toml", "the calibration for people"),
         ("calibration.bin", "the record for the device"),
         ("calibration.json", "everything, for programs"),
-        ("tumble-calibrated.csv.gz, .toml", "the recording corrected through the core"),
+        ("tumble-calibrated.csv.gz", "the recording corrected through the core"),
+        ("tumble-calibrated.toml", "its manifest"),
     ] {
-        println!("  {file:<32} {what}");
+        say!("  {file:<24} {what}");
     }
-    Ok(if found && equal && refitted { Ending::Done } else { Ending::Refused })
+    Ok(if found && equal { Ending::Done } else { Ending::Refused })
 }
 
 /// Largest error in standard errors, sensor by sensor; whether all were accepted.
-fn against_truth(calibration: &Calibration, unit: &SimulatedUnit) -> bool {
-    SensorKind::ALL.into_iter().all(|kind| {
+fn against_truth(calibration: &Calibration, unit: &SimulatedUnit) -> anyhow::Result<bool> {
+    let mut all = true;
+    for kind in SensorKind::ALL {
         let Some(fit) = calibration.sensor(kind).and_then(|outcome| outcome.accepted()) else {
-            return false;
+            all = false;
+            continue;
         };
         let (found, truth) = (fit.raw_triad(), unit.sensor(kind).truth);
         let (gain_std, bias_std) = fit.raw_std();
@@ -93,22 +107,23 @@ fn against_truth(calibration: &Calibration, unit: &SimulatedUnit) -> bool {
             .map(|(error, std)| error.abs() / std)
             .collect::<Vec<_>>();
         let worst = errors.iter().copied().fold(0.0, f64::max);
-        println!("{}: largest error {worst:.1} standard errors, of {} parameters", words(kind), errors.len());
-        true
-    })
+        say!("{}: largest error {worst:.1} standard errors, of {} parameters", words(kind), errors.len());
+    }
+    Ok(all)
 }
 
-fn print_samples(s: &SampleEquivalence) {
-    println!(
+fn print_samples(s: &SampleEquivalence) -> anyhow::Result<()> {
+    say!(
         "{}: {} samples, largest difference {:.1e} of full scale",
         words(s.kind),
         s.samples,
         s.max / s.full_scale
     );
+    Ok(())
 }
 
-fn print_fit(fit: &FitEquivalence) -> bool {
+fn print_fit(fit: &FitEquivalence) -> anyhow::Result<()> {
     let worst = fit.parameters.iter().map(|p| (p.device - p.reference).abs() / p.std).fold(0.0, f64::max);
-    println!("{}: fitted again in f32, largest difference {worst:.4} standard errors", words(fit.kind));
-    fit.passes()
+    say!("{}: fitted again in f32, largest difference {worst:.4} standard errors", words(fit.kind));
+    Ok(())
 }

@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Ending;
+use super::{Ending, load, output::say};
 use crate::{
     recording::SensorKind,
     report::{
         measure::{measure, plain},
         table::words,
     },
-    store::{LoadError, StoredCalibration, StoredTriad},
+    store::StoredTriad,
 };
 
 #[derive(Args, Debug)]
@@ -21,32 +21,30 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let stored = match StoredCalibration::load(&arguments.calibration) {
+    let stored = match load(&arguments.calibration)? {
         Ok(stored) => stored,
-        // The file was read; what it says is that it must not be used.
-        Err(damaged @ (LoadError::Record { .. } | LoadError::Unusable { .. })) => {
-            println!("{damaged}");
+        Err(damaged) => {
+            say!("{damaged}");
             return Ok(Ending::Refused);
         }
-        Err(unreadable) => return Err(unreadable.into()),
     };
-    println!("{}: intact", arguments.calibration.display());
+    say!("{}: intact", arguments.calibration.display());
     let or_unknown = |text: &str| {
         if text.is_empty() { "unknown".to_owned() } else { text.to_owned() }
     };
-    println!("sensor {}, serial {}", or_unknown(&stored.sensor.name), or_unknown(&stored.sensor.serial));
-    println!("made on {}", stored.date);
+    say!("sensor {}, serial {}", or_unknown(&stored.sensor.name), or_unknown(&stored.sensor.serial));
+    say!("made on {}", stored.date);
     for kind in SensorKind::ALL {
         match stored.triad(kind) {
-            Some(triad) => print_triad(kind, triad),
-            None => println!("{}: not calibrated", words(kind)),
+            Some(triad) => print_triad(kind, triad)?,
+            None => say!("{}: not calibrated", words(kind)),
         }
     }
     Ok(Ending::Done)
 }
 
-fn print_triad(kind: SensorKind, triad: &StoredTriad) {
-    println!(
+fn print_triad(kind: SensorKind, triad: &StoredTriad) -> anyhow::Result<()> {
+    say!(
         "{} ({}): calibrated [{}] = gain · (raw [{}] − bias)",
         words(kind),
         triad.model,
@@ -56,7 +54,7 @@ fn print_triad(kind: SensorKind, triad: &StoredTriad) {
     for row in 0..3 {
         let gain: Vec<String> =
             (0..3).map(|column| measure(triad.gain[row][column], triad.gain_std[row][column])).collect();
-        println!(
+        say!(
             "  {}  {:>26} {:>26} {:>26}   {:>22}",
             ["x", "y", "z"][row],
             gain[0],
@@ -67,7 +65,7 @@ fn print_triad(kind: SensorKind, triad: &StoredTriad) {
     }
     let unit = if kind == SensorKind::Gyr { "rad a turn".into() } else { triad.unit_out.to_string() };
     let held = triad.held_out_rms.map_or_else(|| "not known".into(), plain);
-    println!(
+    say!(
         "  {} observations, {} parameters; rms {} {unit}, held out {held}; condition {:.1}, coverage {:.0} %",
         triad.observations,
         triad.parameters,
@@ -75,4 +73,5 @@ fn print_triad(kind: SensorKind, triad: &StoredTriad) {
         triad.condition,
         100.0 * triad.coverage
     );
+    Ok(())
 }

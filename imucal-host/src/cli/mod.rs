@@ -4,10 +4,13 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::store::{LoadError, StoredCalibration};
+
 mod apply;
 mod calibrate;
 mod demo;
 mod inspect;
+mod output;
 mod progress;
 mod verify;
 
@@ -55,7 +58,7 @@ pub fn run() -> ExitCode {
         Ok(Ending::Done) => ExitCode::SUCCESS,
         Ok(Ending::Refused) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("imucal: error: {error:#}");
+            output::tell("error", &format_args!("{error:#}"));
             ExitCode::from(2)
         }
     }
@@ -63,7 +66,21 @@ pub fn run() -> ExitCode {
 
 /// Tells the user of something on standard error.
 fn warn(message: &dyn std::fmt::Display) {
-    eprintln!("imucal: warning: {message}");
+    output::tell("warning", message);
+}
+
+/// Tells the user on standard error why the answer is no.
+fn refuse(refusal: &dyn std::fmt::Display) -> Ending {
+    output::tell("refused", refusal);
+    Ending::Refused
+}
+
+/// Loads a calibration; one that can be read but must not be used is the error within.
+fn load(path: &std::path::Path) -> anyhow::Result<Result<StoredCalibration, LoadError>> {
+    match StoredCalibration::load(path) {
+        Err(damaged @ (LoadError::Record { .. } | LoadError::Unusable { .. })) => Ok(Err(damaged)),
+        read => Ok(Ok(read?)),
+    }
 }
 
 /// Reads a recording and tells of what was odd in it.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Ending, progress::Progress, read, warn};
+use super::{Ending, load, output::say, progress::Progress, read, refuse, warn};
 use crate::{
     apply,
     calibrate::{AccModel, Options, calibrate},
@@ -28,14 +28,14 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let recording = read(&arguments.recording)?;
-    let stored = StoredCalibration::load(&arguments.calibration)?;
+    let stored = match load(&arguments.calibration)? {
+        Ok(stored) => stored,
+        Err(damaged) => return Ok(refuse(&damaged)),
+    };
     let record = stored.to_record(&arguments.calibration)?;
     match apply::check(&recording, &stored, &record, arguments.force) {
         Ok(warning) => warning.iter().for_each(|w| warn(w)),
-        Err(refusal) => {
-            eprintln!("imucal: refused: {refusal}");
-            return Ok(Ending::Refused);
-        }
+        Err(refusal) => return Ok(refuse(&refusal)),
     }
     let progress = Progress::start();
     progress.stage("comparing samples");
@@ -49,10 +49,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     progress.stage("fitting again, by the core and by the reference");
     let fits = refit(&recording, &stored);
     drop(progress);
-    samples.iter().for_each(print_samples);
-    fits.iter().for_each(print_fit);
+    samples.iter().try_for_each(print_samples)?;
+    fits.iter().try_for_each(print_fit)?;
     let passed = samples.iter().all(SampleEquivalence::passes) && fits.iter().all(FitEquivalence::passes);
-    println!("{}", if passed { "equivalent" } else { "NOT equivalent" });
+    say!("{}", if passed { "equivalent" } else { "NOT equivalent" });
     Ok(if passed { Ending::Done } else { Ending::Refused })
 }
 
@@ -69,8 +69,8 @@ fn refit(recording: &Recording, stored: &StoredCalibration) -> Vec<FitEquivalenc
         .collect()
 }
 
-fn print_samples(s: &SampleEquivalence) {
-    println!(
+fn print_samples(s: &SampleEquivalence) -> anyhow::Result<()> {
+    say!(
         "{}: {} samples: f32 core against f64 reference: max {:.3e} {unit}, rms {:.3e} {unit}, max {:.0} ulp; {:.2e} of \
          full scale ({:.4} {unit}), limit {:.0e}: {}",
         words(s.kind),
@@ -84,17 +84,18 @@ fn print_samples(s: &SampleEquivalence) {
         if s.passes() { "ok" } else { "FAILED" },
         unit = s.unit,
     );
+    Ok(())
 }
 
-fn print_fit(fit: &FitEquivalence) {
-    println!(
+fn print_fit(fit: &FitEquivalence) -> anyhow::Result<()> {
+    say!(
         "{}: fitted again: f32 core (stopped by {}) against f64 reference, nominal SI: {}",
         words(fit.kind),
         fit.termination.name(),
         if fit.passes() { "ok" } else { "FAILED" }
     );
     for p in &fit.parameters {
-        println!(
+        say!(
             "  {:<8} {:>14.8} {:>14.8}  difference {:>9.1e} = {:>7.1} ulp = {:.4} standard errors",
             p.name,
             p.device,
@@ -104,4 +105,5 @@ fn print_fit(fit: &FitEquivalence) {
             (p.device - p.reference).abs() / p.std
         );
     }
+    Ok(())
 }

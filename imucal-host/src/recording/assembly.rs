@@ -12,7 +12,7 @@ use super::sensor_kind::SensorKind;
 use super::triple::{Nominal, Triple, median};
 use super::unit::TimeUnit;
 use super::warning::Warning;
-use super::{Recording, unit_check};
+use super::{Recording, absurd, interval, unit_check};
 
 /// Makes a recording of a table, or says what is wrong with it.
 pub(crate) fn assemble(path: &Path, manifest: Manifest, mut table: Table) -> Result<Recording, ReadError> {
@@ -47,8 +47,9 @@ pub(crate) fn assemble(path: &Path, manifest: Manifest, mut table: Table) -> Res
         manifest,
     };
     note_extra(&mut recording);
-    note_interval(&mut recording);
+    interval::check(&mut recording)?;
     unit_check::check(&mut recording)?;
+    absurd::mask(&mut recording, &table.places);
     Ok(recording)
 }
 
@@ -76,14 +77,10 @@ fn order_remedy(time: &[f64], at: usize, unit: TimeUnit) -> String {
     };
     let steps = time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
     let interval = median(steps).map(|step| step / unit.per_si());
-    if interval.is_some_and(interval_unusual) {
+    if interval.is_some_and(interval::is_unusual) {
         remedy.push_str(&format!("; check the unit of t too, with `{unit}` most intervals are unusual"));
     }
     remedy
-}
-
-fn interval_unusual(seconds: f64) -> bool {
-    !(1e-5..=2.0).contains(&seconds)
 }
 
 fn scaled(mut time: Vec<f64>, per_si: f64) -> Vec<f64> {
@@ -146,13 +143,6 @@ fn note_extra(recording: &mut Recording) {
     }
     if SensorKind::ALL.iter().all(|kind| recording.sensor(*kind).is_none()) {
         recording.warnings.push(Warning::NoSensor { path: recording.path.clone() });
-    }
-}
-
-fn note_interval(recording: &mut Recording) {
-    if let Some(found) = recording.median_interval().filter(|interval| interval_unusual(*interval)) {
-        let unit = recording.manifest.units.t;
-        recording.warnings.push(Warning::IntervalUnusual { path: recording.path.clone(), unit, found });
     }
 }
 

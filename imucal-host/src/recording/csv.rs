@@ -61,6 +61,7 @@ impl<'a> CsvReader<'a> {
             if record.len() != self.names.len() {
                 return Err(self.field_count(&record, line));
             }
+            self.check_text(&record, line)?;
             self.push(&record, &mut table).map_err(|bad| self.bad_field(&record, line, &bad))?;
             lines.push(line);
         }
@@ -86,6 +87,17 @@ impl<'a> CsvReader<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Unknown columns are kept as they are, so they have to be text.
+    fn check_text(&self, record: &ByteRecord, line: u64) -> Result<(), ReadError> {
+        let foreign = |(field, target): (&[u8], &Target)| {
+            matches!(target, Target::Extra(_)) && std::str::from_utf8(field).is_err()
+        };
+        match record.iter().zip(&self.layout.targets).any(foreign) {
+            true => Err(ReadError::NotUtf8 { path: self.path.to_path_buf(), line }),
+            false => Ok(()),
+        }
     }
 
     /// Line of a record; its position is where the one before ended, ahead of blank lines.

@@ -203,7 +203,7 @@ impl Manifest {
         let text = fs::read_to_string(path).map_err(|cause| match cause.kind() {
             io::ErrorKind::NotFound => ReadError::ManifestMissing {
                 path: path.to_path_buf(),
-                recording: path.with_extension("").display().to_string(),
+                recording: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
             },
             _ => ReadError::Unreadable { path: path.to_path_buf(), found: cause.to_string() },
         })?;

@@ -175,7 +175,12 @@ mod tests {
         let message = fixture.error();
         assert_says(
             &message,
-            &["run.toml: not found", "the manifest of", "format = \"imucal-recording/1\"", "[units]"],
+            &[
+                "run.toml: not found",
+                "the manifest of the recording run there",
+                "format = \"imucal-recording/1\"",
+                "[units]",
+            ],
         );
     }
 

@@ -5,6 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
+mod absurd;
 mod assembly;
 pub mod atomic_file;
 mod columns;
@@ -18,6 +19,7 @@ mod format;
 pub mod gravity;
 pub mod imu_tk;
 pub mod integrity;
+mod interval;
 pub mod manifest;
 pub mod manifest_check;
 mod manifest_keys;
@@ -138,8 +140,15 @@ impl Recording {
                 return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() });
             }
         };
+        // An unknown key is often why the samples cannot be understood, and then nobody would read the warning.
+        let misspelt =
+            warnings.iter().find(|warning| matches!(warning, Warning::UnknownKey { nearest: Some(_), .. }));
+        let misspelt = misspelt.cloned().map(Box::new);
         table.warnings.splice(0..0, warnings);
-        assembly::assemble(path, manifest, table)
+        assembly::assemble(path, manifest, table).map_err(|error| match misspelt {
+            Some(warning) => ReadError::Misled { error: Box::new(error), warning },
+            None => error,
+        })
     }
 
     /// Writes the samples, in the units of the manifest, as the ending of `path` says, and the manifest

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use super::manifest_check::ManifestFault;
 use super::place::Place;
 use super::sensor_kind::SensorKind;
-use super::unit::Unit;
+use super::unit::{TimeUnit, Unit};
+use super::warning::Warning;
 
 /// A failure to read a recording; its text names the file, the place, what was found, what was
 /// expected and what to do.
@@ -112,7 +113,7 @@ pub enum ReadError {
 
     /// No manifest.
     #[error(
-        "{path}: not found, expected the manifest of {recording} there; write it, for example:\n{}",
+        "{path}: not found, expected the manifest of the recording {recording} there; write it, for example:\n{}",
         super::manifest::MINIMAL
     )]
     ManifestMissing { path: PathBuf, recording: String },
@@ -144,6 +145,14 @@ pub enum ReadError {
         expected: &'static str,
         suggestion: Unit,
     },
+    /// The times cannot be in the unit the manifest says, or in none.
+    #[error(
+        "{path}, column `t`: the median interval is {found:e} s when read as `{unit}`, expected 1e-5 to 2 s; {remedy}"
+    )]
+    IntervalImplausible { path: PathBuf, unit: TimeUnit, found: f64, remedy: String },
+    /// A key of the manifest that was not understood may be the cause.
+    #[error("{error}. First look at the manifest: {warning}")]
+    Misled { error: Box<ReadError>, warning: Box<Warning> },
     /// One axis is in another unit than its neighbours.
     #[error(
         "{path}, column `{column}`: found samples that look like `{found}` beside the other axes in `{expected}` (then the length is steady at {median_norm:.3} m/s², and else it is not); convert the column to `{expected}`"

@@ -15,7 +15,8 @@ pub(crate) fn find(time: &[f64], values: &[Vector3<f64>]) -> Vec<Range<usize>> {
     let runs = runs(values);
     let mut lengths: Vec<usize> = runs.iter().map(Range::len).collect();
     lengths.sort_unstable();
-    let usual = lengths.get(lengths.len() / 2).copied().unwrap_or(1);
+    // A single run is the whole recording and no measure of itself.
+    let usual = lengths.get(lengths.len() / 2).filter(|_| lengths.len() > 1).copied().unwrap_or(1);
     let long = |run: &Range<usize>| {
         run.len() > REPETITIONS * usual && time[run.end - 1] - time[run.start] > DURATION
     };

@@ -102,6 +102,24 @@ pub enum Warning {
         /// Median interval, s.
         found: f64,
     },
+    /// Samples that no sensor can have measured; taken for missing.
+    #[error(
+        "{path}, {place}, column `{column}`: {found:.3e} {unit} found ({more} more like it), which no sensor measures; taken for not measured; correct it if a digit or a decimal point was lost"
+    )]
+    Absurd {
+        /// Samples file.
+        path: PathBuf,
+        /// The first of them.
+        place: Place,
+        /// Its column.
+        column: String,
+        /// Its value, as the file has it.
+        found: f64,
+        /// Unit of the file.
+        unit: Unit,
+        /// How many others there are in the column.
+        more: usize,
+    },
     /// The file holds no sensor.
     #[error(
         "{path}: no sensor columns found, expected acc_x, acc_y, acc_z or those of gyr or mag; nothing can be calibrated from it"

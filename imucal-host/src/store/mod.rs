@@ -17,6 +17,7 @@ pub const FORMAT: &str = "imucal-calibration/1";
 
 /// A stored calibration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct StoredCalibration {
     /// [`FORMAT`].
     pub format: String,
@@ -42,6 +43,7 @@ pub struct StoredCalibration {
 
 /// Whose calibration it is.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct StoredSensor {
     /// Make and model, empty where unknown.
     #[serde(default)]
@@ -53,6 +55,7 @@ pub struct StoredSensor {
 
 /// One sensor's calibration: `calibrated = gain · (raw − bias)` and how good it was.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct StoredTriad {
     /// Model's name.
     pub model: String,
@@ -91,6 +94,7 @@ pub struct StoredTriad {
 
 /// Linear temperature terms; see [`imucal_core::temperature`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct StoredTemperature {
     /// °C.
     pub reference: f64,
@@ -104,15 +108,18 @@ pub struct StoredTemperature {
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The file cannot be read.
-    #[error("{path}: cannot be read: {source}; check the path")]
+    #[error("{path}: cannot be read: {cause}; check the path")]
     Io {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// The TOML is not a calibration.
-    #[error("{path}: not a calibration: {reason}; expected what `imucal calibrate --out` writes")]
+    #[error(
+        "{path}: found a calibration that cannot be understood ({reason}), expected what `imucal calibrate --out` \
+         writes; correct it, or calibrate again"
+    )]
     Toml {
         /// The file.
         path: PathBuf,
@@ -120,7 +127,10 @@ pub enum LoadError {
         reason: String,
     },
     /// The TOML is of another format.
-    #[error("{path}: format is `{found}`, expected `{FORMAT}`")]
+    #[error(
+        "{path}: found the format `{found}`, expected `{FORMAT}`; give the file that `imucal calibrate` wrote with \
+         --out or --record"
+    )]
     Format {
         /// The file.
         path: PathBuf,
@@ -128,7 +138,7 @@ pub enum LoadError {
         found: String,
     },
     /// A stored figure cannot be used.
-    #[error("{path}: {sensor}: {what} must be finite and the gain not singular; calibrate again")]
+    #[error("{path}: {sensor}: found {what}, expected figures that a device can apply; calibrate again")]
     Unusable {
         /// The file.
         path: PathBuf,
@@ -137,13 +147,22 @@ pub enum LoadError {
         /// Which figure.
         what: &'static str,
     },
-    /// The record is damaged, foreign or newer.
-    #[error("{path}: {source}; copy it again from its source, or calibrate again")]
+    /// The file is neither of the two forms.
+    #[error(
+        "{path}: found neither a TOML nor a record, expected a calibration; give the file that `imucal calibrate` \
+         wrote with --out or --record"
+    )]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The record is damaged or newer.
+    #[error("{path}: {cause}; copy it again from its source, or calibrate again")]
     Record {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: DecodeError,
+        cause: DecodeError,
     },
 }
 
@@ -151,12 +170,12 @@ pub enum LoadError {
 #[derive(Debug, thiserror::Error)]
 pub enum SaveError {
     /// The file cannot be written.
-    #[error("{path}: cannot be written: {source}; check the folder and its permissions; nothing was changed")]
+    #[error("{path}: cannot be written: {cause}; check the folder and its permissions; nothing was changed")]
     File {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// A field does not fit the record.
     #[error(
@@ -173,12 +192,12 @@ pub enum SaveError {
         limit: usize,
     },
     /// The record refuses a figure.
-    #[error("{path}: {source}")]
+    #[error("{path}: {cause}")]
     Encode {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: EncodeError,
+        cause: EncodeError,
     },
 }
 
@@ -217,12 +236,14 @@ impl StoredCalibration {
     /// # Errors
     /// [`LoadError`] names the file and what is wrong with it.
     pub fn load(path: &Path) -> Result<Self, LoadError> {
-        let bytes = std::fs::read(path).map_err(|source| LoadError::Io { path: path.into(), source })?;
+        let bytes = std::fs::read(path).map_err(|cause| LoadError::Io { path: path.into(), cause })?;
         if is_toml(path, &bytes) {
             Self::from_toml(path, &bytes)
         } else {
-            let record =
-                record::decode(&bytes).map_err(|source| LoadError::Record { path: path.into(), source })?;
+            let record = record::decode(&bytes).map_err(|cause| match cause {
+                DecodeError::BadMagic => LoadError::Foreign { path: path.into() },
+                cause => LoadError::Record { path: path.into(), cause },
+            })?;
             Ok(Self::from_record(&record))
         }
     }
@@ -230,11 +251,13 @@ impl StoredCalibration {
     fn from_toml(path: &Path, bytes: &[u8]) -> Result<Self, LoadError> {
         let wrong = |reason: String| LoadError::Toml { path: path.into(), reason };
         let text = std::str::from_utf8(bytes).map_err(|e| wrong(e.to_string()))?;
-        let stored: Self =
-            toml::from_str(text).map_err(|e| wrong(e.to_string().trim().replace('\n', " ")))?;
-        if stored.format != FORMAT {
-            return Err(LoadError::Format { path: path.into(), found: stored.format });
+        let explain = |e: toml::de::Error| wrong(explained(text, &e));
+        // The format first: what another one lacks is beside the point.
+        let Head { format } = toml::from_str(text).map_err(explain)?;
+        if format != FORMAT {
+            return Err(LoadError::Format { path: path.into(), found: format });
         }
+        let stored: Self = toml::from_str(text).map_err(explain)?;
         for kind in SensorKind::ALL {
             if let Some(what) = stored.triad(kind).and_then(StoredTriad::defect) {
                 return Err(LoadError::Unusable { path: path.into(), sensor: kind, what });
@@ -261,13 +284,26 @@ impl StoredCalibration {
         let record = self.to_record(path)?;
         let mut buffer = [0; record::MAX_LEN];
         let bytes = record::encode(&record, &mut buffer)
-            .map_err(|source| SaveError::Encode { path: path.into(), source })?;
+            .map_err(|cause| SaveError::Encode { path: path.into(), cause })?;
         write_whole(path, bytes)
     }
 }
 
+/// What every version of the TOML begins with.
+#[derive(Deserialize)]
+struct Head {
+    #[serde(default)]
+    format: String,
+}
+
+/// Line and reason, without a drawing of the line.
+fn explained(text: &str, error: &toml::de::Error) -> String {
+    let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+    format!("line {}: {}", before.matches('\n').count() + 1, error.message().trim().replace('\n', ", "))
+}
+
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), SaveError> {
-    AtomicFile::write_whole(path, bytes).map_err(|source| SaveError::File { path: path.into(), source })
+    AtomicFile::write_whole(path, bytes).map_err(|cause| SaveError::File { path: path.into(), cause })
 }
 
 /// A file is TOML by its name, or because it is text.
@@ -299,12 +335,16 @@ impl StoredTriad {
         }
     }
 
-    /// What makes the triad unusable, if anything.
+    /// What makes the triad unusable, if anything: the device holds it in `f32`.
     fn defect(&self) -> Option<&'static str> {
+        let finite = |x: &f64| (*x as f32).is_finite();
         let gain = nalgebra::Matrix3::from_fn(|i, j| self.gain[i][j]);
-        if !gain.iter().all(|g| g.is_finite()) || gain.try_inverse().is_none() {
-            return Some("the gain");
+        if !gain.iter().all(finite) {
+            return Some("an infinite gain or NaN");
         }
-        (!self.bias.iter().all(|b| b.is_finite())).then_some("the bias")
+        if gain.try_inverse().is_none() {
+            return Some("a singular gain");
+        }
+        (!self.bias.iter().all(finite)).then_some("an infinite bias or NaN")
     }
 }

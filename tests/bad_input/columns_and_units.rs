@@ -1,0 +1,134 @@
+//! Columns that are missing, misspelt or in another unit.
+
+use super::{ACC, ALL, Bad, MAG, assert_as_clean};
+
+#[test]
+fn a_missing_axis_is_named_with_its_neighbours() {
+    let mut bad = Bad::new();
+    bad.rows.iter_mut().for_each(|row| drop(row.remove(ACC + 1)));
+    bad.calibrate().with(2).telling(&[
+        "small.csv, line 1",
+        "`acc_y` is missing",
+        "found `acc_x`, `acc_z`",
+        "expected all of `acc_x`, `acc_y`, `acc_z` or none",
+        "add the column",
+    ]);
+}
+
+#[test]
+fn a_misspelt_column_is_told_from_an_unknown_one() {
+    for (found, meant) in [("acc_X", "acc_x"), ("accx", "acc_x"), ("Acc_x", "acc_x"), ("acc-x", "acc_x")] {
+        let mut bad = Bad::new();
+        bad.line(1)[ACC] = found.into();
+        let told = [format!("`{found}`"), format!("`{meant}`")];
+        bad.calibrate().with(2).telling(&["small.csv, line 1", &told[0], &told[1]]);
+    }
+}
+
+#[test]
+fn a_column_twice_is_refused() {
+    let mut bad = Bad::new();
+    bad.line(1)[MAG] = "acc_x".into();
+    bad.calibrate().with(2).telling(&["small.csv, line 1", "`acc_x` twice", "remove or rename"]);
+}
+
+#[test]
+fn a_file_without_time_is_refused() {
+    let mut bad = Bad::new();
+    bad.line(1)[0] = "when".into();
+    bad.calibrate().with(2).telling(&["small.csv, line 1", "no column `t`", "rename the time column"]);
+}
+
+#[test]
+fn another_separator_is_told() {
+    let bad = Bad::new();
+    let semicolons = bad.text().replace(',', ";");
+    bad.calibrate_bytes("small.csv", semicolons.as_bytes())
+        .with(2)
+        .telling(&["small.csv, line 1", "separate columns by commas"]);
+}
+
+#[test]
+fn a_decimal_comma_is_a_field_too_many() {
+    let bad = Bad::new();
+    let text = bad.text().replacen("0.02,", "0,02,", 1);
+    bad.calibrate_bytes("small.csv", text.as_bytes())
+        .with(2)
+        .telling(&["line 3", "found 11 fields, expected 10"]);
+}
+
+/// From counts to m/s², which the default units say.
+fn in_si(bad: &mut Bad) {
+    // Without the large offsets, as most units in SI are.
+    for (axis, offset) in [33_124.9, 33_274.3, 32_365.5].into_iter().enumerate() {
+        bad.map(ACC + axis, |raw| (raw - offset) / 415.0);
+    }
+    bad.manifest("acc = \"counts\"", "acc = \"m/s^2\"");
+}
+
+#[test]
+fn samples_in_g_that_the_manifest_calls_si_are_refused() {
+    let mut bad = Bad::new();
+    in_si(&mut bad);
+    for axis in 0..3 {
+        bad.map(ACC + axis, |value| value / 9.80665);
+    }
+    bad.calibrate().with(2).telling(&[
+        "small.csv, sensor acc",
+        "when read as `m/s^2`",
+        "about 9.8",
+        "acc = \"g\"",
+        "[units]",
+    ]);
+}
+
+#[test]
+fn one_axis_in_g_beside_others_in_si_is_refused() {
+    let mut bad = Bad::new();
+    in_si(&mut bad);
+    bad.map(ACC + 2, |value| value / 9.80665);
+    bad.calibrate().with(2).telling(&["small.csv, column `acc_z`", "look like `g`", "convert the column"]);
+}
+
+#[test]
+fn counts_that_the_manifest_calls_si_are_refused() {
+    let mut bad = Bad::new();
+    bad.manifest("acc = \"counts\"", "acc = \"m/s^2\"");
+    bad.calibrate().with(2).telling(&["small.csv, sensor acc", "look like `counts`", "[units]"]);
+}
+
+#[test]
+fn counts_without_their_conversion_are_refused() {
+    let mut bad = Bad::new();
+    let (head, tail) = bad.toml.split_once("[counts").expect("conversions");
+    let rest = tail.find("\n[sensor]").expect("a sensor");
+    bad.toml = format!("{head}{}", &tail[rest + 1..]);
+    bad.calibrate().with(2).telling(&[
+        "small.toml, line",
+        "= \"counts\" and no conversion",
+        "[counts]",
+        "data sheet",
+    ]);
+}
+
+#[test]
+fn extra_columns_are_reported_and_change_nothing() {
+    let mut bad = Bad::new();
+    for (index, row) in bad.rows.iter_mut().enumerate() {
+        row.push(if index == 0 { "note".into() } else { "x y".into() });
+    }
+    bad.calibrate().with(0).telling(&["warning", "small.csv, column `note`", "not used"]);
+    assert_as_clean(&bad, &ALL);
+}
+
+#[test]
+fn a_recording_without_any_sensor_has_nothing_to_calibrate() {
+    let mut bad = Bad::new();
+    bad.rows.iter_mut().for_each(|row| row.truncate(1));
+    bad.calibrate().with(1).telling(&[
+        "small.csv",
+        "no sensor columns",
+        "acc_x",
+        "nothing can be calibrated",
+    ]);
+}

@@ -1,0 +1,72 @@
+//! Runs the program, as its users do.
+
+use std::ffi::OsStr;
+use std::time::Duration;
+
+/// A command that has not ended by then hangs: the slowest takes seconds.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// How a command ended, and what it wrote.
+#[derive(Debug)]
+pub struct Ended {
+    /// Exit status; −1 where a signal ended it.
+    pub status: i32,
+    /// Standard output.
+    pub out: String,
+    /// Standard error.
+    pub err: String,
+}
+
+/// Runs a program that has to end, without a terminal, in the folder of the test.
+///
+/// # Panics
+///
+/// Where it does not start, hangs, or writes something that is not UTF-8.
+pub fn run<A: AsRef<OsStr>>(program: &str, variables: &[(&str, &str)], arguments: &[A]) -> Ended {
+    let output = assert_cmd::Command::new(program)
+        .args(arguments)
+        .env_remove("SOURCE_DATE_EPOCH")
+        .envs(variables.iter().copied())
+        .timeout(PATIENCE)
+        .output()
+        .expect("the program starts");
+    let text = |bytes| String::from_utf8(bytes).expect("the program writes UTF-8");
+    Ended { status: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
+}
+
+impl Ended {
+    /// Asserts the exit status.
+    ///
+    /// # Panics
+    ///
+    /// Where it is another, or the program panicked.
+    pub fn with(self, status: i32) -> Self {
+        assert!(!self.err.contains("panicked"), "{self:#?}");
+        assert_eq!(self.status, status, "{self:#?}");
+        self
+    }
+
+    /// Asserts that standard error holds all of the parts.
+    ///
+    /// # Panics
+    ///
+    /// Where one is missing.
+    pub fn telling(self, parts: &[&str]) -> Self {
+        for part in parts {
+            assert!(self.err.contains(part), "`{part}` is missing in {self:#?}");
+        }
+        self
+    }
+
+    /// Asserts that standard output holds all of the parts.
+    ///
+    /// # Panics
+    ///
+    /// Where one is missing.
+    pub fn printing(self, parts: &[&str]) -> Self {
+        for part in parts {
+            assert!(self.out.contains(part), "`{part}` is missing in {self:#?}");
+        }
+        self
+    }
+}

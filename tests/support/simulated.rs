@@ -1,0 +1,82 @@
+//! A simulated recording small enough for many tests: every sensor is accepted from it.
+
+use std::f64::consts::PI;
+use std::path::{Path, PathBuf};
+
+use imucal_host::recording::{Recording, SensorKind};
+use imucal_host::simulator::{SimulatedUnit, Tumble, record};
+use nalgebra::{Unit, UnitQuaternion, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Rests of the small recording.
+pub const RESTS: usize = 14;
+
+/// Tumbled through so many attitudes, at 50 Hz.
+pub fn tumbled(rests: usize, seed: u64) -> Recording {
+    let unit = SimulatedUnit { interval: 0.02, ..SimulatedUnit::mtx() };
+    record("small.csv", &Tumble::new(rests, seed), &unit, seed + 1)
+}
+
+/// The small recording.
+pub fn small() -> Recording {
+    tumbled(RESTS, 5)
+}
+
+/// Writes the small recording as `small.csv` and `small.toml` into a folder.
+///
+/// # Panics
+///
+/// Where it cannot be written.
+pub fn write_small(folder: &Path) -> PathBuf {
+    let path = folder.join("small.csv");
+    small().write(&path).expect("the folder takes files");
+    path
+}
+
+/// A motion of one's own, recorded by the small recording's unit at 50 Hz: what `truth` says of a time in seconds
+/// is specific force (m/s²), rate (rad/s) and field (µT).
+///
+/// # Panics
+///
+/// Where the manifest lacks a conversion.
+pub fn recorded(duration: f64, truth: impl Fn(f64) -> [Vector3<f64>; 3]) -> Recording {
+    let (unit, manifest) = (SimulatedUnit::mtx(), small().manifest);
+    let mut rng = ChaCha8Rng::seed_from_u64(17);
+    let time: Vec<f64> = (0..(duration * 50.0) as usize).map(|row| row as f64 * 0.02).collect();
+    let rows: Vec<[Vector3<f64>; 3]> = time.iter().map(|t| truth(*t)).collect();
+    let mut recording = Recording::new("small.csv", manifest.clone(), time);
+    let [acc, gyr, mag] = SensorKind::ALL.map(|kind| {
+        let sensor = unit.sensor(kind);
+        let samples = rows.iter().map(|row| {
+            let noise = Vector3::from_fn(|_, _| sensor.noise * normal(&mut rng));
+            let raw = sensor.truth.predict(&(row[kind as usize] + noise)).expect("the gain can be inverted");
+            raw.map(|counts| (counts.round() - sensor.counts.offset) / sensor.counts.per_unit)
+        });
+        manifest.triple(kind, samples.collect()).expect("the manifest has the conversion")
+    });
+    (recording.acc, recording.gyr, recording.mag) = (Some(acc), Some(gyr), Some(mag));
+    recording
+}
+
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// Rests of 3 s, after 10 s of rest, between turns of 2 s about one axis of the table by the same angle (rad).
+pub fn turned_about(axis: Vector3<f64>, start: UnitQuaternion<f64>, angle: f64, rests: usize) -> Recording {
+    let axis = Unit::new_normalize(axis);
+    recorded(10.0 + 5.0 * (rests - 1) as f64, |t| {
+        let since = (t - 10.0).max(0.0);
+        let (turn, within) = ((since / 5.0).floor(), (since % 5.0).min(2.0) / 2.0);
+        let turned = angle * (turn + 0.5 * (1.0 - (PI * within).cos()));
+        let rate = if within > 0.0 && within < 1.0 { angle * 0.25 * PI * (PI * within).sin() } else { 0.0 };
+        let to_q = (UnitQuaternion::from_axis_angle(&axis, turned) * start).inverse();
+        [
+            to_q * Vector3::new(0.0, 0.0, -9.7997),
+            to_q * (axis.into_inner() * rate),
+            to_q * Vector3::new(25.3, 2.6, 40.1),
+        ]
+    })
+}
