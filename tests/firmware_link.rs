@@ -9,6 +9,9 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, elf};
 /// of the other, which brings its arithmetic along.
 const BUDGET: [(&str, u64); 2] = [("Cortex-M4F", 6 * 1024), ("Cortex-M0", 8 * 1024)];
 
+/// Flash that an image may take which makes its observations, fits every sensor and judges the fits, bytes.
+const FIT_BUDGET: u64 = 76 * 1024;
+
 /// Instructions one corrected sample may take on a Cortex-M4F: 18 loads and stores, 12 operations, and a return.
 const INSTRUCTIONS_A_SAMPLE: usize = 40;
 
@@ -41,30 +44,73 @@ fn a_deliberate_panic_does_not_link() {
 
 #[test]
 fn device_and_host_compute_the_same_bits() {
-    if !ready() {
-        return;
-    }
     let mut host = String::new();
     firmware_example::replay::write(&mut host).expect("a String takes every line");
     assert!(host.contains("encoded alike\nacc apply "), "{host}");
+    if !ready() {
+        return;
+    }
     for board in BOARDS {
-        let output = run(board, "replay");
-        assert_eq!(output.status.code(), Some(0), "{output:?}");
-        let device = String::from_utf8(output.stdout).expect("the image writes text");
-        let differing = host.lines().zip(device.lines()).find(|(host, device)| host != device);
-        assert_eq!(differing, None, "host and {} differ", board.core);
-        assert_eq!(host.len(), device.len(), "{} wrote another number of lines", board.core);
+        assert_eq!(after_the_lines_of(&host, board, "replay"), "", "on {}", board.core);
     }
 }
 
 #[test]
-fn record_and_corrector_stay_within_their_flash() {
+fn the_fits_of_the_image_find_its_sensors_whether_resumed_or_not() {
+    let host = fits_of_the_host();
+    let errors: Vec<u32> = host
+        .lines()
+        .filter_map(|line| line.strip_suffix(" standard errors of the truth"))
+        .map(|line| line.rsplit(' ').next().and_then(|count| count.parse().ok()).expect("a number"))
+        .collect();
+    assert_eq!(errors.len(), 4, "{host}");
+    assert!(errors.iter().all(|error| *error <= 4), "{errors:?}");
+    for (ending, count) in [(" resumed alike", 5), (" accepted", 4), ("as T9 not-redundant", 1)] {
+        assert_eq!(host.lines().filter(|line| line.ends_with(ending)).count(), count, "{ending}:\n{host}");
+    }
+    assert!(host.contains("\nrecord decoded alike: 49 4d 55 43 "), "{host}");
+}
+
+#[test]
+fn device_and_host_fit_to_the_same_bits_and_the_stack_suffices() {
+    if !ready() {
+        return;
+    }
+    let host = fits_of_the_host();
+    for board in BOARDS {
+        let stack = after_the_lines_of(&host, board, "fit");
+        let figures: Vec<u32> = stack.split(' ').filter_map(|word| word.parse().ok()).collect();
+        let [used, there] = figures[..] else { panic!("{}: {stack:?}", board.core) };
+        announce(&format!("stack: {}: fitting all sensors takes {used} of {there} B", board.core));
+        assert!(used < there, "{}: the stack has left its memory", board.core);
+    }
+}
+
+fn fits_of_the_host() -> String {
+    let mut host = String::new();
+    firmware_example::fit::write(&mut host).expect("a String takes every line");
+    host
+}
+
+/// What an image writes after the lines that it shares with the host.
+fn after_the_lines_of(host: &str, board: Board, image: &str) -> String {
+    let output = run(board, image);
+    assert_eq!(output.status.code(), Some(0), "{image} on {}: {output:?}", board.core);
+    let device = String::from_utf8(output.stdout).expect("the image writes text");
+    let differing = host.lines().zip(device.lines()).find(|(host, device)| host != device);
+    assert_eq!(differing, None, "host and {} differ", board.core);
+    device.strip_prefix(host).expect("as many lines as the host").to_owned()
+}
+
+#[test]
+fn record_corrector_and_fits_stay_within_their_flash() {
     if !ready() {
         return;
     }
     for (board, (core, budget)) in BOARDS.into_iter().zip(BUDGET) {
         assert_eq!(board.core, core);
-        let [empty, correct, gate] = ["empty", "correct", "gate"].map(|image| memory(&elf_of(board, image)));
+        let [empty, correct, gate, fit] =
+            ["empty", "correct", "gate", "fit"].map(|image| memory(&elf_of(board, image)));
         let flash = correct.flash - empty.flash;
         announce(&format!(
             "size: {core}: decode and apply take {flash} B of flash and {} B of static RAM over an empty image \
@@ -73,6 +119,13 @@ fn record_and_corrector_stay_within_their_flash() {
             gate.flash - empty.flash,
         ));
         assert!(flash <= budget, "{core}: {flash} B exceed {budget} B");
+        let flash = fit.flash - empty.flash;
+        announce(&format!(
+            "size: {core}: fitting all sensors takes {flash} B of flash and {} B of static RAM over an empty image \
+             (budget {FIT_BUDGET} B)",
+            fit.ram - empty.ram,
+        ));
+        assert!(flash <= FIT_BUDGET, "{core}: {flash} B exceed {FIT_BUDGET} B");
     }
 }
 

@@ -20,11 +20,11 @@ use crate::scalar::Scalar;
 /// Series are used below this squared angle, rad².
 const SERIES_LIMIT: f64 = 1.0;
 /// Terms of each series there.
-const TERMS: u32 = 9;
+const TERMS: usize = 9;
 /// Below this squared angle, rad², a few terms leave the same remainder.
 const SHORT_LIMIT: f64 = 0.02;
 /// Terms of each series there.
-const SHORT_TERMS: u32 = 6;
+const SHORT_TERMS: usize = 6;
 
 /// `[v]×`: the matrix that takes x to v × x.
 #[inline]
@@ -41,25 +41,38 @@ struct Coefficients<T> {
     c: T,
 }
 
+/// Factors of a series, as constants: a device without double precision takes hundreds of instructions for each.
+struct Factors<const N: u32>;
+
+impl<const N: u32> Factors<N> {
+    const ALL: [f64; TERMS - 1] = [
+        Self::at(1),
+        Self::at(2),
+        Self::at(3),
+        Self::at(4),
+        Self::at(5),
+        Self::at(6),
+        Self::at(7),
+        Self::at(8),
+    ];
+
+    const fn at(k: u32) -> f64 {
+        1.0 / ((2 * k + N - 1) * (2 * k + N)) as f64
+    }
+}
+
 /// The first `TERMS` of `Σ_k (−x)^k · N! / (2k + N)!` by Horner's rule, that is 1 − x/((N+1)(N+2)) · (1 − …).
 #[inline]
-fn series<T: Scalar, const N: u32, const TERMS: u32>(x: T) -> T {
+fn series<T: Scalar, const N: u32, const TERMS: usize>(x: T) -> T {
     let mut sum = T::one();
-    for k in (1..TERMS).rev() {
-        let factor = const_reciprocal(2 * k + N - 1, 2 * k + N);
-        sum = T::one() - x * sum * T::of(factor);
+    for factor in Factors::<N>::ALL.iter().take(TERMS - 1).rev() {
+        sum = T::one() - x * sum * T::of(*factor);
     }
     sum
 }
 
-/// 1 / (a b), folded at compile time once the loop above is unrolled.
 #[inline]
-fn const_reciprocal(a: u32, b: u32) -> f64 {
-    1.0 / (f64::from(a) * f64::from(b))
-}
-
-#[inline]
-fn series_coefficients<T: Scalar, const TERMS: u32>(x: T) -> Coefficients<T> {
+fn series_coefficients<T: Scalar, const TERMS: usize>(x: T) -> Coefficients<T> {
     Coefficients {
         a: series::<T, 1, TERMS>(x),
         b: series::<T, 2, TERMS>(x) * T::of(0.5),

@@ -4,19 +4,10 @@
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    use core::fmt::Write;
+    use firmware_example::{FAILED, console::Console, replay};
 
-    /// Byte by byte: the stream types of `semihosting` can panic.
-    struct Console;
-    impl Write for Console {
-        fn write_str(&mut self, text: &str) -> core::fmt::Result {
-            text.bytes().for_each(semihosting::sys::arm_compat::sys_writec);
-            Ok(())
-        }
-    }
-
-    let written = firmware_example::replay::write(&mut Console);
-    semihosting::process::exit(if written.is_ok() { 0 } else { firmware_example::FAILED })
+    let written = replay::write(&mut Console);
+    semihosting::process::exit(if written.is_ok() { 0 } else { FAILED })
 }
 
 #[cfg(not(target_os = "none"))]

@@ -32,10 +32,9 @@ impl<const P: usize> Parameterisation<P> {
                 *slot = *value;
             }
         }
-        Triad {
-            gain: Matrix3::from_row_iterator(all.iter().copied().take(9)),
-            bias: Vector3::from_iterator(all.iter().copied().skip(9)),
-        }
+        // By name: a matrix built of an iterator panics where that ends early.
+        let [a, b, c, d, e, f, g, h, i, x, y, z] = all.into();
+        Triad { gain: Matrix3::new(a, b, c, d, e, f, g, h, i), bias: Vector3::new(x, y, z) }
     }
 
     /// The parameter vector of a triad; entries that are not estimated are left out.

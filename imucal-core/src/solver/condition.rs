@@ -59,7 +59,9 @@ fn singular_values<T: Scalar, const P: usize>(mut w: SMatrix<T, P, P>) -> SVecto
         let mut turned = false;
         for i in 0..P {
             for j in (i + 1)..P {
-                turned |= orthogonalise(&mut w, i, j);
+                if let Ok([first, second]) = w.data.0.get_disjoint_mut([i, j]) {
+                    turned |= orthogonalise(first, second);
+                }
             }
         }
         if !turned {
@@ -73,10 +75,10 @@ fn singular_values<T: Scalar, const P: usize>(mut w: SMatrix<T, P, P>) -> SVecto
     values
 }
 
-/// Rotates columns `i` and `j` so that they are orthogonal; false where they were.
-fn orthogonalise<T: Scalar, const P: usize>(w: &mut SMatrix<T, P, P>, i: usize, j: usize) -> bool {
+/// Rotates two columns so that they are orthogonal; false where they were.
+fn orthogonalise<T: Scalar, const P: usize>(first: &mut [T; P], second: &mut [T; P]) -> bool {
     let (mut a, mut b, mut c) = (T::zero(), T::zero(), T::zero());
-    for (x, y) in w.column(i).iter().zip(w.column(j).iter()) {
+    for (x, y) in first.iter().zip(second.iter()) {
         a += *x * *x;
         b += *y * *y;
         c += *x * *y;
@@ -92,9 +94,9 @@ fn orthogonalise<T: Scalar, const P: usize>(w: &mut SMatrix<T, P, P>, i: usize, 
     let tangent = if zeta < T::zero() { -tangent } else { tangent };
     let cos = T::one() / (T::one() + tangent * tangent).root();
     let sin = cos * tangent;
-    let (first, second) = (w.column(i) * cos - w.column(j) * sin, w.column(i) * sin + w.column(j) * cos);
-    w.set_column(i, &first);
-    w.set_column(j, &second);
+    for (x, y) in first.iter_mut().zip(second.iter_mut()) {
+        (*x, *y) = (*x * cos - *y * sin, *x * sin + *y * cos);
+    }
     true
 }
 
