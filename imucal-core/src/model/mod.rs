@@ -12,6 +12,7 @@ use nalgebra::SVector;
 
 use crate::scalar::Scalar;
 
+mod block;
 pub mod norm;
 pub mod parameterisation;
 pub mod turn;
