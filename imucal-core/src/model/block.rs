@@ -3,6 +3,7 @@
 //! ```text
 //! φ = A (s0 − T b) + ½ cof(A) (c − s1 × b)          the block's rotation vector
 //! C ← C exp([φ]×)
+//! φ_e = φ − T e − ½ (A s1) × e                      with Earth rate e taken out
 //! ∂C: C(A + δA, b + δb) = exp([Σ M_k φ'_k]×) C,     M_k = C_k J_l(φ_k)
 //! ```
 //!
@@ -10,6 +11,7 @@
 //! | --- | --- | --- |
 //! | s0, s1, c, T | sums over a block of samples ([`Block`]), rad, rad·s, rad², and its duration, s | – |
 //! | A, b | gain and bias, rad/s; cof(A) = det(A) A⁻ᵀ, so that cof(A)(x × y) = Ax × Ay | K⁻¹, b |
+//! | e | mean Earth rate over the block, rad/s, calibrated axes: β = b + K e instead of b, K = A⁻¹, as A β = A b + e and cof(A)(s1 × K e) = (A s1) × e: no inverse is taken | Ω |
 //! | C | attitude before the block; φ' the derivative of φ by an entry of A or b | Ĉ |
 //!
 //! Source: models.md 3 (a reconstruction of Secer & Barshan 2016). Not modelled: rates that change within a sample,
@@ -24,11 +26,12 @@ use crate::{observation::Block, rotation::cross_matrix, scalar::Scalar, triad::T
 pub(super) type ByEntries<T> = SMatrix<T, 3, ENTRIES>;
 
 #[inline]
-pub(super) fn columns<T: Scalar>(a: &Matrix3<T>) -> [Vector3<T>; 3] {
+fn columns<T: Scalar>(a: &Matrix3<T>) -> [Vector3<T>; 3] {
     [a.column(0).into_owned(), a.column(1).into_owned(), a.column(2).into_owned()]
 }
 
-/// What a triad does to every block of a turn.
+/// What a triad does to every block.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct BlockRotation<T: Scalar> {
     gain: Matrix3<T>,
     /// cof(A), whose columns are the cross products of A's.
@@ -49,6 +52,18 @@ impl<T: Scalar> BlockRotation<T> {
     #[inline]
     pub(super) fn vector(&self, angle: &Vector3<T>, coning: &Vector3<T>) -> Vector3<T> {
         self.gain * angle + self.cofactor * coning
+    }
+
+    /// What Earth rate, calibrated axes, rad/s, adds to a block's rotation vector: T e + ½ (A s1) × e.
+    #[inline]
+    pub(super) fn earth(&self, block: &Block<T>, duration: T, earth: &Vector3<T>) -> Vector3<T> {
+        earth * duration + (self.gain * block.s1).cross(earth) * T::of(0.5)
+    }
+
+    /// Derivative of φ by the bias: −T A − ½ cof(A) [s1]×.
+    #[inline]
+    pub(super) fn by_bias(&self, block: &Block<T>, duration: T) -> Matrix3<T> {
+        -(self.gain * duration) - self.cofactor * cross_matrix(&block.s1) * T::of(0.5)
     }
 }
 
@@ -100,6 +115,15 @@ impl<T: Scalar> DerivativeSums<T> {
             }
         }
         self.time += m * duration;
+    }
+
+    /// Adds what the Earth rate taken out of the block just added changes: −½ (δA s1) × e, by δA.
+    #[inline]
+    pub(super) fn add_earth(&mut self, m: &Matrix3<T>, block: &Block<T>, earth: &Vector3<T>) {
+        let turned = m * cross_matrix(&(earth * T::of(0.5)));
+        for (sum, moment) in self.angle.iter_mut().zip(block.s1.iter()) {
+            *sum += turned * *moment;
+        }
     }
 
     /// Derivative by the gain's nine entries (rows) and the bias.

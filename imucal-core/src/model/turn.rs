@@ -21,7 +21,7 @@
 use nalgebra::{Matrix3, SVector};
 
 use super::{
-    Model, Parameterisation, RowSink,
+    Cost, Model, Parameterisation, RowSink,
     block::{BlockRotation, ByEntries, DerivativeSums, reduce},
 };
 use crate::{
@@ -86,6 +86,56 @@ impl<T: Scalar, const P: usize> Model<T, P> for TurnModel<'_, T, P> {
 
     fn independent_rows(&self) -> usize {
         2 * self.turns.len()
+    }
+}
+
+/// An evaluation of [`TurnModel`]'s cost under way.
+#[derive(Clone, Copy, Debug)]
+pub struct TurnPass<T: Scalar> {
+    triad: Triad<T>,
+    rotation: BlockRotation<T>,
+    turn: usize,
+    block: usize,
+    attitude: Matrix3<T>,
+    /// Σ |r|² of the turns before.
+    sum: T,
+}
+
+/// The field form as a swarm's cost: mean |r|² of a turn, rad² to second order; NaN without turns. A block of it is
+/// a block of a turn.
+impl<T: Scalar, const P: usize> Cost<T, P> for TurnModel<'_, T, P> {
+    type State = TurnPass<T>;
+
+    fn begin(&self, theta: &SVector<T, P>) -> TurnPass<T> {
+        let triad = self.form.triad(theta);
+        TurnPass {
+            triad,
+            rotation: BlockRotation::new(&triad),
+            turn: 0,
+            block: 0,
+            attitude: Matrix3::identity(),
+            sum: T::zero(),
+        }
+    }
+
+    fn advance(&self, _: &SVector<T, P>, pass: &mut TurnPass<T>, budget: &mut usize) -> Option<T> {
+        while let Some(turn) = self.turns.get(pass.turn) {
+            let until = turn.blocks.len().min(pass.block.saturating_add(*budget));
+            for (index, block) in turn.blocks.iter().enumerate().take(until).skip(pass.block) {
+                let (angle, coning) = reduce(&pass.triad.bias, block, turn.durations.get(index));
+                pass.attitude *= exp(&pass.rotation.vector(&angle, &coning));
+            }
+            *budget = budget.saturating_sub(until.saturating_sub(pass.block));
+            pass.block = until;
+            if pass.block < turn.blocks.len() {
+                return None;
+            }
+            pass.sum += (pass.attitude.tr_mul(&turn.before) - turn.after).norm_squared();
+            pass.turn += 1;
+            pass.block = 0;
+            pass.attitude = Matrix3::identity();
+        }
+        Some(pass.sum / T::of(self.turns.len() as f64))
     }
 }
 
