@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! ω̂      = A (ω_m − b − G f) − e
-//! φ_k     = A (s0 − T β) + ½ cof(A) (c − s1 × β) − T e_k − ½ (A s1) × e_k,   β = b + G f_k
+//! φ_k     = A s0 − T v + ½ cof(A) c − ½ (A s1) × v,   v = A (b + G f_k) + e_k
 //! Ĉ       = C_0 Π exp([φ_k]×)
 //! r = δφ  = log(C_refᵀ Ĉ),   J = mean |δφ|²
 //! ∂δφ     = J_l⁻¹(δφ)ᵀ Ĉᵀ Σ_k Ĉ_k J_l(φ_k) ∂φ_k
@@ -58,16 +58,10 @@ struct Gyroscope<T: Scalar> {
     rotation: BlockRotation<T>,
     gain: Matrix3<T>,
     bias: Vector3<T>,
+    /// A b.
+    still: Vector3<T>,
     /// G, where it is estimated.
     sensitivity: Option<Matrix3<T>>,
-}
-
-/// A block less bias, specific force and Earth rate.
-struct Reduced<T: Scalar> {
-    angle: Vector3<T>,
-    coning: Vector3<T>,
-    /// φ of the module's second equation.
-    phi: Vector3<T>,
 }
 
 impl<T: Scalar> Gyroscope<T> {
@@ -77,24 +71,26 @@ impl<T: Scalar> Gyroscope<T> {
             rotation: BlockRotation::new(&triad),
             gain: triad.gain,
             bias: triad.bias,
+            still: triad.gain * triad.bias,
             sensitivity: form.has_sensitivity().then(|| form.sensitivity(theta)),
         }
     }
 
+    /// β: the bias, and what specific force adds to it.
     #[inline]
-    fn reduce(&self, motion: &Motion<'_, T>, index: usize, block: &Block<T>) -> Reduced<T> {
-        let duration = motion.durations.get(index);
-        let beta = match (&self.sensitivity, motion.force.get(index)) {
-            (Some(sensitivity), Some(force)) => self.bias + sensitivity * force,
-            _ => self.bias,
-        };
-        let (angle, coning) = reduce(&beta, block, duration);
-        let whole = self.rotation.vector(&angle, &coning);
-        let phi = match motion.earth.get(index) {
-            Some(earth) => whole - self.rotation.earth(block, duration, earth),
-            None => whole,
-        };
-        Reduced { angle, coning, phi }
+    fn beta(&self, motion: &Motion<'_, T>, index: usize) -> Option<Vector3<T>> {
+        let (sensitivity, force) = (self.sensitivity.as_ref()?, motion.force.get(index)?);
+        Some(self.bias + sensitivity * force)
+    }
+
+    /// φ of the module's second equation.
+    #[inline]
+    fn vector(&self, motion: &Motion<'_, T>, index: usize, block: &Block<T>) -> Vector3<T> {
+        let mut still = self.beta(motion, index).map_or(self.still, |beta| self.gain * beta);
+        if let Some(earth) = motion.earth.get(index) {
+            still += earth;
+        }
+        self.rotation.vector(block, motion.durations.get(index), &still)
     }
 }
 
@@ -125,11 +121,13 @@ impl<T: Scalar> Derivative<T> {
         m: &Matrix3<T>,
         gyroscope: &Gyroscope<T>,
         motion: &Motion<'_, T>,
-        at: (usize, &Block<T>, &Reduced<T>),
+        at: (usize, &Block<T>),
     ) {
-        let (index, block, reduced) = at;
+        let (index, block) = at;
         let duration = motion.durations.get(index);
-        self.triad.add(m, &reduced.angle, &reduced.coning, block, duration);
+        let (angle, coning) =
+            reduce(&gyroscope.beta(motion, index).unwrap_or(gyroscope.bias), block, duration);
+        self.triad.add(m, &angle, &coning, block, duration);
         if let Some(earth) = motion.earth.get(index) {
             self.triad.add_earth(m, block, earth);
         }
@@ -163,13 +161,13 @@ impl<T: Scalar, const P: usize> Model<T, P> for AttitudeModel<'_, T, P> {
             let (mut index, mut reference) = (0, 0);
             while let Some((after, attitude)) = motion.reference(reference) {
                 for block in motion.blocks.iter().take(after).skip(index) {
-                    let reduced = gyroscope.reduce(motion, index, block);
+                    let phi = gyroscope.vector(motion, index, block);
                     if S::JACOBIAN {
-                        let (step, jacobian) = exp_with_jacobian(&reduced.phi);
-                        sums.add(&(c * jacobian), &gyroscope, motion, (index, block, &reduced));
+                        let (step, jacobian) = exp_with_jacobian(&phi);
+                        sums.add(&(c * jacobian), &gyroscope, motion, (index, block));
                         c *= step;
                     } else {
-                        c *= exp(&reduced.phi);
+                        c *= exp(&phi);
                     }
                     index += 1;
                 }
@@ -239,7 +237,7 @@ impl<T: Scalar, const P: usize> Cost<T, P> for AttitudeModel<'_, T, P> {
             let until = after.min(pass.block.saturating_add(*budget));
             let mut c = pass.attitude;
             for (index, block) in motion.blocks.iter().enumerate().take(until).skip(pass.block) {
-                c *= exp(&pass.gyroscope.reduce(motion, index, block).phi);
+                c *= exp(&pass.gyroscope.vector(motion, index, block));
             }
             pass.attitude = c;
             *budget = budget.saturating_sub(until.saturating_sub(pass.block));

@@ -1,18 +1,21 @@
 //! What a gyroscope's triad makes of compressed blocks: one formula for every model that integrates them.
 //!
 //! ```text
-//! φ = A (s0 − T b) + ½ cof(A) (c − s1 × b)          the block's rotation vector
+//! φ = A s0 − T v + ½ cof(A) c − ½ (A s1) × v,   v = A β + e        the block's rotation vector
 //! C ← C exp([φ]×)
-//! φ_e = φ − T e − ½ (A s1) × e                      with Earth rate e taken out
 //! ∂C: C(A + δA, b + δb) = exp([Σ M_k φ'_k]×) C,     M_k = C_k J_l(φ_k)
 //! ```
 //!
 //! | symbol | meaning | paper |
 //! | --- | --- | --- |
 //! | s0, s1, c, T | sums over a block of samples ([`Block`]), rad, rad·s, rad², and its duration, s | – |
-//! | A, b | gain and bias, rad/s; cof(A) = det(A) A⁻ᵀ, so that cof(A)(x × y) = Ax × Ay | K⁻¹, b |
-//! | e | mean Earth rate over the block, rad/s, calibrated axes: β = b + K e instead of b, K = A⁻¹, as A β = A b + e and cof(A)(s1 × K e) = (A s1) × e: no inverse is taken | Ω |
+//! | A, β | gain, and bias with whatever else is constant over a block, raw rad/s | K⁻¹, b |
+//! | e | Earth rate, calibrated axes, mean over the block, rad/s; zero where it is part of the bias | Ω |
+//! | v | rate that the block reads while nothing turns, calibrated, rad/s | – |
 //! | C | attitude before the block; φ' the derivative of φ by an entry of A or b | Ĉ |
+//!
+//! This is `A (s0 − T β') + ½ cof(A) (c − s1 × β')` with β' = β + A⁻¹ e, written out by cof(A)(x × y) = Ax × Ay: so
+//! no inverse is taken, and all that is constant over a block is one vector.
 //!
 //! Source: models.md 3 (a reconstruction of Secer & Barshan 2016). Not modelled: rates that change within a sample,
 //! and the third order of a block (see [`super::attitude`] for its size).
@@ -48,16 +51,11 @@ impl<T: Scalar> BlockRotation<T> {
         Matrix3::from_columns(&[y.cross(&z), z.cross(&x), x.cross(&y)])
     }
 
-    /// φ of the module's first equation, from what [`reduce`] leaves of a block.
+    /// φ of the module's first equation, less what stands still: v.
     #[inline]
-    pub(super) fn vector(&self, angle: &Vector3<T>, coning: &Vector3<T>) -> Vector3<T> {
-        self.gain * angle + self.cofactor * coning
-    }
-
-    /// What Earth rate, calibrated axes, rad/s, adds to a block's rotation vector: T e + ½ (A s1) × e.
-    #[inline]
-    pub(super) fn earth(&self, block: &Block<T>, duration: T, earth: &Vector3<T>) -> Vector3<T> {
-        earth * duration + (self.gain * block.s1).cross(earth) * T::of(0.5)
+    pub(super) fn vector(&self, block: &Block<T>, duration: T, still: &Vector3<T>) -> Vector3<T> {
+        let swing = self.cofactor * block.c - (self.gain * block.s1).cross(still);
+        self.gain * block.s0 - still * duration + swing * T::of(0.5)
     }
 
     /// Derivative of φ by the bias: −T A − ½ cof(A) [s1]×.
@@ -67,7 +65,7 @@ impl<T: Scalar> BlockRotation<T> {
     }
 }
 
-/// A block less its bias: s0 − T b and ½ (c − s1 × b).
+/// What the derivative by the gain is made of: s0 − T β and ½ (c − s1 × β).
 #[inline]
 pub(super) fn reduce<T: Scalar>(
     bias: &Vector3<T>,

@@ -18,7 +18,7 @@
 //! Earth rate (it is part of the bias where that is taken from rests), g-sensitivity, rates that change within a
 //! sample.
 
-use nalgebra::{Matrix3, SVector};
+use nalgebra::{Matrix3, SVector, Vector3};
 
 use super::{
     Cost, Model, Parameterisation, RowSink,
@@ -44,9 +44,9 @@ pub struct TurnModel<'a, T: Scalar, const P: usize> {
 pub fn attitude<T: Scalar>(triad: &Triad<T>, turn: &Turn<'_, T>) -> Matrix3<T> {
     let mut c = Matrix3::identity();
     let rotation = BlockRotation::new(triad);
+    let still = triad.gain * triad.bias;
     for (index, block) in turn.blocks.iter().enumerate() {
-        let (angle, coning) = reduce(&triad.bias, block, turn.durations.get(index));
-        c *= exp(&rotation.vector(&angle, &coning));
+        c *= exp(&rotation.vector(block, turn.durations.get(index), &still));
     }
     c
 }
@@ -56,10 +56,11 @@ fn attitude_with_derivative<T: Scalar>(triad: &Triad<T>, turn: &Turn<'_, T>) -> 
     let mut c = Matrix3::identity();
     let mut sums = DerivativeSums::new();
     let rotation = BlockRotation::new(triad);
+    let still = triad.gain * triad.bias;
     for (index, block) in turn.blocks.iter().enumerate() {
         let duration = turn.durations.get(index);
         let (angle, coning) = reduce(&triad.bias, block, duration);
-        let (step, jacobian) = exp_with_jacobian(&rotation.vector(&angle, &coning));
+        let (step, jacobian) = exp_with_jacobian(&rotation.vector(block, duration, &still));
         sums.add(&(c * jacobian), &angle, &coning, block, duration);
         c *= step;
     }
@@ -92,8 +93,9 @@ impl<T: Scalar, const P: usize> Model<T, P> for TurnModel<'_, T, P> {
 /// An evaluation of [`TurnModel`]'s cost under way.
 #[derive(Clone, Copy, Debug)]
 pub struct TurnPass<T: Scalar> {
-    triad: Triad<T>,
     rotation: BlockRotation<T>,
+    /// A b.
+    still: Vector3<T>,
     turn: usize,
     block: usize,
     attitude: Matrix3<T>,
@@ -109,8 +111,8 @@ impl<T: Scalar, const P: usize> Cost<T, P> for TurnModel<'_, T, P> {
     fn begin(&self, theta: &SVector<T, P>) -> TurnPass<T> {
         let triad = self.form.triad(theta);
         TurnPass {
-            triad,
             rotation: BlockRotation::new(&triad),
+            still: triad.gain * triad.bias,
             turn: 0,
             block: 0,
             attitude: Matrix3::identity(),
@@ -122,8 +124,7 @@ impl<T: Scalar, const P: usize> Cost<T, P> for TurnModel<'_, T, P> {
         while let Some(turn) = self.turns.get(pass.turn) {
             let until = turn.blocks.len().min(pass.block.saturating_add(*budget));
             for (index, block) in turn.blocks.iter().enumerate().take(until).skip(pass.block) {
-                let (angle, coning) = reduce(&pass.triad.bias, block, turn.durations.get(index));
-                pass.attitude *= exp(&pass.rotation.vector(&angle, &coning));
+                pass.attitude *= exp(&pass.rotation.vector(block, turn.durations.get(index), &pass.still));
             }
             *budget = budget.saturating_sub(until.saturating_sub(pass.block));
             pass.block = until;
@@ -147,7 +148,6 @@ mod tests {
         observation::{Block, BlockBuilder, Durations},
         solver::jacobian_check::largest_jacobian_error,
     };
-    use nalgebra::Vector3;
     use proptest::prelude::*;
     use std::vec::Vec;
 

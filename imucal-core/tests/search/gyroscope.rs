@@ -145,16 +145,21 @@ fn summary(label: &str, outcomes: &[Outcome]) -> [usize; 3] {
         mean(|o| o.optimum)
     );
     println!("  swarm {:.3?}, swarm + LM {:.4?}", mean(|o| o.swarm), mean(|o| o.polished));
+    for (k, o) in outcomes.iter().enumerate().filter(|(_, o)| !o.reaches(o.polished)) {
+        println!("  {k}: swarm {:.2?}, swarm + LM {:.2?}, at a bound: {}", o.swarm, o.polished, o.at_bound);
+    }
     counts
 }
 
 #[test]
 fn the_swarm_finds_what_no_descent_from_nominal_does() {
-    let outcomes = outcomes(8, 0.1, 10.0, Variant::Constriction);
+    let outcomes = outcomes(8, 0.1, 10.0, Variant::default());
     let [swarm, identity, from_rest] = summary("10 %, 10 °/s", &outcomes);
     assert!(swarm >= 7 && identity <= 2 && from_rest == 8);
     for outcome in &outcomes {
-        assert!(outcome.optimum[0] < outcome.truth[0] && outcome.nominal[1] > 20.0 && !outcome.at_bound);
+        assert!(outcome.optimum[0] < outcome.truth[0] && outcome.nominal[1] > 20.0);
+        // A search that failed says so: its best lies on a bound.
+        assert_eq!(outcome.at_bound, !outcome.reaches(outcome.polished));
         // Judged on the second motion, where noise does not help the fit.
         assert!(!outcome.reaches(outcome.polished) || outcome.polished[1] < outcome.optimum[1] * 1.05 + 1e-3);
     }
@@ -164,15 +169,17 @@ fn the_swarm_finds_what_no_descent_from_nominal_does() {
 #[ignore = "four hundred searches take ten minutes"]
 fn success_rates_over_a_hundred_seeds() {
     use Variant::{Constriction, LinearInertia};
-    for (scale, bias, variant) in [
-        (0.1, 10.0, Constriction),
-        (0.1, 10.0, LinearInertia),
-        (0.05, 3.0, Constriction),
-        (0.01, 0.5, Constriction),
+    for (scale, bias, variant, least) in [
+        (0.1, 10.0, LinearInertia, 95),
+        (0.1, 10.0, Constriction, 90),
+        (0.05, 3.0, LinearInertia, 95),
+        (0.01, 0.5, LinearInertia, 95),
     ] {
         let label = format!("{variant:?} at {scale}, {bias} °/s");
-        let [swarm, _, from_rest] = summary(&label, &outcomes(100, scale, bias, variant));
-        assert!(from_rest == 100 && swarm >= 95, "{label}: {swarm} and {from_rest}");
+        let outcomes = outcomes(100, scale, bias, variant);
+        let [swarm, _, from_rest] = summary(&label, &outcomes);
+        assert!(from_rest == 100 && swarm >= least, "{label}: {swarm} and {from_rest}");
+        assert!(outcomes.iter().all(|o| o.reaches(o.polished) || o.at_bound), "a failure that nothing tells");
     }
 }
 
