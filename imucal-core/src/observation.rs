@@ -6,10 +6,11 @@
 //! | [`Rest`] | the moments of both inertial sensors, and the temperature | everything |
 //! | [`Block`] | a few gyroscope samples, compressed | [`Turn`] |
 //! | [`Turn`] | the blocks from inside one rest to inside the next | gyroscope |
+//! | [`Motion`] | blocks, and the attitudes that a rig's encoders give | gyroscope |
 //!
 //! All in SI of the sensor's nominal output (m/s², rad/s, µT), sensor frame `s`, before calibration.
 
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, Vector3};
 
 use crate::scalar::Scalar;
 
@@ -166,6 +167,59 @@ pub struct Turn<'a, T: Scalar> {
     pub before: Vector3<T>,
     /// The same in the rest after.
     pub after: Vector3<T>,
+}
+
+/// After how many blocks of a motion each reference attitude stands.
+#[derive(Clone, Copy, Debug)]
+pub enum Compared<'a> {
+    /// Reference k after (k + 1) times as many.
+    Every(u32),
+    /// One number for each reference, ascending: references at rests.
+    After(&'a [u32]),
+}
+
+impl Compared<'_> {
+    /// Blocks before reference `index`; `None` without a number for it.
+    pub fn get(&self, index: usize) -> Option<usize> {
+        match self {
+            Self::Every(blocks) => usize::try_from(*blocks).ok()?.checked_mul(index.checked_add(1)?),
+            Self::After(all) => usize::try_from(*all.get(index)?).ok(),
+        }
+    }
+}
+
+/// A motion whose attitudes a rig knows: blocks of the gyroscope between reference attitudes.
+///
+/// In `f32` a block takes 36 bytes, 12 more for Earth rate and 12 more for specific force; a reference takes 16.
+/// Quaternions (w first, of any length) take components from the table `r`, which carries the sensor, to the base
+/// `p`, `v_p = q v_r q*`; the sensor's mounting on the table is part of its gain.
+#[derive(Clone, Copy, Debug)]
+pub struct Motion<'a, T: Scalar> {
+    /// Gyroscope blocks in time order; their rates are nominal SI, rad/s.
+    pub blocks: &'a [Block<T>],
+    /// Their durations, s.
+    pub durations: Durations<'a, T>,
+    /// Mean Earth rate over each block, rad/s, components in the table's frame, from the reference attitudes; zero
+    /// beyond the last. Empty: not taken out.
+    pub earth: &'a [Vector3<T>],
+    /// Mean specific force over each block, m/s², components in the table's frame; zero beyond the last. Looked at
+    /// only where g-sensitivity is estimated.
+    pub force: &'a [Vector3<T>],
+    /// Attitude before the first block.
+    pub start: Quaternion<T>,
+    /// Attitudes to compare with, in time order.
+    pub references: &'a [Quaternion<T>],
+    /// Where they stand.
+    pub compared: Compared<'a>,
+}
+
+impl<T: Scalar> Motion<'_, T> {
+    /// Reference `index` and the blocks before it; `None` beyond the last that the blocks reach.
+    #[inline]
+    pub fn reference(&self, index: usize) -> Option<(usize, &Quaternion<T>)> {
+        let blocks = self.compared.get(index).filter(|blocks| *blocks <= self.blocks.len())?;
+        Some((blocks, self.references.get(index)?))
+    }
 }
 
 /// A point that ought to lie on a sphere once calibrated: a rest of an accelerometer, a sample of a magnetometer.

@@ -4,6 +4,7 @@
 //! | --- | --- | --- |
 //! | [`dip`] | cosine between gravity and field, against one value for all poses | – |
 //! | [`norm`] | distance of a point from the shell that calibration maps to a sphere | raw (nominal SI) |
+//! | [`attitude`] | attitude that the gyroscope integrates, against a rig's encoders | rad |
 //! | [`turn`] | gravity's direction carried through a turn by the gyroscope, against the accelerometer's | rad |
 //! | [`unified`] | output of a triad on a rig, against what it put out | raw (nominal SI) |
 //!
@@ -14,6 +15,8 @@ use nalgebra::SVector;
 
 use crate::scalar::Scalar;
 
+pub mod attitude;
+mod block;
 pub mod dip;
 pub mod norm;
 pub mod parameterisation;
@@ -39,6 +42,27 @@ pub trait Model<T: Scalar, const P: usize> {
 
     /// Independent residuals among the rows: what the degrees of freedom are counted from.
     fn independent_rows(&self) -> usize;
+}
+
+/// A cost that is worked out block by block, so that a search can be laid aside within one evaluation.
+pub trait Cost<T: Scalar, const P: usize> {
+    /// An evaluation under way.
+    type State;
+
+    /// Starts an evaluation at `theta`.
+    fn begin(&self, theta: &SVector<T, P>) -> Self::State;
+
+    /// Works off at most `budget` blocks and counts them down; the cost, once it is known.
+    ///
+    /// The answer must not depend on how often this was called. `theta` is the one given to [`begin`](Self::begin).
+    /// A cost of NaN or infinity is never the best. Only a used-up budget may leave the cost unknown.
+    fn advance(&self, theta: &SVector<T, P>, state: &mut Self::State, budget: &mut usize) -> Option<T>;
+
+    /// The cost at `theta`, in one go; NaN where it does not keep to the rule above.
+    fn cost(&self, theta: &SVector<T, P>) -> T {
+        let mut budget = usize::MAX;
+        self.advance(theta, &mut self.begin(theta), &mut budget).unwrap_or_else(|| T::of(f64::NAN))
+    }
 }
 
 /// Sum of squared residuals.

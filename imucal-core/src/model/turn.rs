@@ -18,18 +18,18 @@
 //! Earth rate (it is part of the bias where that is taken from rests), g-sensitivity, rates that change within a
 //! sample.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SVector, Vector3};
 
-use super::{Model, Parameterisation, RowSink, parameterisation::ENTRIES};
+use super::{
+    Cost, Model, Parameterisation, RowSink,
+    block::{BlockRotation, ByEntries, DerivativeSums, reduce},
+};
 use crate::{
-    observation::{Block, Turn},
+    observation::Turn,
     rotation::{cross_matrix, exp, exp_with_jacobian},
     scalar::Scalar,
     triad::Triad,
 };
-
-/// Derivative of a rotation vector by the twelve entries of a triad.
-type ByEntries<T> = SMatrix<T, 3, ENTRIES>;
 
 /// Turns whose end directions are known.
 #[derive(Clone, Copy, Debug)]
@@ -40,113 +40,15 @@ pub struct TurnModel<'a, T: Scalar, const P: usize> {
     pub form: Parameterisation<P>,
 }
 
-#[inline]
-fn columns<T: Scalar>(a: &Matrix3<T>) -> [Vector3<T>; 3] {
-    [a.column(0).into_owned(), a.column(1).into_owned(), a.column(2).into_owned()]
-}
-
-/// What a triad does to every block of a turn.
-struct BlockRotation<T: Scalar> {
-    gain: Matrix3<T>,
-    /// cof(A), whose columns are the cross products of A's.
-    cofactor: Matrix3<T>,
-}
-
-impl<T: Scalar> BlockRotation<T> {
-    fn new(triad: &Triad<T>) -> Self {
-        Self { gain: triad.gain, cofactor: Self::cofactor(&triad.gain) }
-    }
-
-    fn cofactor(gain: &Matrix3<T>) -> Matrix3<T> {
-        let [x, y, z] = columns(gain);
-        Matrix3::from_columns(&[y.cross(&z), z.cross(&x), x.cross(&y)])
-    }
-
-    /// φ of the module's first equation, from what [`reduce`] leaves of a block.
-    #[inline]
-    fn vector(&self, angle: &Vector3<T>, coning: &Vector3<T>) -> Vector3<T> {
-        self.gain * angle + self.cofactor * coning
-    }
-}
-
-/// A block less its bias: s0 − T b and ½ (c − s1 × b).
-#[inline]
-fn reduce<T: Scalar>(bias: &Vector3<T>, block: &Block<T>, duration: T) -> (Vector3<T>, Vector3<T>) {
-    (block.s0 - bias * duration, (block.c - block.s1.cross(bias)) * T::of(0.5))
-}
-
 /// `C_after_before`: the attitude after the turn, as the product of its blocks.
 pub fn attitude<T: Scalar>(triad: &Triad<T>, turn: &Turn<'_, T>) -> Matrix3<T> {
     let mut c = Matrix3::identity();
     let rotation = BlockRotation::new(triad);
+    let still = triad.gain * triad.bias;
     for (index, block) in turn.blocks.iter().enumerate() {
-        let (angle, coning) = reduce(&triad.bias, block, turn.durations.get(index));
-        c *= exp(&rotation.vector(&angle, &coning));
+        c *= exp(&rotation.vector(block, turn.durations.get(index), &still));
     }
     c
-}
-
-/// Sums over a turn's blocks from which the derivative by all twelve entries follows at its end.
-///
-/// A block adds M φ' to the derivative, M = C J_l(φ), and φ' is linear in the block's few numbers: so M is summed
-/// against each of them, and the gain's and bias's part is multiplied on once a turn instead of once a block.
-struct DerivativeSums<T: Scalar> {
-    /// Σ M a_i, a = s0 − T b.
-    angle: [Matrix3<T>; 3],
-    /// Σ M w_i, w = ½ (c − s1 × b).
-    coning: [Matrix3<T>; 3],
-    /// Σ M s1_i.
-    moment: [Matrix3<T>; 3],
-    /// Σ M T.
-    time: Matrix3<T>,
-}
-
-impl<T: Scalar> DerivativeSums<T> {
-    fn new() -> Self {
-        let none = [Matrix3::zeros(); 3];
-        Self { angle: none, coning: none, moment: none, time: Matrix3::zeros() }
-    }
-
-    #[inline]
-    fn add(
-        &mut self,
-        m: &Matrix3<T>,
-        angle: &Vector3<T>,
-        coning: &Vector3<T>,
-        block: &Block<T>,
-        duration: T,
-    ) {
-        for (sums, factors) in
-            [(&mut self.angle, angle), (&mut self.coning, coning), (&mut self.moment, &block.s1)]
-        {
-            for (sum, factor) in sums.iter_mut().zip(factors.iter()) {
-                *sum += m * *factor;
-            }
-        }
-        self.time += m * duration;
-    }
-
-    /// Derivative by the gain's nine entries (rows) and the bias.
-    fn by_entries(&self, gain: &Matrix3<T>) -> ByEntries<T> {
-        let [x, y, z] = columns(gain);
-        let [cx, cy, cz] = [x, y, z].map(|c| cross_matrix(&c));
-        let [kx, ky, kz] = self.coning;
-        let by_cofactor = [ky * cz - kz * cy, kz * cx - kx * cz, kx * cy - ky * cx];
-        let mut by = ByEntries::zeros();
-        for (column, (angle, cofactor)) in self.angle.iter().zip(by_cofactor.iter()).enumerate() {
-            let part = angle + cofactor;
-            for row in 0..3 {
-                by.set_column(3 * row + column, &part.column(row));
-            }
-        }
-        let cofactor = BlockRotation::cofactor(gain);
-        let [mx, my, mz] = self.moment;
-        let moment = mx * cofactor * cross_matrix(&Vector3::x())
-            + my * cofactor * cross_matrix(&Vector3::y())
-            + mz * cofactor * cross_matrix(&Vector3::z());
-        by.fixed_columns_mut::<3>(9).copy_from(&(-(self.time * gain) - moment * T::of(0.5)));
-        by
-    }
 }
 
 /// The attitude and the derivative of its rotation, in the frame before the turn.
@@ -154,10 +56,11 @@ fn attitude_with_derivative<T: Scalar>(triad: &Triad<T>, turn: &Turn<'_, T>) -> 
     let mut c = Matrix3::identity();
     let mut sums = DerivativeSums::new();
     let rotation = BlockRotation::new(triad);
+    let still = triad.gain * triad.bias;
     for (index, block) in turn.blocks.iter().enumerate() {
         let duration = turn.durations.get(index);
         let (angle, coning) = reduce(&triad.bias, block, duration);
-        let (step, jacobian) = exp_with_jacobian(&rotation.vector(&angle, &coning));
+        let (step, jacobian) = exp_with_jacobian(&rotation.vector(block, duration, &still));
         sums.add(&(c * jacobian), &angle, &coning, block, duration);
         c *= step;
     }
@@ -187,12 +90,62 @@ impl<T: Scalar, const P: usize> Model<T, P> for TurnModel<'_, T, P> {
     }
 }
 
+/// An evaluation of [`TurnModel`]'s cost under way.
+#[derive(Clone, Copy, Debug)]
+pub struct TurnPass<T: Scalar> {
+    rotation: BlockRotation<T>,
+    /// A b.
+    still: Vector3<T>,
+    turn: usize,
+    block: usize,
+    attitude: Matrix3<T>,
+    /// Σ |r|² of the turns before.
+    sum: T,
+}
+
+/// The field form as a swarm's cost: mean |r|² of a turn, rad² to second order; NaN without turns. A block of it is
+/// a block of a turn.
+impl<T: Scalar, const P: usize> Cost<T, P> for TurnModel<'_, T, P> {
+    type State = TurnPass<T>;
+
+    fn begin(&self, theta: &SVector<T, P>) -> TurnPass<T> {
+        let triad = self.form.triad(theta);
+        TurnPass {
+            rotation: BlockRotation::new(&triad),
+            still: triad.gain * triad.bias,
+            turn: 0,
+            block: 0,
+            attitude: Matrix3::identity(),
+            sum: T::zero(),
+        }
+    }
+
+    fn advance(&self, _: &SVector<T, P>, pass: &mut TurnPass<T>, budget: &mut usize) -> Option<T> {
+        while let Some(turn) = self.turns.get(pass.turn) {
+            let until = turn.blocks.len().min(pass.block.saturating_add(*budget));
+            for (index, block) in turn.blocks.iter().enumerate().take(until).skip(pass.block) {
+                pass.attitude *= exp(&pass.rotation.vector(block, turn.durations.get(index), &pass.still));
+            }
+            *budget = budget.saturating_sub(until.saturating_sub(pass.block));
+            pass.block = until;
+            if pass.block < turn.blocks.len() {
+                return None;
+            }
+            pass.sum += (pass.attitude.tr_mul(&turn.before) - turn.after).norm_squared();
+            pass.turn += 1;
+            pass.block = 0;
+            pass.attitude = Matrix3::identity();
+        }
+        Some(pass.sum / T::of(self.turns.len() as f64))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
         model::parameterisation::{FULL, FULL_GAIN},
-        observation::{BlockBuilder, Durations},
+        observation::{Block, BlockBuilder, Durations},
         solver::jacobian_check::largest_jacobian_error,
     };
     use proptest::prelude::*;

@@ -24,7 +24,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::{
     Model, RowSink,
-    parameterisation::select,
+    parameterisation::{matrix_by_rows, select, vector},
     rig::{GimbalPose, PoseRotations, RigAxes},
 };
 use crate::scalar::Scalar;
@@ -94,21 +94,20 @@ impl<T: Scalar> UnifiedParameters<T> {
 
     /// From all entries in a row.
     pub fn from_vector(all: &SVector<T, UNIFIED>) -> Self {
-        let three = |from: usize| Vector3::from_iterator(all.iter().copied().skip(from));
         let mut tilt = [T::zero(); 2];
         for (slot, value) in tilt.iter_mut().zip(all.iter().skip(12)) {
             *slot = *value;
         }
         Self {
-            sensitivity: Matrix3::from_row_iterator(all.iter().copied()),
-            bias: three(9),
+            sensitivity: matrix_by_rows(all, 0),
+            bias: vector(all, 9),
             tilt,
-            vector_n: three(14),
-            outer_source: three(17),
-            middle_source: three(20),
-            quadratic: three(23),
-            cubic: three(26),
-            cross_product: three(29),
+            vector_n: vector(all, 14),
+            outer_source: vector(all, 17),
+            middle_source: vector(all, 20),
+            quadratic: vector(all, 23),
+            cubic: vector(all, 26),
+            cross_product: vector(all, 29),
         }
     }
 

@@ -13,6 +13,8 @@ pub enum Termination {
     Step,
     /// No step can lower the cost by more than its own rounding.
     Precision,
+    /// A swarm has drawn together to its tolerance.
+    Spread,
     /// The iterations allowed are used up.
     Iterations,
     /// Damping grew without bound: no step lowers the cost.
@@ -22,9 +24,10 @@ pub enum Termination {
 }
 
 impl Termination {
-    /// The solver is at a stationary point; whether the calibration is any good is another question.
+    /// The solver is at a stationary point, or its swarm has settled on one point; whether the calibration is any
+    /// good is another question.
     pub fn was_successful(self) -> bool {
-        matches!(self, Self::Gradient | Self::Step | Self::Precision)
+        matches!(self, Self::Gradient | Self::Step | Self::Precision | Self::Spread)
     }
 
     /// The word for it in files and messages.
@@ -33,6 +36,7 @@ impl Termination {
             Self::Gradient => "gradient",
             Self::Step => "step",
             Self::Precision => "precision",
+            Self::Spread => "spread",
             Self::Iterations => "iterations",
             Self::Stalled => "stalled",
             Self::NotFinite => "not-finite",
