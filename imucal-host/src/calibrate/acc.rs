@@ -168,6 +168,7 @@ fn with_form<const P: usize>(
                     norm: gravity,
                     diagonal: model == AccModel::T6,
                     triad: summary.triad,
+                    std: Box::new(Triad { gain: summary.gain_std, bias: summary.bias_std }),
                 }),
                 fit: Some(summary),
             },
@@ -216,6 +217,7 @@ fn summary<const P: usize>(
         gain_spread: None,
         bias_wander: None,
         rig: None,
+        alignment: None,
     }
 }
 

@@ -294,6 +294,7 @@ fn summarise(
         gain_spread: None,
         bias_wander: Some(turns.wander),
         rig: None,
+        alignment: None,
     }
 }
 

@@ -6,10 +6,11 @@ use imucal_core::{
     observation::ShellPoint,
     triad::Triad,
 };
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
 use super::{
+    alignment,
     norm_fit::{NormFit, NormProblem, dynamic, raw_coverage},
     outcome::{Evidence, FitSummary, Refused, SensorOutcome},
 };
@@ -88,6 +89,7 @@ fn fit(points: &[ShellPoint<f64>], sensor: &Triple, field: Option<f64>) -> Resul
         norm,
         diagonal: false,
         triad: problem.form.triad(fit.solver.theta()),
+        std: Box::new(problem.form.triad(&fit.covariance(&inflation).diagonal().map(f64::sqrt))),
         points: fit.points,
     };
     Ok((summary, verdict.map(|()| evidence)))
@@ -125,6 +127,7 @@ fn summarise(
         gain_spread: None,
         bias_wander: None,
         rig: None,
+        alignment: None,
     }
 }
 
@@ -185,6 +188,19 @@ fn advice(refusal: &Refusal) -> String {
         _ => "check the recording for clipping, and for iron that moved",
     }
     .into()
+}
+
+/// Turns an accepted magnetometer alone into the accelerometer's axes, where the rests tell the rotation.
+/// `pairs` are the calibrated specific force and the nominal output of the magnetometer at each rest.
+pub fn align_with(fit: &mut FitSummary, pairs: &[(Vector3<f64>, Vector3<f64>)]) {
+    let corrected: Vec<_> = pairs.iter().map(|(f, m)| (*f, fit.triad.correct(m))).collect();
+    let Some(alignment) = alignment::align(&corrected) else { return };
+    let (triad, covariance) = alignment.turn(&fit.triad, &fit.covariance, &fit.covariance_of);
+    fit.triad = triad;
+    fit.gain_std = Matrix3::from_fn(|i, j| covariance[(3 * i + j, 3 * i + j)].sqrt());
+    fit.covariance = dynamic(&covariance);
+    fit.covariance_of = (0..12).collect();
+    fit.alignment = Some(alignment);
 }
 
 #[cfg(test)]

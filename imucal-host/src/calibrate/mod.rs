@@ -1,6 +1,6 @@
 //! A recording to a calibration: observations, fits through the core, acceptance.
 
-use imucal_core::{accept::Refusal, triad::Triad};
+use imucal_core::{accept::Refusal, observation::Moments, triad::Triad};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -82,9 +82,39 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         let field = recording.manifest.site.field_ned_ut.map(|f| Vector3::from(f).norm());
         let usable = usable(&integrity, SensorKind::Mag, recording.rows());
         let on_rig = rig::magnetometer(recording, mag, &usable, options, &mut calibration);
-        calibration.sensors.push(on_rig.unwrap_or_else(|| mag::calibrate(mag, &usable, field)));
+        let outcome = on_rig.unwrap_or_else(|| {
+            let mut outcome = mag::calibrate(mag, &usable, field);
+            if outcome.verdict.is_ok()
+                && let Some(fit) = &mut outcome.fit
+            {
+                mag::align_with(fit, &rest_pairs(recording, &usable, &calibration));
+            }
+            outcome
+        });
+        calibration.sensors.push(outcome);
     }
     calibration
+}
+
+/// Calibrated specific force and nominal magnetometer output at each rest; none without an accepted accelerometer.
+fn rest_pairs(
+    recording: &Recording,
+    usable: &[bool],
+    calibration: &Calibration,
+) -> Vec<(Vector3<f64>, Vector3<f64>)> {
+    let accepted = calibration.sensor(SensorKind::Acc).and_then(SensorOutcome::accepted);
+    let (Some(fit), Some(segmentation)) = (accepted, &calibration.segmentation) else { return Vec::new() };
+    let (Some(acc), Some(mag)) = (&recording.acc, &recording.mag) else { return Vec::new() };
+    let mean = |values: &[Vector3<f64>], rows: &std::ops::Range<usize>| {
+        let mut moments = Moments::default();
+        rows.clone().filter(|k| usable[*k]).for_each(|k| moments.push(&values[k]));
+        (moments.count() > 0).then(|| moments.mean())
+    };
+    segmentation
+        .rests
+        .iter()
+        .filter_map(|rows| Some((fit.triad.correct(&mean(&acc.values, rows)?), mean(&mag.values, rows)?)))
+        .collect()
 }
 
 /// What was found wrong with the samples and left out, in words.

@@ -3,7 +3,7 @@
 use imucal_core::{accept::Refusal, observation::ShellPoint, solver::Termination, triad::Triad};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use super::compare::Comparison;
+use super::{alignment::Alignment, compare::Comparison};
 use crate::{
     observe::turn::TurnData,
     recording::{Nominal, SensorKind, Unit},
@@ -56,6 +56,8 @@ pub enum Evidence {
         diagonal: bool,
         /// Where the fit ended, before any change of gauge.
         triad: Triad<f64>,
+        /// Standard errors of its entries.
+        std: Box<Triad<f64>>,
     },
     /// Turns of a gyroscope.
     Turns(Vec<KnownTurn>),
@@ -130,6 +132,8 @@ pub struct FitSummary {
     pub bias_wander: Option<BiasWander>,
     /// What belongs to the rig and not to the sensor, where there was one.
     pub rig: Option<RigFindings>,
+    /// Rotation of a magnetometer into the accelerometer's axes, where the rests told it.
+    pub alignment: Option<Alignment>,
 }
 
 /// What a fit on a rig found of the machine: reported, and never stored in a sensor's record.

@@ -191,6 +191,7 @@ fn summarise(
         gain_spread: None,
         bias_wander: None,
         rig: Some(findings(fit)),
+        alignment: None,
     }
 }
 

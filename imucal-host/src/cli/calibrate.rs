@@ -7,7 +7,8 @@ use imucal_core::record::Date;
 
 use super::{Ending, output, progress::Progress, read, warn};
 use crate::{
-    calibrate::{AccModel, Calibration, Options, calibrate, gyr, mag},
+    calibrate::{AccModel, Calibration, Options, calibrate, gyr, ladder, mag},
+    observe::pose,
     recording::{Recording, SensorKind},
     report,
     store::StoredCalibration,
@@ -17,8 +18,8 @@ use crate::{
 pub(super) struct Arguments {
     /// The recording: NAME.csv, NAME.csv.gz (or NAME.parquet), with NAME.toml beside it
     recording: PathBuf,
-    /// Models, e.g. acc=T9,gyr=K9,mag=E9; acc=T6 fits six parameters from six faces. A sensor named here must be
-    /// accepted for the program to end with 0
+    /// Models, e.g. acc=T9,gyr=K9,mag=E9; acc=T6 fits six parameters from six faces; on a rig acc=I14 (T12, I17, I20,
+    /// I23) and mag=X18 (M12, M15, X21). A sensor named here must be accepted for the program to end with 0
     #[arg(long, value_delimiter = ',', value_parser = model)]
     model: Vec<(SensorKind, ModelChoice)>,
     /// Write the calibration for people
@@ -33,23 +34,46 @@ pub(super) struct Arguments {
     /// Use this multiple of the initial rest's variance for the rest test instead of trying 2 to 10
     #[arg(long, value_name = "MULTIPLE", value_parser = multiple)]
     threshold: Option<f64>,
+    /// Fit every model of the ladders, score each on what is left out, and say which to use
+    #[arg(long)]
+    compare: bool,
 }
 
+/// A model named on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ModelChoice {
+    /// A field form of the accelerometer.
     Acc(AccModel),
-    Only,
+    /// A rung of the sensor's ladder on a rig.
+    Rig(&'static str),
+    /// The sensor's field form, where it has but one.
+    Field,
 }
 
 /// One `sensor=model`.
 fn model(text: &str) -> Result<(SensorKind, ModelChoice), String> {
-    match text {
-        "acc=T9" => Ok((SensorKind::Acc, ModelChoice::Acc(AccModel::T9))),
-        "acc=T6" => Ok((SensorKind::Acc, ModelChoice::Acc(AccModel::T6))),
-        _ if text.strip_prefix("gyr=") == Some(gyr::MODEL) => Ok((SensorKind::Gyr, ModelChoice::Only)),
-        _ if text.strip_prefix("mag=") == Some(mag::MODEL) => Ok((SensorKind::Mag, ModelChoice::Only)),
-        _ => Err(format!("`{text}` is no model; expected acc=T9, acc=T6, gyr=K9 or mag=E9")),
-    }
+    let rung = |ladder: &[(&'static str, &str)], name: &str| {
+        ladder.iter().find(|(known, _)| *known == name).map(|(known, _)| ModelChoice::Rig(known))
+    };
+    let found = match text.split_once('=') {
+        Some(("acc", "T9")) => Some((SensorKind::Acc, ModelChoice::Acc(AccModel::T9))),
+        Some(("acc", "T6")) => Some((SensorKind::Acc, ModelChoice::Acc(AccModel::T6))),
+        Some(("acc", name)) => rung(&ladder::ACCELEROMETER, name).map(|choice| (SensorKind::Acc, choice)),
+        Some(("gyr", name)) if name == gyr::MODEL => Some((SensorKind::Gyr, ModelChoice::Field)),
+        Some(("mag", name)) if name == mag::MODEL => Some((SensorKind::Mag, ModelChoice::Field)),
+        Some(("mag", name)) => rung(&ladder::MAGNETOMETER, name).map(|choice| (SensorKind::Mag, choice)),
+        _ => None,
+    };
+    found.ok_or_else(|| {
+        let names = |ladder: &[(&str, &str)]| ladder.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+        format!(
+            "`{text}` is no model; expected acc=T9 or acc=T6, on a rig acc= {}; gyr={}; mag={}, on a rig mag= {}",
+            names(&ladder::ACCELEROMETER),
+            gyr::MODEL,
+            mag::MODEL,
+            names(&ladder::MAGNETOMETER)
+        )
+    })
 }
 
 fn multiple(text: &str) -> Result<f64, String> {
@@ -65,6 +89,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     output::check(&output::files_of(&arguments.recording), &outputs(arguments))?;
     let recording = read(&arguments.recording)?;
     check_named(&recording, &named)?;
+    check_rig(&recording, &arguments.model)?;
     let progress = Progress::start();
     let calibration = calibrate(&recording, &options(arguments), &|stage| progress.stage(stage));
     drop(progress);
@@ -80,16 +105,40 @@ fn outputs(arguments: &Arguments) -> Vec<PathBuf> {
 }
 
 fn options(arguments: &Arguments) -> Options {
-    let mut options = Options::default();
-    for (_, choice) in &arguments.model {
-        if let ModelChoice::Acc(acc) = choice {
-            options.acc = *acc;
+    let mut options = Options { compare: arguments.compare, ..Options::default() };
+    for choice in &arguments.model {
+        match *choice {
+            (SensorKind::Acc, ModelChoice::Acc(field)) => (options.acc, options.rig_acc) = (field, None),
+            (SensorKind::Acc, ModelChoice::Rig(name)) => options.rig_acc = Some(name),
+            (SensorKind::Mag, ModelChoice::Rig(name)) => options.rig_mag = Some(name),
+            (SensorKind::Mag, ModelChoice::Field) => options.rig_mag = None,
+            _ => {}
         }
     }
     if let Some(threshold) = arguments.threshold {
         options.multipliers = vec![threshold];
     }
     options
+}
+
+/// A rung of a rig's ladder needs the rig.
+fn check_rig(recording: &Recording, models: &[(SensorKind, ModelChoice)]) -> anyhow::Result<()> {
+    for (kind, choice) in models {
+        let ModelChoice::Rig(name) = choice else { continue };
+        let file = &recording.name;
+        if let Err(why) = pose::axes_and_encoders(recording) {
+            anyhow::bail!(
+                "{file}: --model {kind}={name} needs a rig: {why}; leave it out for the field form"
+            );
+        }
+        if *kind == SensorKind::Mag && recording.manifest.site.field_ned_ut.is_none() {
+            anyhow::bail!(
+                "{file}: --model mag={name} needs Earth's field, expected [site] field_ned_ut = [north, east, down] \
+                 in its TOML; add it, or leave --model out for the field form"
+            );
+        }
+    }
+    Ok(())
 }
 
 /// Each sensor has one model.

@@ -73,11 +73,11 @@ impl FitEquivalence {
 pub fn compare(recording: &Recording, outcome: &SensorOutcome) -> Option<FitEquivalence> {
     let summary = outcome.accepted()?;
     match outcome.evidence.as_ref()? {
-        Evidence::Shell { points, norm, diagonal: false, triad } => {
-            shell(outcome.kind, points, *norm, triad, UPPER_TRIANGULAR, summary)
+        Evidence::Shell { points, norm, diagonal: false, triad, std } => {
+            shell(outcome.kind, points, *norm, (triad, std), UPPER_TRIANGULAR)
         }
-        Evidence::Shell { points, norm, diagonal: true, triad } => {
-            shell(outcome.kind, points, *norm, triad, DIAGONAL, summary)
+        Evidence::Shell { points, norm, diagonal: true, triad, std } => {
+            shell(outcome.kind, points, *norm, (triad, std), DIAGONAL)
         }
         Evidence::Turns(turns) => gyroscope(recording, turns, summary),
     }
@@ -87,9 +87,8 @@ fn shell<const P: usize>(
     kind: SensorKind,
     points: &[ShellPoint<f64>],
     norm: f64,
-    near: &Triad<f64>,
+    (near, std): (&Triad<f64>, &Triad<f64>),
     form: Parameterisation<P>,
-    summary: &FitSummary,
 ) -> Option<FitEquivalence> {
     // Both start a few percent away from the answer, so that both have to find it.
     let start = form.theta(&Triad { gain: near.gain * 1.02, bias: near.bias * 0.98 });
@@ -99,7 +98,7 @@ fn shell<const P: usize>(
     let report = solver.run(&NormModel { points: &narrow, norm: norm as f32, form });
     let plain: Vec<([f64; 3], f64)> = points.iter().map(|p| (p.value.into(), p.excess)).collect();
     let reference = reference::fit_shell(&plain, norm, P == 6, start.as_slice())?;
-    let std = form.theta(&Triad { gain: summary.gain_std, bias: summary.bias_std });
+    let std = form.theta(std);
     let scales = form.theta(&Triad {
         gain: nalgebra::Matrix3::repeat(near.gain.norm()),
         bias: Vector3::repeat(norm / near.gain.norm()),

@@ -75,13 +75,22 @@ pub fn rig_axes(rig: Option<&Rig>) -> Result<RigAxes, NoPoses> {
     Ok(RigAxes([axis(outer), axis(middle), axis(inner)]))
 }
 
-/// Stretches in which all encoders stand still, as half-open row ranges; the table's settling is left out.
+/// The rig's axes and the encoders' readings.
 ///
 /// # Errors
-/// [`NoPoses::NoEncoders`].
-pub fn still_stretches(recording: &Recording) -> Result<Vec<Range<usize>>, NoPoses> {
+/// [`NoPoses`] where there are no encoders, the manifest does not name the rig's axes, or angles are in degrees.
+pub fn axes_and_encoders(recording: &Recording) -> Result<(RigAxes, &[[f64; 3]]), NoPoses> {
     let gimbal = recording.gimbal.as_deref().ok_or(NoPoses::NoEncoders)?;
-    let time = &recording.time;
+    let axes = rig_axes(recording.manifest.rig.as_ref())?;
+    let largest = gimbal.iter().flatten().filter(|a| a.is_finite()).fold(0.0f64, |most, a| most.max(a.abs()));
+    if largest > LARGEST {
+        return Err(NoPoses::Degrees { largest });
+    }
+    Ok((axes, gimbal))
+}
+
+/// Stretches in which all encoders stand still, as half-open row ranges; the table's settling is left out.
+pub fn still_stretches(time: &[f64], gimbal: &[[f64; 3]]) -> Vec<Range<usize>> {
     let mut stretches = Vec::new();
     let mut from = 0;
     for k in 1..=gimbal.len() {
@@ -94,7 +103,7 @@ pub fn still_stretches(recording: &Recording) -> Result<Vec<Range<usize>>, NoPos
             from = k;
         }
     }
-    Ok(stretches)
+    stretches
 }
 
 /// From one reading of the encoders to another, through the wrap; NaN where either is missing.
@@ -109,14 +118,9 @@ fn turned(to: &[f64; 3], from: &[f64; 3]) -> Vector3<f64> {
 /// # Errors
 /// [`NoPoses`] where there are no encoders or the manifest does not name the rig's axes.
 pub fn poses(recording: &Recording, sensor: &Triple, usable: &[bool]) -> Result<Poses, NoPoses> {
-    let axes = rig_axes(recording.manifest.rig.as_ref())?;
-    let gimbal = recording.gimbal.as_deref().ok_or(NoPoses::NoEncoders)?;
-    let largest = gimbal.iter().flatten().filter(|a| a.is_finite()).fold(0.0f64, |most, a| most.max(a.abs()));
-    if largest > LARGEST {
-        return Err(NoPoses::Degrees { largest });
-    }
+    let (axes, gimbal) = axes_and_encoders(recording)?;
     let mut poses = Vec::new();
-    for rows in still_stretches(recording)? {
+    for rows in still_stretches(&recording.time, gimbal) {
         let Some(angles) = mean_angles(&gimbal[rows.clone()]) else { continue };
         let mut moments = Moments::default();
         rows.filter(|k| usable[*k]).for_each(|k| moments.push(&sensor.values[k]));
@@ -156,12 +160,10 @@ mod tests {
     #[test]
     fn a_stretch_ends_where_an_encoder_moves_or_is_missing() {
         let time: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.01).collect();
-        let mut recording = Recording::new("x.csv", crate::recording::Manifest::default(), time);
         let mut gimbal = vec![[0.5, 0.0, 0.0]; 1000];
         gimbal[400..].fill([0.9, 0.0, 0.0]);
         gimbal[700] = [f64::NAN; 3];
-        recording.gimbal = Some(gimbal);
         // Half a second of settling is left out of each.
-        assert_eq!(still_stretches(&recording).unwrap(), [50..400, 450..700, 751..1000]);
+        assert_eq!(still_stretches(&time, &gimbal), [50..400, 450..700, 751..1000]);
     }
 }

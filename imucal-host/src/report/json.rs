@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use crate::{
     calibrate::{
         Calibration, FitSummary, SegmentationReport, SensorOutcome,
+        alignment::Alignment,
         compare::Comparison,
         outcome::{RigFindings, entry_name},
     },
@@ -99,7 +100,22 @@ fn fit_value(kind: SensorKind, fit: &FitSummary) -> Value {
         "left_out": fit.left_out,
         "gain_spread_over_thresholds": fit.gain_spread,
         "bias_interpolated": fit.bias_wander.map(|w| w.interpolated),
+        "alignment": fit.alignment.as_ref().map(alignment),
         "rig": rig,
+    })
+}
+
+/// The magnetometer's rotation into the accelerometer's axes.
+fn alignment(found: &Alignment) -> Value {
+    json!({
+        "rotation_vector": vector(&found.phi),
+        "rotation_std": vector(&found.covariance.diagonal().map(f64::sqrt)),
+        "dip": found.dip.0,
+        "dip_std": found.dip.1,
+        "dip_rms": found.rms,
+        "dip_held_out_rms": found.held_out_rms,
+        "rests": found.rests,
+        "unit": "rad",
     })
 }
 

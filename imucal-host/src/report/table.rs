@@ -168,6 +168,19 @@ fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {
             wander.spread.norm().to_degrees() / 3f64.sqrt()
         )?;
     }
+    if let Some(alignment) = &fit.alignment {
+        let std = alignment.covariance.diagonal().map(f64::sqrt);
+        let degrees = |k: usize| measure(alignment.phi[k].to_degrees(), std[k].to_degrees());
+        writeln!(
+            text,
+            "  turned into the accelerometer's axes by {}°, {}°, {}°; dip {}°, held out within {:.2}°",
+            degrees(0),
+            degrees(1),
+            degrees(2),
+            measure(alignment.dip.0.to_degrees(), alignment.dip.1.to_degrees()),
+            alignment.held_out_rms.unwrap_or(f64::NAN).to_degrees()
+        )?;
+    }
     if let Some(rig) = &fit.rig {
         write_rig(text, rig)?;
     }
