@@ -36,7 +36,7 @@ pub(super) fn add(plan: &mut Plan, axes: [Axis; 3], random: &mut Random) {
     }
     for pose in poses {
         plan.slew(pose);
-        plan.rest(random.between(3.5, 6.0));
+        plan.rest(random.between(3.0, 5.0));
     }
 }
 

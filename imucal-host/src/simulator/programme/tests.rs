@@ -86,8 +86,12 @@ fn a_schedule_follows_from_its_seed_and_lasts_as_long_as_asked() {
     let at = |seed| schedule(Programme::Full, AXES[0], seed).truth(200.0, &|_| ());
     assert_eq!(at(1), at(1));
     assert_ne!(at(1), at(2));
-    let full = schedule(Programme::Full, AXES[0], 1).duration();
-    assert!((120.0..650.0).contains(&full), "{full}");
+    for programme in Programme::ALL {
+        for seed in 0..20 {
+            let duration = schedule(programme, AXES[1], seed).duration();
+            assert!((80.0..650.0).contains(&duration), "{programme:?} {seed}: {duration}");
+        }
+    }
     let longer = Programme::Full.schedule(AXES[0], 1, Some(640.0), Place::ankara()).unwrap();
     assert!((longer.duration() - 640.0).abs() < 1e-9);
 }

@@ -7,6 +7,7 @@ use crate::{
     effect::{Act, CATALOGUE, Role, Stage, find},
     simulator::truth::EARTH_RATE,
 };
+use SensorKind::{Acc, Mag};
 
 /// A short recording with rests, rates and swings of temperature.
 fn short() -> Simulation {
@@ -175,6 +176,75 @@ fn rests_show_gravity_and_the_rate_shows_earth_s_rotation() {
         assert!((truth.f_t.norm() - schedule.place().gravity).abs() < 1e-12);
         assert!((truth.w_it_t.norm() - EARTH_RATE).abs() < 1e-15, "{time}");
     }
+}
+
+#[test]
+fn the_rate_stays_the_derivative_of_the_attitude_on_a_bad_rig() {
+    let schedule = short().schedule().unwrap();
+    let h = 1e-5;
+    for effect in CATALOGUE.iter().filter(|effect| effect.act.stage() == Stage::Rig) {
+        let doses = [Dose::sized(effect, 20.0, 1, 100.0)];
+        for k in 0..100 {
+            let t = 1.0 + 0.9 * f64::from(k);
+            let rows = Chain::new(&doses).truth(&schedule, &[t - h, t, t + h]);
+            let numeric = (rows[2].f_t - rows[0].f_t) / (2.0 * h);
+            assert!((numeric + rows[1].w_pt_t.cross(&rows[1].f_t)).norm() < 1e-6, "{} {t}", effect.id);
+            let dw = (rows[2].w_it_t - rows[0].w_it_t) / (2.0 * h);
+            assert!((dw - rows[1].dw_it_t).norm() < 1e-3, "{} {t}", effect.id);
+        }
+    }
+}
+
+/// The truth with one effect less that without.
+fn added(simulation: &Simulation, id: &str, values: &[f64], sensor: SensorKind) -> Vec<Vector3<f64>> {
+    let doses = vec![Dose { effect: find(id).unwrap(), values: values.to_vec() }];
+    let (with, without) = (clean(&Simulation { doses, ..simulation.clone() }), clean(simulation));
+    let pairs = with.sensor(sensor).unwrap().values.iter().zip(&without.sensor(sensor).unwrap().values);
+    pairs.map(|(with, without)| with - without).collect()
+}
+
+fn rms(rows: &[Vector3<f64>]) -> f64 {
+    (rows.iter().map(|v| v.norm_squared()).sum::<f64>() / rows.len() as f64).sqrt()
+}
+
+fn difference(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+#[test]
+fn in_a_steady_field_eddy_currents_look_like_a_late_magnetometer() {
+    // Brisk sampling, since the filter takes its input as straight between rows.
+    let fast = Simulation { rate: 500.0, ..short() };
+    let by = |id| added(&fast, id, &[1e-3], Mag);
+    let (eddy, late) = (by("mag.eddy_current"), by("mag.bandwidth"));
+    assert!(rms(&difference(&eddy, &late)) < 0.05 * rms(&eddy));
+}
+
+#[test]
+fn axes_that_share_a_lever_arm_are_the_accelerometer_s_lever_arm() {
+    let arm = [0.03, -0.02, 0.05];
+    let inner = added(&short(), "acc.inner_lever_arm", &[arm, arm, arm].concat(), Acc);
+    let whole = added(&short(), "acc.lever_arm", &arm, Acc);
+    // The inner arms are in the enclosure's axes, turned by up to a degree, and behind K.
+    assert!(rms(&difference(&inner, &whole)) < 0.1 * rms(&whole));
+}
+
+#[test]
+fn a_lever_arm_adds_the_centripetal_acceleration() {
+    let simulation = Simulation { programme: Programme::Rates, ..short() };
+    let schedule = simulation.schedule().unwrap();
+    let doses = [Dose { effect: find("acc.lever_arm").unwrap(), values: vec![0.1, 0.0, 0.0] }];
+    let times: Vec<f64> = (0..1600).map(|k| 0.1 * f64::from(k)).collect();
+    let rows = Chain::new(&doses).truth(&schedule, &times);
+    let steady = rows.iter().filter(|row| row.dw_it_t.norm() < 1e-3 && row.w_pt_t.z.abs() > 2.0);
+    let mut found = 0;
+    for row in steady {
+        let added = row.f_t - schedule.truth(row.time, &|_| ()).f_t;
+        let across = row.w_it_t.norm_squared() - row.w_it_t.x * row.w_it_t.x;
+        assert!((added.x + 0.1 * across).abs() < 1e-3, "{added}");
+        found += 1;
+    }
+    assert!(found > 20, "{found}");
 }
 
 #[test]
