@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::Ending;
 use crate::{
-    effect::{self, Act, CATALOGUE, Effect},
+    effect::{self, Act, CATALOGUE, Effect, Parameter, Role},
     recording::{AtomicFile, Manifest, manifest::Axis, spelling::nearest},
     simulator::{
         Programme, Simulation, UnitKind,
@@ -23,8 +23,11 @@ const NEAR: usize = 8;
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
     /// The recording: NAME.csv or NAME.csv.gz; NAME.toml is written beside it
-    #[arg(long, value_name = "REC")]
-    out: PathBuf,
+    #[arg(long, value_name = "REC", required_unless_present = "list")]
+    out: Option<PathBuf>,
+    /// Name the effects there are, what causes them, and the usual size of their parameters
+    #[arg(long)]
+    list: bool,
     /// The unit: mtx or 3dm-gx2
     #[arg(long, value_name = "UNIT", default_value = "mtx", value_parser = unit)]
     unit: UnitKind,
@@ -103,6 +106,10 @@ fn axes(text: &str) -> Result<[Axis; 3], String> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let Some(out) = arguments.out.as_deref().filter(|_| !arguments.list) else {
+        CATALOGUE.iter().for_each(|effect| print!("{}", listed(effect)));
+        return Ok(Ending::Done);
+    };
     let mut simulation = Simulation {
         unit: arguments.unit,
         programme: arguments.programme,
@@ -115,12 +122,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         doses: Vec::new(),
     };
     if arguments.sealed {
-        return sealed(simulation, &arguments.out);
+        return sealed(simulation, out);
     }
     for (effect, size) in &arguments.effects {
         simulation.add(effect, *size)?;
     }
-    write(&simulation, &arguments.out)?;
+    write(&simulation, out)?;
     for dose in &simulation.doses {
         let values = dose.effect.parameters.iter().zip(&dose.values);
         let values: Vec<String> =
@@ -128,6 +135,26 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         println!("  {}: {}", dose.effect.id, values.join(", "));
     }
     Ok(Ending::Done)
+}
+
+/// An effect for people; parameters of the same size and unit together.
+fn listed(effect: &Effect) -> String {
+    let mut text = format!("{}\n  {}\n", effect.id, effect.words.cause);
+    let alike = |a: &Parameter, b: &Parameter| {
+        (a.prior_scale, &a.unit, a.neutral(1.0)) == (b.prior_scale, &b.unit, b.neutral(1.0))
+    };
+    for group in effect.parameters.chunk_by(alike) {
+        let names: Vec<&str> = group.iter().map(|parameter| parameter.name.as_str()).collect();
+        let first = &group[0];
+        let usual = match first.role {
+            Role::Amplitude => format!("{} {}", first.prior_scale, first.unit),
+            Role::Shape { usual } => format!("{usual} {}", first.unit),
+            Role::Instant { share } => format!("{:.0} % of the run", 100.0 * share),
+            Role::Choice => format!("0 to {}", first.range.1),
+        };
+        text += &format!("  {}: {usual}\n", names.join(", "));
+    }
+    text
 }
 
 fn write(simulation: &Simulation, out: &Path) -> anyhow::Result<()> {
@@ -230,6 +257,13 @@ mod tests {
         for text in ["gyr.warmup=", "gyr.warmup=big", "gyr.warmup=inf"] {
             assert!(dose(text).unwrap_err().contains("no number"), "{text}");
         }
+    }
+
+    #[test]
+    fn the_list_says_what_an_effect_is_and_how_large() {
+        let text = listed(effect::find("acc.warmup").unwrap());
+        assert!(text.starts_with("acc.warmup\n  The unit warms itself"), "{text}");
+        assert!(text.contains("x, y, z: 0.02 m/s^2\n  tau: 150 s\n"), "{text}");
     }
 
     #[test]
