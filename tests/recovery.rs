@@ -103,8 +103,8 @@ fn errors_of_thirty_recordings_are_as_large_as_their_standard_errors() {
     }
     let (mean, std) = moments(&pooled);
     println!("pooled: {mean:.3}, {std:.3} of {}", pooled.len());
-    assert_eq!(pooled.len(), 30 * (9 + 12 + 9), "every parameter of every recording");
-    // Nine hundred scores, hardly correlated from recording to recording: their mean is known to about 0.05 and their
+    assert_eq!(pooled.len(), 30 * (9 + 12 + 12), "every parameter of every recording");
+    // A thousand scores, hardly correlated from recording to recording: their mean is known to about 0.05 and their
     // spread to about 0.04. A variance estimated from 21 degrees of freedom widens the accelerometer's by 5 %.
     assert!(mean.abs() < 0.15, "{mean}");
     assert!((std - 1.0).abs() < 0.15, "{std}");

@@ -7,6 +7,8 @@
 
 pub mod recording;
 
+pub mod effect;
+
 pub mod simulator;
 
 pub mod observe;

@@ -63,7 +63,7 @@ fn bad_usage_ends_with_2() {
         ("calibrate", "<RECORDING>"),
         ("callibrate small.csv", "similar subcommand"),
         ("calibrate small.csv --outt x.toml", "--out"),
-        ("calibrate small.csv --model acc=T99", "expected acc=T9, acc=T6, gyr=K9 or mag=E9"),
+        ("calibrate small.csv --model acc=T99", "expected acc=T9 or acc=T6, on a rig acc="),
         ("calibrate small.csv --model acc=T9,acc=T6", "acc"),
         ("calibrate small.csv --threshold 0", "above 0"),
         ("apply small.csv", "--calibration"),

@@ -12,6 +12,7 @@ mod demo;
 mod inspect;
 mod output;
 mod progress;
+mod simulate;
 mod verify;
 
 /// Calibrates inertial and magnetic sensors from recordings, through the code that runs on their microcontroller.
@@ -32,6 +33,8 @@ enum Command {
     Inspect(inspect::Arguments),
     /// Compare the core in f32 with a reference in f64, sample by sample and fit by fit.
     Verify(verify::Arguments),
+    /// Record a simulated unit on a simulated flight motion simulator.
+    Simulate(simulate::Arguments),
     /// The whole way on a simulated sensor: record, calibrate, pack, apply, verify.
     Demo(demo::Arguments),
 }
@@ -52,6 +55,7 @@ pub fn run() -> ExitCode {
         Command::Apply(arguments) => apply::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
     };
     match result {

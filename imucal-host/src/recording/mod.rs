@@ -32,7 +32,7 @@ mod rig;
 mod saturation;
 mod sensor_kind;
 mod site;
-mod spelling;
+pub(crate) mod spelling;
 mod stuck;
 mod triple;
 pub mod unit;

@@ -1,7 +1,27 @@
-//! Simulated recordings: a motion that knows no sensor, and a sensor that knows no motion.
+//! Simulated recordings: movements that know no sensor, units that know no movement, and effects between them.
+//!
+//! Everything random follows from a seed and everything else from arithmetic that is the same on any machine: libm by
+//! name, no function of the platform.
 
+pub mod chain;
+pub mod climate;
+pub mod course;
+pub mod dose;
+mod error;
+pub mod gimbal;
+pub mod programme;
+pub mod random;
 pub mod recorder;
+pub mod run;
+pub mod truth;
 pub mod tumble;
+pub mod unit;
 
+pub use dose::Dose;
+pub use error::SimulationError;
+pub use programme::Programme;
 pub use recorder::{SimulatedSensor, SimulatedUnit, record};
-pub use tumble::{Truth, Tumble};
+pub use run::Simulation;
+pub use truth::{Motion, Place};
+pub use tumble::Tumble;
+pub use unit::UnitKind;

@@ -2,14 +2,14 @@
 
 use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 
-use super::tumble::Tumble;
+use super::{
+    random::{Purpose, Random},
+    truth::Motion,
+};
 use crate::recording::{
     Manifest, Recording, SensorKind, Unit,
-    manifest::{Counts, Identity, Rig, RigKind, Site},
+    manifest::{Counts, Identity, Site},
 };
 
 /// One triad of a unit.
@@ -83,40 +83,41 @@ impl SimulatedUnit {
         }
     }
 
-    fn manifest(&self, tumble: &Tumble) -> Manifest {
+    fn manifest(&self, motion: &dyn Motion) -> Manifest {
         let mut manifest = Manifest::default();
+        let place = motion.place();
         (manifest.units.acc, manifest.units.gyr, manifest.units.mag) =
             (Unit::Counts, Unit::Counts, Unit::Counts);
         manifest.counts.acc = Some(self.acc.counts);
         manifest.counts.gyr = Some(self.gyr.counts);
         manifest.counts.mag = Some(self.mag.counts);
         manifest.site = Site {
-            latitude_deg: Some(tumble.latitude.to_degrees()),
+            latitude_deg: Some(place.latitude_deg),
             height_m: None,
-            gravity: Some(tumble.gravity),
-            field_ned_ut: Some(tumble.field_n.into()),
+            gravity: Some(place.gravity),
+            field_ned_ut: Some(place.field_n.into()),
         };
-        manifest.rig = Some(Rig { kind: RigKind::Hand, axes: None });
+        manifest.rig = Some(motion.rig());
         manifest.sensor = Identity { name: Some(self.name.clone()), serial: Some(self.serial.clone()) };
         manifest
     }
 }
 
 /// Records a motion with a unit; the noise is drawn from the seed, the same on any machine.
-pub fn record(name: &str, tumble: &Tumble, unit: &SimulatedUnit, seed: u64) -> Recording {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let rows = (tumble.duration() / unit.interval).floor() as usize;
+pub fn record(name: &str, motion: &dyn Motion, unit: &SimulatedUnit, seed: u64) -> Recording {
+    let mut random = Random::new(seed, Purpose::Noise);
+    let rows = (motion.duration() / unit.interval).floor() as usize;
     let time: Vec<f64> = (0..rows).map(|k| k as f64 * unit.interval).collect();
     let mut columns = [const { Vec::new() }; 3];
     for t in &time {
-        let truth = tumble.truth(*t);
+        let truth = motion.truth(*t, &|_| ());
         for ((kind, value), column) in
-            SensorKind::ALL.into_iter().zip([truth.f_q, truth.w_iq_q, truth.b_q]).zip(&mut columns)
+            SensorKind::ALL.into_iter().zip([truth.f_t, truth.w_it_t, truth.b_t]).zip(&mut columns)
         {
-            column.push(sample(unit.sensor(kind), &value, &mut rng));
+            column.push(sample(unit.sensor(kind), &value, &mut random));
         }
     }
-    let manifest = unit.manifest(tumble);
+    let manifest = unit.manifest(motion);
     let [acc, gyr, mag] = columns;
     let mut recording = Recording::new(name, manifest.clone(), time);
     // Its own manifest has every conversion it needs.
@@ -127,11 +128,8 @@ pub fn record(name: &str, tumble: &Tumble, unit: &SimulatedUnit, seed: u64) -> R
 }
 
 /// One sample in nominal SI: the sensor's errors, noise, and the converter's steps.
-fn sample(sensor: &SimulatedSensor, truth: &Vector3<f64>, rng: &mut ChaCha8Rng) -> Vector3<f64> {
-    let noise = Vector3::from_fn(|_, _| {
-        let draw: f64 = StandardNormal.sample(rng);
-        draw * sensor.noise
-    });
+fn sample(sensor: &SimulatedSensor, truth: &Vector3<f64>, random: &mut Random) -> Vector3<f64> {
+    let noise = random.normals() * sensor.noise;
     let raw = sensor.truth.predict(&(truth + noise)).unwrap_or_default();
     raw.map(|counts| (counts.round() - sensor.counts.offset) / sensor.counts.per_unit)
 }

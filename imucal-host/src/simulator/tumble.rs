@@ -11,19 +11,11 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, UnitSphere};
 
-/// Earth's rotation, rad/s (IERS conventions 2010).
-const EARTH_RATE: f64 = 7.292_115e-5;
-
-/// What is true at one time, in the enclosure's frame `q`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Truth {
-    /// Specific force, m/s².
-    pub f_q: Vector3<f64>,
-    /// Rate against inertial space, rad/s.
-    pub w_iq_q: Vector3<f64>,
-    /// Magnetic field, µT.
-    pub b_q: Vector3<f64>,
-}
+use super::truth::{Motion, Place, in_the_open};
+use crate::{
+    effect::{Machine, Truth},
+    recording::manifest::{Rig, RigKind},
+};
 
 /// A programme of rests and turns.
 #[derive(Clone, Debug)]
@@ -32,12 +24,8 @@ pub struct Tumble {
     attitudes: Vec<UnitQuaternion<f64>>,
     /// First rest, other rests and turns, s.
     durations: (f64, f64, f64),
-    /// Local gravity, m/s².
-    pub gravity: f64,
-    /// Latitude, rad.
-    pub latitude: f64,
-    /// Earth's field in n, µT.
-    pub field_n: Vector3<f64>,
+    /// Where.
+    place: Place,
 }
 
 /// Where the programme is.
@@ -65,19 +53,7 @@ impl Tumble {
     /// Rests in the attitudes given, `C_q_n`, at least one; durations of the first rest, of the others and of turns, s.
     pub fn through(attitudes: Vec<UnitQuaternion<f64>>, durations: (f64, f64, f64)) -> Self {
         debug_assert!(!attitudes.is_empty());
-        Self {
-            attitudes,
-            durations,
-            gravity: 9.7997,
-            latitude: 39.87f64.to_radians(),
-            field_n: Vector3::new(25.3, 2.6, 40.1),
-        }
-    }
-
-    /// Length of the programme, s.
-    pub fn duration(&self) -> f64 {
-        let (first, rest, turn) = self.durations;
-        first + (self.attitudes.len() - 1) as f64 * (rest + turn)
+        Self { attitudes, durations, place: Place::ankara() }
     }
 
     fn phase(&self, time: f64) -> Phase {
@@ -93,25 +69,40 @@ impl Tumble {
         }
         Phase::Turn(index, within / turn)
     }
+}
 
-    /// The truth at a time from 0 to [`duration`](Self::duration), s.
-    pub fn truth(&self, time: f64) -> Truth {
-        let (attitude, rate) = match self.phase(time) {
-            Phase::Rest(k) => (self.attitudes[k], Vector3::zeros()),
+impl Motion for Tumble {
+    fn duration(&self) -> f64 {
+        let (first, rest, turn) = self.durations;
+        first + (self.attitudes.len() - 1) as f64 * (rest + turn)
+    }
+
+    /// No rig turns it: the table is the enclosure.
+    fn truth(&self, time: f64, _: &dyn Fn(&mut Machine)) -> Truth {
+        let (attitude, rate, acceleration) = match self.phase(time) {
+            Phase::Rest(k) => (self.attitudes[k], Vector3::zeros(), Vector3::zeros()),
             Phase::Turn(k, share) => {
                 let turn = (self.attitudes[k].inverse() * self.attitudes[k + 1]).scaled_axis();
-                let progress = 0.5 * (1.0 - (PI * share).cos());
-                let speed = 0.5 * PI * (PI * share).sin() / self.durations.2;
-                (self.attitudes[k] * UnitQuaternion::from_scaled_axis(turn * progress), turn * speed)
+                let (sin, cos) = libm::sincos(PI * share);
+                let pace = PI / self.durations.2;
+                let here = self.attitudes[k] * UnitQuaternion::from_scaled_axis(turn * (0.5 * (1.0 - cos)));
+                (here, turn * (0.5 * pace * sin), turn * (0.5 * pace * pace * cos))
             }
         };
-        let earth_n = Vector3::new(self.latitude.cos(), 0.0, -self.latitude.sin()) * EARTH_RATE;
-        let to_q = attitude.inverse();
-        Truth {
-            f_q: to_q * Vector3::new(0.0, 0.0, -self.gravity),
-            w_iq_q: rate + to_q * earth_n,
-            b_q: to_q * self.field_n,
-        }
+        let c_t_n = attitude.to_rotation_matrix();
+        in_the_open(time, c_t_n.matrix(), rate, acceleration, &self.place)
+    }
+
+    fn encoders(&self, _: f64) -> Option<[f64; 3]> {
+        None
+    }
+
+    fn rig(&self) -> Rig {
+        Rig { kind: RigKind::Hand, axes: None }
+    }
+
+    fn place(&self) -> Place {
+        self.place
     }
 }
 
@@ -125,16 +116,18 @@ mod tests {
         let h = 1e-5;
         for k in 0..200 {
             let t = 9.0 + f64::from(k) * 0.1;
-            let (before, here, after) = (tumble.truth(t - h), tumble.truth(t), tumble.truth(t + h));
-            // A direction fixed in n turns the other way in q: df/dt = −w × f.
-            let numeric = (after.f_q - before.f_q) / (2.0 * h);
-            assert!((numeric + here.w_iq_q.cross(&here.f_q)).norm() < 2e-3, "at {t} s");
+            let at = |t| tumble.truth(t, &|_| ());
+            let (before, here, after) = (at(t - h), at(t), at(t + h));
+            // A direction fixed in n turns the other way in t: df/dt = −w × f.
+            let numeric = (after.f_t - before.f_t) / (2.0 * h);
+            assert!((numeric + here.w_it_t.cross(&here.f_t)).norm() < 2e-3, "at {t} s");
         }
     }
 
     #[test]
     fn the_same_seed_gives_the_same_motion() {
-        assert_eq!(Tumble::new(9, 4).truth(33.3), Tumble::new(9, 4).truth(33.3));
-        assert_ne!(Tumble::new(9, 4).truth(33.3), Tumble::new(9, 5).truth(33.3));
+        let at = |seed| Tumble::new(9, seed).truth(33.3, &|_| ());
+        assert_eq!(at(4), at(4));
+        assert_ne!(at(4), at(5));
     }
 }

@@ -1,0 +1,303 @@
+//! `imucal simulate`
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::Args;
+use serde_json::json;
+use sha2::{Digest, Sha256};
+
+use super::Ending;
+use crate::{
+    effect::{self, Act, CATALOGUE, Effect, Parameter, Role},
+    recording::{AtomicFile, Manifest, manifest::Axis, spelling::nearest},
+    simulator::{
+        Programme, Simulation, UnitKind,
+        random::{Purpose, Random},
+    },
+};
+
+/// Edits within which a misspelt name is taken for a known one.
+const NEAR: usize = 8;
+
+#[derive(Args, Debug)]
+pub(super) struct Arguments {
+    /// The recording: NAME.csv or NAME.csv.gz; NAME.toml is written beside it
+    #[arg(long, value_name = "REC", required_unless_present = "list")]
+    out: Option<PathBuf>,
+    /// Name the effects there are, what causes them, and the usual size of their parameters
+    #[arg(long)]
+    list: bool,
+    /// The unit: mtx or 3dm-gx2
+    #[arg(long, value_name = "UNIT", default_value = "mtx", value_parser = unit)]
+    unit: UnitKind,
+    /// What the rig does: multi-position, rates, sinusoids, gyroscope, thermal or full
+    #[arg(long, value_name = "NAME", default_value = "full", value_parser = programme)]
+    programme: Programme,
+    /// An effect beyond the baseline, e.g. acc.lever_arm or mag.bias_step=3: its size in multiples of its usual one.
+    /// Several parameters point in a direction drawn from the seed; for P.axis_swap the size is the code of the order
+    #[arg(long = "effect", value_name = "ID[=SIZE]", value_parser = dose)]
+    effects: Vec<(&'static Effect, f64)>,
+    /// Everything random follows from it
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Sampling rate
+    #[arg(long, value_name = "HZ", default_value_t = 100.0)]
+    rate: f64,
+    /// Length in seconds; as long as the programme takes if not given. Rests are stretched or cut
+    #[arg(long, value_name = "S")]
+    duration: Option<f64>,
+    /// Gimbal axes, outermost first
+    #[arg(long, value_name = "AXES", default_value = "zyx", value_parser = axes)]
+    axes: [Axis; 3],
+    /// Write SI units instead of raw counts
+    #[arg(long)]
+    si: bool,
+    /// Leave out noise, drift, scatter and rounding
+    #[arg(long)]
+    no_noise: bool,
+    /// Draw seed and effects from a fresh nonce, write them into NAME.label.json and print only its SHA-256
+    #[arg(long, conflicts_with_all = ["effects", "seed"])]
+    sealed: bool,
+}
+
+fn unit(text: &str) -> Result<UnitKind, String> {
+    UnitKind::find(text).ok_or_else(|| unknown("unit", text, UnitKind::ALL.map(UnitKind::name)))
+}
+
+fn programme(text: &str) -> Result<Programme, String> {
+    Programme::find(text).ok_or_else(|| unknown("programme", text, Programme::ALL.map(Programme::name)))
+}
+
+fn dose(text: &str) -> Result<(&'static Effect, f64), String> {
+    let (id, size) = text.split_once('=').unwrap_or((text, "1"));
+    let effect = effect::find(id).ok_or_else(|| unknown("effect", id, CATALOGUE.iter().map(|e| &*e.id)))?;
+    let size: f64 = size
+        .parse()
+        .ok()
+        .filter(|size: &f64| size.is_finite())
+        .ok_or_else(|| format!("the size `{size}` of {id} is no number; expected for instance {id}=2"))?;
+    Ok((effect, size))
+}
+
+/// What was found, and the nearest name or all there are.
+fn unknown<'a>(what: &str, found: &str, names: impl IntoIterator<Item = &'a str> + Clone) -> String {
+    match nearest(found, names.clone(), NEAR) {
+        Some(name) => format!("there is no {what} `{found}`; did you mean `{name}`?"),
+        None => {
+            let list: Vec<&str> = names.into_iter().collect();
+            format!("there is no {what} `{found}`; expected one of {}", list.join(", "))
+        }
+    }
+}
+
+fn axes(text: &str) -> Result<[Axis; 3], String> {
+    let axis = |letter: char| match letter {
+        'x' => Some(Axis::X),
+        'y' => Some(Axis::Y),
+        'z' => Some(Axis::Z),
+        _ => None,
+    };
+    let axes: Vec<Axis> = text.chars().filter_map(axis).collect();
+    let apart = axes.windows(2).all(|pair| pair[0] != pair[1]) && text.chars().count() == 3;
+    let refusal =
+        || format!("`{text}` is no order of axes; expected three letters such as zyx, no two alike in a row");
+    <[Axis; 3]>::try_from(axes).ok().filter(|_| apart).ok_or_else(refusal)
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let Some(out) = arguments.out.as_deref().filter(|_| !arguments.list) else {
+        CATALOGUE.iter().for_each(|effect| print!("{}", listed(effect)));
+        return Ok(Ending::Done);
+    };
+    let mut simulation = Simulation {
+        unit: arguments.unit,
+        programme: arguments.programme,
+        axes: arguments.axes,
+        rate: arguments.rate,
+        duration: arguments.duration,
+        seed: arguments.seed,
+        noise: !arguments.no_noise,
+        counts: !arguments.si,
+        doses: Vec::new(),
+    };
+    if arguments.sealed {
+        return sealed(simulation, out);
+    }
+    for (effect, size) in &arguments.effects {
+        simulation.add(effect, *size)?;
+    }
+    write(&simulation, out)?;
+    for dose in &simulation.doses {
+        let values = dose.effect.parameters.iter().zip(&dose.values);
+        let values: Vec<String> =
+            values.map(|(p, value)| format!("{} = {value:.4e} {}", p.name, p.unit)).collect();
+        println!("  {}: {}", dose.effect.id, values.join(", "));
+    }
+    Ok(Ending::Done)
+}
+
+/// An effect for people; parameters of the same size and unit together.
+fn listed(effect: &Effect) -> String {
+    let mut text = format!("{}\n  {}\n", effect.id, effect.words.cause);
+    let alike = |a: &Parameter, b: &Parameter| {
+        (a.prior_scale, &a.unit, a.neutral(1.0)) == (b.prior_scale, &b.unit, b.neutral(1.0))
+    };
+    for group in effect.parameters.chunk_by(alike) {
+        let names: Vec<&str> = group.iter().map(|parameter| parameter.name.as_str()).collect();
+        let first = &group[0];
+        let usual = match first.role {
+            Role::Amplitude => format!("{} {}", first.prior_scale, first.unit),
+            Role::Shape { usual } => format!("{usual} {}", first.unit),
+            Role::Instant { share } => format!("{:.0} % of the run", 100.0 * share),
+            Role::Choice => format!("0 to {}", first.range.1),
+        };
+        text += &format!("  {}: {usual}\n", names.join(", "));
+    }
+    text
+}
+
+fn write(simulation: &Simulation, out: &Path) -> anyhow::Result<()> {
+    let name = out.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let recording = simulation.record(&name)?;
+    recording.write(out)?;
+    println!(
+        "{}: {} rows, {:.0} s of the programme {}, unit {}",
+        out.display(),
+        recording.rows(),
+        recording.rows() as f64 / simulation.rate,
+        simulation.programme.name(),
+        simulation.unit.name(),
+    );
+    Ok(())
+}
+
+/// None, one, two or three effects in a quarter, nearly half, a fifth and a tenth of all cases, of any size from a third of
+/// the usual to ten times it; what a calibration takes up, and gross mistakes, are not drawn.
+fn draw(simulation: &mut Simulation) -> anyhow::Result<()> {
+    let mut random = Random::new(simulation.seed, Purpose::Case);
+    let chance = random.share();
+    let count = [0.25, 0.7, 0.9].iter().filter(|bound| chance >= **bound).count();
+    let mut pool: Vec<&'static Effect> = CATALOGUE.iter().filter(|effect| is_drawn(effect)).collect();
+    random.shuffle(&mut pool);
+    for effect in pool.into_iter().take(count) {
+        let sign = if random.share() < 0.5 { -1.0 } else { 1.0 };
+        simulation.add(effect, sign * 0.3 * libm::pow(100.0 / 3.0, random.share()))?;
+    }
+    Ok(())
+}
+
+fn is_drawn(effect: &Effect) -> bool {
+    let baseline = matches!(effect.act, Act::Triad(..))
+        || ["rig.level_tilt", "rig.heading", "acc.gravity_error", "mag.hard_iron", "mag.soft_iron"]
+            .contains(&effect.id.as_str());
+    !baseline && !effect.id.ends_with(".axis_swap") && !effect.id.ends_with(".unit_error")
+}
+
+fn sealed(mut simulation: Simulation, out: &Path) -> anyhow::Result<Ending> {
+    let label_path = label_beside(out)?;
+    let mut nonce = [0u8; 32];
+    getrandom::fill(&mut nonce).context("the system gave no random numbers")?;
+    // Not the nonce itself, and one way: the recording says nothing of its label.
+    let seed = Sha256::new().chain_update(b"imucal sealed seed").chain_update(nonce).finalize();
+    simulation.seed = seed.iter().take(8).fold(0, |seed, byte| seed << 8 | u64::from(*byte));
+    draw(&mut simulation)?;
+    let effects: Vec<_> = simulation
+        .doses
+        .iter()
+        .map(|dose| {
+            let names = dose.effect.parameters.iter().map(|parameter| parameter.name.clone());
+            let values: serde_json::Map<_, _> = names.zip(dose.values.iter().map(|v| json!(v))).collect();
+            json!({ "effect": dose.effect.id, "parameters": values })
+        })
+        .collect();
+    let label = json!({
+        "format": "imucal-label/1",
+        "salt": hex(&nonce),
+        "seed": simulation.seed,
+        "unit": simulation.unit.name(),
+        "programme": simulation.programme.name(),
+        "effects": effects,
+    });
+    let text = serde_json::to_string_pretty(&label)? + "\n";
+    write(&simulation, out)?;
+    AtomicFile::write_whole(&label_path, text.as_bytes())
+        .with_context(|| format!("{}: cannot be written; check the folder", label_path.display()))?;
+    println!("{}: SHA-256 {}", label_path.display(), hex(&Sha256::digest(text.as_bytes())));
+    Ok(Ending::Done)
+}
+
+/// `NAME.label.json` for `NAME.csv.gz`.
+fn label_beside(out: &Path) -> anyhow::Result<PathBuf> {
+    let manifest = Manifest::path_beside(out)
+        .with_context(|| format!("{}: expected a name that ends in .csv or .csv.gz", out.display()))?;
+    Ok(manifest.with_extension("label.json"))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_name_is_answered_with_the_nearest() {
+        assert!(dose("acc.leverarm=2").unwrap_err().contains("did you mean `acc.lever_arm`"));
+        assert!(programme("rate").unwrap_err().contains("`rates`"));
+        assert!(unit("mti").unwrap_err().contains("`mtx`"));
+        assert!(dose("something else entirely").unwrap_err().contains("expected one of rig.level_tilt"));
+    }
+
+    #[test]
+    fn a_size_must_be_a_number() {
+        assert_eq!(dose("gyr.warmup=-2.5").unwrap().1, -2.5);
+        assert_eq!(dose("gyr.warmup").unwrap().1, 1.0);
+        for text in ["gyr.warmup=", "gyr.warmup=big", "gyr.warmup=inf"] {
+            assert!(dose(text).unwrap_err().contains("no number"), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_list_says_what_an_effect_is_and_how_large() {
+        let text = listed(effect::find("acc.warmup").unwrap());
+        assert!(text.starts_with("acc.warmup\n  The unit warms itself"), "{text}");
+        assert!(text.contains("x, y, z: 0.02 m/s^2\n  tau: 150 s\n"), "{text}");
+    }
+
+    #[test]
+    fn axes_are_three_letters_no_two_alike_in_a_row() {
+        assert_eq!(axes("zxy"), Ok([Axis::Z, Axis::X, Axis::Y]));
+        assert!(axes("zxz").is_ok());
+        for text in ["zz", "zzy", "zxyz", "abc", "z-y", "zayx"] {
+            assert!(axes(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_sealed_case_has_its_label_beside_it_and_the_manifest_does_not_tell() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("case.csv");
+        let simulation = Simulation { programme: Programme::Sinusoids, rate: 10.0, ..Simulation::default() };
+        sealed(simulation, &out).unwrap();
+        let label = std::fs::read_to_string(folder.path().join("case.label.json")).unwrap();
+        let label: serde_json::Value = serde_json::from_str(&label).unwrap();
+        assert_eq!(label["salt"].as_str().unwrap().len(), 64);
+        assert!(label["effects"].is_array());
+        let manifest = std::fs::read_to_string(folder.path().join("case.toml")).unwrap();
+        assert!(!manifest.contains(&label["seed"].to_string()), "{manifest}");
+    }
+
+    #[test]
+    fn sealed_cases_vary_and_draw_neither_baseline_nor_gross_mistakes() {
+        let mut counts = [0; 4];
+        for seed in 0..200 {
+            let mut simulation = Simulation { programme: Programme::Rates, seed, ..Simulation::default() };
+            draw(&mut simulation).unwrap();
+            counts[simulation.doses.len()] += 1;
+            assert!(simulation.doses.iter().all(|dose| is_drawn(dose.effect)));
+        }
+        assert!(counts.iter().all(|count| *count > 5), "{counts:?}");
+    }
+}

@@ -1,0 +1,64 @@
+//! The sensor's low-pass: `P.bandwidth`.
+//!
+//! ```text
+//! τ ẏ = x − y      exact for an input that is straight between rows
+//! ```
+
+use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, of};
+
+pub(super) fn effect(kind: SensorKind) -> Effect {
+    let words = Words {
+        cause: "The sensor or its firmware filters its output: a delay, and less amplitude when brisk.",
+        remedy: "Put the filter into the simulator, or widen it in the unit's settings.",
+        needs: "Sinusoids at three or more frequencies, or brisk slews.",
+    };
+    let tau = Parameter::magnitude("tau", "s", of(kind, 5e-3, 4e-3, 0.016), 0.2);
+    let effect = Effect::member(kind, "bandwidth", Act::Sensor(kind, alter), vec![tau], words)
+        .like("clk.time_offset", "the other triads: one clock makes all of them late alike");
+    match kind {
+        SensorKind::Acc => effect.like("acc.lever_arm", "sinusoids at several frequencies"),
+        SensorKind::Gyr => {
+            effect.like("gyr.angular_acceleration", "none at low frequency: the two are the same")
+        }
+        SensorKind::Mag => effect.like("mag.eddy_current", "a coil step at rest"),
+    }
+}
+
+fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+    let ratio = run.interval() / values.first().copied().unwrap_or(0.0);
+    let (Some(first), true) = (run.output.first().copied(), ratio.is_finite() && ratio > 0.0) else {
+        return;
+    };
+    let kept = libm::exp(-ratio);
+    let lag = (1.0 - kept) / ratio;
+    let (mut state, mut before) = (first, first);
+    for output in run.output.iter_mut() {
+        state = state * kept + before * (lag - kept) + *output * (1.0 - lag);
+        before = *output;
+        *output = state;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Input;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn a_ramp_comes_out_late_by_the_time_constant() {
+        let input: Vec<Input> = (0..400)
+            .map(|k| Input {
+                time: 0.01 * f64::from(k),
+                temperature: 25.0,
+                f_q: Vector3::zeros(),
+                w_iq_q: Vector3::zeros(),
+                dw_iq_q: Vector3::zeros(),
+                b_q: Vector3::zeros(),
+            })
+            .collect();
+        let mut output: Vec<Vector3<f64>> = input.iter().map(|row| Vector3::repeat(row.time)).collect();
+        alter(&[0.037], &mut SensorRun { input: &input, sensed: &[], output: &mut output });
+        assert!((output[399].x - (3.99 - 0.037)).abs() < 1e-9, "{}", output[399].x);
+    }
+}

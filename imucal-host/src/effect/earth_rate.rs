@@ -1,0 +1,25 @@
+//! Earth's rotation is not that of the model: `gyr.earth_rate`.
+
+use super::{Act, Effect, Parameter, Role, SensorKind, Truth, Words};
+
+pub(super) fn effect() -> Effect {
+    let words = Words {
+        cause: "The simulator leaves Earth's rotation out: the recording's is 1 + share of the simulator's.",
+        remedy: "Add Earth's rotation at the site's latitude to the rate.",
+        needs: "Long rests in different attitudes and a gyroscope quieter than 10 degrees an hour.",
+    };
+    let share =
+        Parameter { role: Role::Amplitude, range: (-2.0, 2.0), ..Parameter::amplitude("share", "-", 1.0) };
+    Effect::new("gyr.earth_rate", Act::Field(alter), vec![share], words)
+        .on(SensorKind::Gyr)
+        .like(
+            "gyr.g_sensitivity",
+            "rests at several headings: its vertical part looks like Earth's, its level part not",
+        )
+        .like("gyr.bias", "rests in opposite attitudes")
+}
+
+fn alter(values: &[f64], rows: &mut [Truth]) {
+    let share = values.first().copied().unwrap_or(0.0);
+    rows.iter_mut().for_each(|row| row.w_it_t += row.w_ie_t * share);
+}

@@ -1,0 +1,19 @@
+//! Local gravity is not that of the model: `acc.gravity_error`.
+
+use super::{Act, Effect, Parameter, SensorKind, Truth, Words};
+
+pub(super) fn effect() -> Effect {
+    let words = Words {
+        cause: "Gravity at the site is larger than the model's, by this share.",
+        remedy: "Enter the site's measured gravity, or its latitude and height.",
+        needs: "Known specific force other than gravity, as of a centrifuge; rests alone cannot show it.",
+    };
+    Effect::new("acc.gravity_error", Act::Field(alter), vec![Parameter::amplitude("share", "-", 5e-4)], words)
+        .on(SensorKind::Acc)
+        .like("acc.scale", "a known centripetal acceleration; not data with 1 g alone")
+}
+
+fn alter(values: &[f64], rows: &mut [Truth]) {
+    let factor = 1.0 + values.first().copied().unwrap_or(0.0);
+    rows.iter_mut().for_each(|row| row.f_t *= factor);
+}

@@ -1,0 +1,320 @@
+//! The catalogue of effects that a simulator may lack: the only list of them.
+//!
+//! An effect alters the chain from the rig to the samples at its true place, and says in words what it is. The chain
+//! runs by [`Stage`], within a stage in the order of [`CATALOGUE`]. Between the stages the simulator adds what belongs
+//! to the rig and the unit: rig and clock → truth → field → triad → sensor → noise → signal → converter → data.
+//!
+//! Effects have no noise of their own: without the unit's noise a recording is a function of the parameters, and can
+//! be differentiated by them. Those with a memory are handed the whole run.
+
+use std::sync::LazyLock;
+
+use imucal_core::triad::Triad;
+
+use crate::recording::{SensorKind, Unit};
+
+mod angular_acceleration;
+mod axis_nonorthogonality;
+mod axis_swap;
+mod bandwidth;
+mod bias;
+mod bias_drift;
+mod bias_step;
+mod cross_axis_product;
+mod earth_rate;
+mod eddy_current;
+mod encoder_harmonic;
+mod encoder_offset;
+mod field_drift;
+mod field_gradient;
+mod g2_sensitivity;
+mod g_sensitivity;
+mod gimbal_hard_iron;
+mod gimbal_soft_iron;
+mod gravity_error;
+mod hard_iron;
+mod heading;
+mod hysteresis;
+mod inner_lever_arm;
+mod level_tilt;
+mod lever_arm;
+mod machine;
+mod misalignment;
+mod motor_current;
+mod noise_burst;
+mod parameter;
+mod rate_error;
+mod saturation;
+mod scale;
+mod scale_asymmetry;
+mod scale_cubic;
+mod scale_quadratic;
+mod sensor_run;
+mod soft_iron;
+mod stuck_samples;
+mod temp_bias;
+mod temp_bias_quadratic;
+mod temp_scale;
+mod time_offset;
+mod transient;
+mod truth;
+mod unit_error;
+mod vibration_rectification;
+mod warmup;
+mod wobble;
+
+pub use self::machine::{Machine, Swing};
+pub use self::parameter::{Parameter, Role};
+pub use self::sensor_run::{DataRun, SensorRun, SignalRun};
+pub use self::truth::{Input, Truth};
+
+use SensorKind::{Acc, Gyr, Mag};
+
+/// Where in the chain an effect acts. The order is that of the chain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// The rig does not stand or turn as it says.
+    Rig,
+    /// Sensors and rig do not share a clock.
+    Clock,
+    /// The fields at the sensor: specific force, Earth rate, magnetic field.
+    Field,
+    /// The triad's response, before noise.
+    Sensor,
+    /// Noise and limits before the converter.
+    Signal,
+    /// Samples after the converter.
+    Data,
+}
+
+/// How an effect alters the chain, given its parameters.
+#[derive(Clone, Copy, Debug)]
+pub enum Act {
+    /// Alters the rig at an instant.
+    Rig(fn(&[f64], &mut Machine)),
+    /// The rig's time that a row of this time shows, s.
+    Clock(fn(&[f64], f64) -> f64),
+    /// Alters the truth of all rows.
+    Field(fn(&[f64], &mut [Truth])),
+    /// Alters a triad of the baseline: true SI in the enclosure's axes to raw SI.
+    Triad(SensorKind, fn(&[f64], &mut Triad<f64>)),
+    /// Alters a triad's output.
+    Sensor(SensorKind, fn(&[f64], &mut SensorRun<'_>)),
+    /// Alters a triad's noise or limit.
+    Signal(SensorKind, fn(&[f64], &mut SignalRun<'_>)),
+    /// Alters a triad's samples.
+    Data(SensorKind, fn(&[f64], &mut DataRun<'_>)),
+}
+
+impl Act {
+    /// Its place in the chain.
+    pub fn stage(&self) -> Stage {
+        match self {
+            Self::Rig(_) => Stage::Rig,
+            Self::Clock(_) => Stage::Clock,
+            Self::Field(_) => Stage::Field,
+            Self::Triad(..) | Self::Sensor(..) => Stage::Sensor,
+            Self::Signal(..) => Stage::Signal,
+            Self::Data(..) => Stage::Data,
+        }
+    }
+}
+
+/// Another effect that looks alike.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Confusable {
+    /// Its id.
+    pub id: String,
+    /// The experiment that parts the two.
+    pub parted_by: &'static str,
+}
+
+/// What an effect is, in words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Words {
+    /// What causes it.
+    pub cause: &'static str,
+    /// What to do about it.
+    pub remedy: &'static str,
+    /// What a recording must hold to show it.
+    pub needs: &'static str,
+}
+
+/// One entry of the catalogue.
+#[derive(Clone, Debug)]
+pub struct Effect {
+    /// Its fixed name.
+    pub id: String,
+    /// What it does to the chain.
+    pub act: Act,
+    /// Sensors it may alter; all others are left bit for bit as they were.
+    pub sensors: &'static [SensorKind],
+    /// Its parameters, in the order of the parameter vector.
+    pub parameters: Vec<Parameter>,
+    /// What it is.
+    pub words: Words,
+    /// What it is mistaken for.
+    pub confusables: Vec<Confusable>,
+}
+
+impl Effect {
+    fn new(id: &str, act: Act, parameters: Vec<Parameter>, words: Words) -> Self {
+        let sensors: &'static [SensorKind] = match act {
+            Act::Rig(_) | Act::Clock(_) | Act::Field(_) => &SensorKind::ALL,
+            Act::Triad(kind, _) | Act::Sensor(kind, _) | Act::Signal(kind, _) | Act::Data(kind, _) => {
+                only(kind)
+            }
+        };
+        Self { id: id.to_owned(), act, sensors, parameters, words, confusables: Vec::new() }
+    }
+
+    /// One of a family with a member for each sensor.
+    fn member(kind: SensorKind, name: &str, act: Act, parameters: Vec<Parameter>, words: Words) -> Self {
+        Self::new(&member_id(kind, name), act, parameters, words)
+    }
+
+    fn on(mut self, kind: SensorKind) -> Self {
+        self.sensors = only(kind);
+        self
+    }
+
+    fn like(mut self, id: &str, parted_by: &'static str) -> Self {
+        self.confusables.push(Confusable { id: id.to_owned(), parted_by });
+        self
+    }
+
+    /// Its parameters in a run of `duration` s, such that it does nothing.
+    pub fn neutral(&self, duration: f64) -> Vec<f64> {
+        self.parameters.iter().map(|parameter| parameter.neutral(duration)).collect()
+    }
+
+    /// With these parameters it does nothing.
+    pub fn is_off(&self, values: &[f64]) -> bool {
+        self.parameters.iter().zip(values).all(|(parameter, value)| !parameter.switches() || *value == 0.0)
+    }
+}
+
+/// `acc.bias` of `bias`.
+fn member_id(kind: SensorKind, name: &str) -> String {
+    format!("{kind}.{name}")
+}
+
+fn only(kind: SensorKind) -> &'static [SensorKind] {
+    match kind {
+        Acc => &[Acc],
+        Gyr => &[Gyr],
+        Mag => &[Mag],
+    }
+}
+
+/// The SI-side unit of a sensor, as text.
+fn si(kind: SensorKind) -> String {
+    Unit::of(kind).first().map(ToString::to_string).unwrap_or_default()
+}
+
+/// One of three, by sensor.
+fn of<T>(kind: SensorKind, acc: T, gyr: T, mag: T) -> T {
+    match kind {
+        Acc => acc,
+        Gyr => gyr,
+        Mag => mag,
+    }
+}
+
+/// The axes' names, for parameters of which there is one an axis.
+const XYZ: [&str; 3] = ["x", "y", "z"];
+
+/// A symmetric matrix from xx, yy, zz, xy, xz, yz; missing values are zero.
+fn symmetric(values: &[f64]) -> nalgebra::Matrix3<f64> {
+    let at = |k: usize| values.get(k).copied().unwrap_or(0.0);
+    nalgebra::Matrix3::new(at(0), at(3), at(4), at(3), at(1), at(5), at(4), at(5), at(2))
+}
+
+/// The parameters' names of [`symmetric`].
+const SYMMETRIC: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
+
+/// The vector of three values from `at` on; missing values are zero.
+fn vector(values: &[f64], at: usize) -> nalgebra::Vector3<f64> {
+    nalgebra::Vector3::from_fn(|k, _| values.get(at + k).copied().unwrap_or(0.0))
+}
+
+/// The matrix of nine values, row by row; missing values are zero.
+fn matrix(values: &[f64]) -> nalgebra::Matrix3<f64> {
+    nalgebra::Matrix3::from_fn(|row, column| values.get(3 * row + column).copied().unwrap_or(0.0))
+}
+
+/// The parameters' names of [`matrix`].
+const MATRIX: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
+
+/// Every effect there is, in the order of the chain.
+pub static CATALOGUE: LazyLock<Vec<Effect>> = LazyLock::new(|| {
+    let mut list = vec![
+        level_tilt::effect(),
+        heading::effect(),
+        encoder_offset::effect(),
+        encoder_harmonic::effect(),
+        axis_nonorthogonality::effect(),
+        wobble::effect(),
+        time_offset::effect(),
+        rate_error::effect(),
+        gravity_error::effect(),
+        lever_arm::effect(),
+        earth_rate::effect(),
+        field_drift::effect(),
+        transient::effect(),
+        field_gradient::effect(),
+        gimbal_soft_iron::outer(),
+        gimbal_soft_iron::middle(),
+        gimbal_hard_iron::outer(),
+        gimbal_hard_iron::middle(),
+        motor_current::effect(),
+        eddy_current::effect(),
+    ];
+    // What is done to a triad comes before what its output gains, and the filter sees all of that.
+    for family in [bias::effect, scale::effect, misalignment::effect] {
+        list.extend(SensorKind::ALL.map(family));
+    }
+    list.extend([soft_iron::effect(), hard_iron::effect()]);
+    for family in [
+        scale_quadratic::effect,
+        scale_cubic::effect,
+        scale_asymmetry::effect,
+        cross_axis_product::effect,
+        temp_bias::effect,
+        temp_bias_quadratic::effect,
+        temp_scale::effect,
+        warmup::effect,
+        bias_drift::effect,
+        bias_step::effect,
+    ] {
+        list.extend(SensorKind::ALL.map(family));
+    }
+    list.extend([
+        inner_lever_arm::effect(),
+        vibration_rectification::effect(),
+        hysteresis::effect(Acc),
+        hysteresis::effect(Gyr),
+        g_sensitivity::effect(),
+        g2_sensitivity::effect(),
+        angular_acceleration::effect(),
+    ]);
+    for family in [
+        bandwidth::effect,
+        noise_burst::effect,
+        saturation::effect,
+        stuck_samples::effect,
+        axis_swap::effect,
+        unit_error::effect,
+    ] {
+        list.extend(SensorKind::ALL.map(family));
+    }
+    list
+});
+
+/// The effect of an id.
+pub fn find(id: &str) -> Option<&'static Effect> {
+    CATALOGUE.iter().find(|effect| effect.id == id)
+}
+
+#[cfg(test)]
+mod tests;

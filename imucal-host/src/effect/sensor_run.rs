@@ -1,0 +1,51 @@
+//! One triad over a whole run, on its way from input to output.
+
+use nalgebra::Vector3;
+
+use super::truth::Input;
+
+/// A triad's output before noise. Effects with a memory see the whole run.
+#[derive(Debug)]
+pub struct SensorRun<'a> {
+    /// What the unit is given, row by row.
+    pub input: &'a [Input],
+    /// What each axis itself senses: output of the baseline less its bias, SI units.
+    pub sensed: &'a [Vector3<f64>],
+    /// Output so far, SI units.
+    pub output: &'a mut [Vector3<f64>],
+}
+
+impl SensorRun<'_> {
+    /// Adds to each row's output a function of its input and of what the axes sense.
+    pub fn add(&mut self, term: impl Fn(&Input, &Vector3<f64>) -> Vector3<f64>) {
+        for ((output, input), sensed) in self.output.iter_mut().zip(self.input).zip(self.sensed) {
+            *output += term(input, sensed);
+        }
+    }
+
+    /// Interval between rows, s; 0 below two rows.
+    pub fn interval(&self) -> f64 {
+        match self.input {
+            [first, second, ..] => second.time - first.time,
+            _ => 0.0,
+        }
+    }
+}
+
+/// A triad's noise and limit on the way to the converter.
+#[derive(Debug)]
+pub struct SignalRun<'a> {
+    /// Times of the rows, s.
+    pub time: &'a [f64],
+    /// White noise still to be added, SI units.
+    pub noise: &'a mut [Vector3<f64>],
+    /// Largest output, SI units, both signs.
+    pub limit: &'a mut f64,
+}
+
+/// A triad's samples as they leave the converter, SI units.
+#[derive(Debug)]
+pub struct DataRun<'a> {
+    /// One vector a row.
+    pub samples: &'a mut [Vector3<f64>],
+}

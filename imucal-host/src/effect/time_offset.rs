@@ -1,0 +1,19 @@
+//! Sensors late against the rig: `clk.time_offset`.
+
+use super::{Act, Effect, Parameter, Words};
+
+pub(super) fn effect() -> Effect {
+    let words = Words {
+        cause: "Samples reach their row later than the encoders: the row of t shows the rig at t - offset.",
+        remedy: "Record a common trigger, or shift the sensors' times by the offset.",
+        needs: "Motion with changing rate, such as sinusoids or slews.",
+    };
+    Effect::new("clk.time_offset", Act::Clock(alter), vec![Parameter::amplitude("offset", "s", 5e-3)], words)
+        .like("clk.rate_error", "brisk motion at the beginning and again at the end")
+        .like("gyr.angular_acceleration", "the accelerometer: it is late only where the clock is")
+        .like("mag.eddy_current", "the gyroscope: it is late only where the clock is")
+}
+
+fn alter(values: &[f64], time: f64) -> f64 {
+    time - values.first().copied().unwrap_or(0.0)
+}

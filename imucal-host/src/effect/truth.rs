@@ -1,0 +1,74 @@
+//! What is true at one row of a recording, before any sensor.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::machine::Swing;
+
+/// The truth at one row, in the table's frame `t`. `C_a_b` takes components from `a` to `b`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth {
+    /// The row's time on the sensor's clock, s.
+    pub time: f64,
+    /// Table to base.
+    pub c_t_p: Matrix3<f64>,
+    /// Table to outer gimbal.
+    pub c_t_o: Matrix3<f64>,
+    /// Table to middle gimbal.
+    pub c_t_m: Matrix3<f64>,
+    /// Base to local north, east, down.
+    pub c_p_n: Matrix3<f64>,
+    /// True gimbal angles, outermost first.
+    pub gimbals: [Swing; 3],
+    /// Rate of the table against the base, rad/s.
+    pub w_pt_t: Vector3<f64>,
+    /// Earth's rotation, rad/s.
+    pub w_ie_t: Vector3<f64>,
+    /// Rate of the table against inertial space, rad/s: the sum of the former two.
+    pub w_it_t: Vector3<f64>,
+    /// Angular acceleration against inertial space, rad/s².
+    pub dw_it_t: Vector3<f64>,
+    /// Specific force where the sensor is, m/s².
+    pub f_t: Vector3<f64>,
+    /// Magnetic field where the sensor is, µT.
+    pub b_t: Vector3<f64>,
+    /// Temperature of the sensor, °C.
+    pub temperature: f64,
+}
+
+impl Truth {
+    /// Field effects: adds a field with components in a frame that `c_t_a` takes the table's components to, µT.
+    pub fn add_field(&mut self, c_t_a: &Matrix3<f64>, b_a: &Vector3<f64>) {
+        self.b_t += c_t_a.tr_mul(b_a);
+    }
+}
+
+/// The truth at one row in the enclosure's frame `q`: what the triads are given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Input {
+    /// Time on the sensor's clock, s.
+    pub time: f64,
+    /// Temperature of the sensor, °C.
+    pub temperature: f64,
+    /// Specific force, m/s².
+    pub f_q: Vector3<f64>,
+    /// Rate against inertial space, rad/s.
+    pub w_iq_q: Vector3<f64>,
+    /// Angular acceleration against inertial space, rad/s².
+    pub dw_iq_q: Vector3<f64>,
+    /// Magnetic field, µT.
+    pub b_q: Vector3<f64>,
+}
+
+impl Input {
+    /// The truth as a unit sees it that is turned on the table; `c_t_q` takes the table's components to its own.
+    pub fn of(truth: &Truth, c_t_q: &Matrix3<f64>) -> Self {
+        Self {
+            time: truth.time,
+            temperature: truth.temperature,
+            f_q: c_t_q * truth.f_t,
+            w_iq_q: c_t_q * truth.w_it_t,
+            dw_iq_q: c_t_q * truth.dw_it_t,
+            b_q: c_t_q * truth.b_t,
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! The chain from a movement to a unit's samples, with effects at their places.
+
+use imucal_core::triad::Triad;
+use nalgebra::{Matrix3, Vector3};
+
+use super::{dose::Dose, truth::Motion};
+use crate::{
+    effect::{Act, CATALOGUE, DataRun, Effect, Input, SensorRun, SignalRun, Truth},
+    recording::SensorKind,
+};
+
+/// Effects in the order of the chain; those that are off are left out, so that they change not a bit.
+#[derive(Clone, Debug, Default)]
+pub struct Chain<'a> {
+    doses: Vec<&'a Dose>,
+}
+
+impl<'a> Chain<'a> {
+    /// A chain with these effects, given in any order. Of two doses of one effect, both act.
+    pub fn new(doses: &'a [Dose]) -> Self {
+        let mut active: Vec<&Dose> = doses.iter().filter(|dose| !dose.effect.is_off(&dose.values)).collect();
+        let place = |effect: &Effect| CATALOGUE.iter().position(|entry| entry.id == effect.id);
+        active.sort_by_key(|dose| place(dose.effect));
+        Self { doses: active }
+    }
+
+    /// The truth of each row: times of the sensor's clock, s.
+    pub fn truth(&self, motion: &dyn Motion, times: &[f64]) -> Vec<Truth> {
+        let mut rows: Vec<Truth> = times
+            .iter()
+            .map(|time| {
+                let shown = self.doses.iter().fold(*time, |shown, dose| match dose.effect.act {
+                    Act::Clock(alter) => alter(&dose.values, shown),
+                    _ => shown,
+                });
+                let truth = motion.truth(shown, &|machine| {
+                    for dose in &self.doses {
+                        if let Act::Rig(alter) = dose.effect.act {
+                            alter(&dose.values, machine);
+                        }
+                    }
+                });
+                Truth { time: *time, ..truth }
+            })
+            .collect();
+        for dose in &self.doses {
+            if let Act::Field(alter) = dose.effect.act {
+                alter(&dose.values, &mut rows);
+            }
+        }
+        rows
+    }
+
+    /// A triad's output without noise, SI units: K v + b, and what effects make of it. `None` where K is singular.
+    pub fn output(&self, kind: SensorKind, triad: &Triad<f64>, input: &[Input]) -> Option<Vec<Vector3<f64>>> {
+        let mut triad = *triad;
+        for dose in &self.doses {
+            if let Act::Triad(of, alter) = dose.effect.act
+                && of == kind
+            {
+                alter(&dose.values, &mut triad);
+            }
+        }
+        let given = |row: &Input| match kind {
+            SensorKind::Acc => row.f_q,
+            SensorKind::Gyr => row.w_iq_q,
+            SensorKind::Mag => row.b_q,
+        };
+        let unbiased = Triad { bias: Vector3::zeros(), ..triad };
+        let mut output: Vec<_> = input.iter().map(|row| triad.predict(&given(row))).collect::<Option<_>>()?;
+        let sensed: Vec<_> = input.iter().map(|row| unbiased.predict(&given(row))).collect::<Option<_>>()?;
+        let mut run = SensorRun { input, sensed: &sensed, output: &mut output };
+        for dose in &self.doses {
+            if let Act::Sensor(of, alter) = dose.effect.act
+                && of == kind
+            {
+                alter(&dose.values, &mut run);
+            }
+        }
+        Some(output)
+    }
+
+    /// Noise and limit of a triad on the way to its converter.
+    pub fn signal(&self, kind: SensorKind, mut run: SignalRun<'_>) {
+        for dose in &self.doses {
+            if let Act::Signal(of, alter) = dose.effect.act
+                && of == kind
+            {
+                alter(&dose.values, &mut run);
+            }
+        }
+    }
+
+    /// Samples of a triad after its converter.
+    pub fn data(&self, kind: SensorKind, samples: &mut [Vector3<f64>]) {
+        let mut run = DataRun { samples };
+        for dose in &self.doses {
+            if let Act::Data(of, alter) = dose.effect.act
+                && of == kind
+            {
+                alter(&dose.values, &mut run);
+            }
+        }
+    }
+}
+
+/// The rows as a unit on the table is given them.
+pub fn inputs(rows: &[Truth], c_t_q: &Matrix3<f64>) -> Vec<Input> {
+    rows.iter().map(|row| Input::of(row, c_t_q)).collect()
+}

@@ -1,0 +1,235 @@
+//! A recording of the flight motion simulator: programme, unit, effects and a seed.
+
+use nalgebra::Vector3;
+
+use super::{
+    SimulationError,
+    chain::{Chain, inputs},
+    dose::Dose,
+    programme::{Programme, Schedule, wrap},
+    random::{Purpose, Random},
+    truth::{Motion, Place},
+    unit::{TriadUnderTest, UnitKind, UnitUnderTest},
+};
+use crate::{
+    effect::{Effect, SignalRun, Truth},
+    recording::{
+        Manifest, Recording, SensorKind, Unit,
+        manifest::{Axis, Identity, PerSensor, Site},
+    },
+};
+
+/// Rates there is a recording of, Hz.
+const RATES: (f64, f64) = (10.0, 1000.0);
+/// Longest recording, s.
+const LONGEST: f64 = 7200.0;
+/// A step of the encoders, rad: twenty bits a turn.
+const ENCODER_STEP: f64 = std::f64::consts::TAU / 1_048_576.0;
+/// An arc second, rad.
+const ARC_SECOND: f64 = std::f64::consts::PI / 648_000.0;
+/// Noise and step of the thermometer, K.
+const THERMOMETER: (f64, f64) = (0.03, 0.01);
+
+/// What to simulate.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    /// Type of the unit.
+    pub unit: UnitKind,
+    /// What the rig does.
+    pub programme: Programme,
+    /// Gimbal axes, outermost first.
+    pub axes: [Axis; 3],
+    /// Sampling rate, Hz, 10 to 1000.
+    pub rate: f64,
+    /// Length, s, to two hours; `None` as long as the programme takes.
+    pub duration: Option<f64>,
+    /// Everything random follows from it.
+    pub seed: u64,
+    /// Noise, drift, scatter of the rests and rounding; without, a recording is a smooth function of the effects'
+    /// parameters.
+    pub noise: bool,
+    /// Raw counts in the file instead of SI units.
+    pub counts: bool,
+    /// Effects beyond the baseline.
+    pub doses: Vec<Dose>,
+}
+
+impl Default for Simulation {
+    fn default() -> Self {
+        Self {
+            unit: UnitKind::default(),
+            programme: Programme::default(),
+            axes: [Axis::Z, Axis::Y, Axis::X],
+            rate: 100.0,
+            duration: None,
+            seed: 1,
+            noise: true,
+            counts: true,
+            doses: Vec::new(),
+        }
+    }
+}
+
+impl Simulation {
+    /// The rig's movement, without effects.
+    ///
+    /// # Errors
+    ///
+    /// [`SimulationError`], when rate or duration are impossible.
+    pub fn schedule(&self) -> Result<Schedule, SimulationError> {
+        if !(RATES.0..=RATES.1).contains(&self.rate) {
+            return Err(SimulationError::Rate { found: self.rate });
+        }
+        if let Some(found) = self.duration.filter(|duration| *duration > LONGEST) {
+            return Err(SimulationError::TooLong { found, longest: LONGEST });
+        }
+        let schedule = self.programme.schedule(self.axes, self.seed, self.duration, Place::ankara())?;
+        let schedule = schedule.on_base(self.seed);
+        if !self.noise {
+            return Ok(schedule);
+        }
+        let mut random = Random::new(self.seed, Purpose::Scatter);
+        Ok(schedule.scattered(0.002f64.to_radians(), &mut random))
+    }
+
+    /// The unit, without effects.
+    pub fn unit_under_test(&self) -> UnitUnderTest {
+        UnitUnderTest::draw(self.unit, self.seed, self.rate)
+    }
+
+    /// Adds an effect of a size, see [`Dose::sized`].
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::schedule`].
+    pub fn add(&mut self, effect: &'static Effect, size: f64) -> Result<(), SimulationError> {
+        let duration = self.schedule()?.duration();
+        self.doses.push(Dose::sized(effect, size, self.seed, duration));
+        Ok(())
+    }
+
+    /// Records it.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::schedule`], and [`SimulationError::Singular`] for an effect beyond reason.
+    pub fn record(&self, name: &str) -> Result<Recording, SimulationError> {
+        let schedule = self.schedule()?;
+        let unit = self.unit_under_test();
+        let chain = Chain::new(&self.doses);
+        let rows = (schedule.duration() * self.rate).floor() as usize;
+        let time: Vec<f64> = (0..rows).map(|k| k as f64 / self.rate).collect();
+        let truth = chain.truth(&schedule, &time);
+        let input = inputs(&truth, &unit.c_t_q);
+        let mut random = Random::new(self.seed, Purpose::Noise);
+        let manifest = self.manifest(&schedule, &unit);
+        let mut recording = Recording::new(name, manifest.clone(), time);
+        for kind in SensorKind::ALL {
+            let triad = unit.triad(kind);
+            let clean =
+                chain.output(kind, &triad.triad, &input).ok_or(SimulationError::Singular { sensor: kind })?;
+            let samples = self.convert(kind, triad, &chain, clean, &recording.time, &mut random);
+            // Its own manifest has every conversion it needs.
+            let triple = manifest.triple(kind, samples).ok();
+            match kind {
+                SensorKind::Acc => recording.acc = triple,
+                SensorKind::Gyr => recording.gyr = triple,
+                SensorKind::Mag => recording.mag = triple,
+            }
+        }
+        recording.temperature = Some(self.thermometer(&truth));
+        recording.gimbal = Some(self.encoders(&schedule, &recording.time));
+        Ok(recording)
+    }
+
+    /// Noise, limit and steps of the converter, and what becomes of the samples behind it; SI units.
+    fn convert(
+        &self,
+        kind: SensorKind,
+        triad: &TriadUnderTest,
+        chain: &Chain<'_>,
+        clean: Vec<Vector3<f64>>,
+        time: &[f64],
+        random: &mut Random,
+    ) -> Vec<Vector3<f64>> {
+        let mut samples = clean;
+        let mut noise = vec![Vector3::zeros(); samples.len()];
+        if self.noise {
+            noise.iter_mut().for_each(|noise| *noise = random.normals() * triad.noise);
+            let drift = triad.drift.draw(samples.len(), 1.0 / self.rate, random);
+            samples.iter_mut().zip(drift).for_each(|(sample, drift)| *sample += drift);
+        }
+        let mut limit = triad.full_scale;
+        chain.signal(kind, SignalRun { time, noise: &mut noise, limit: &mut limit });
+        for (sample, noise) in samples.iter_mut().zip(&noise) {
+            *sample = (*sample + noise).map(|value| value.clamp(-limit, limit));
+            if self.noise {
+                *sample = sample.map(|value| (value * triad.counts.per_unit).round() / triad.counts.per_unit);
+            }
+        }
+        chain.data(kind, &mut samples);
+        samples
+    }
+
+    fn thermometer(&self, truth: &[Truth]) -> Vec<f64> {
+        let mut random = Random::new(self.seed, Purpose::Thermometer);
+        let (sigma, step) = THERMOMETER;
+        let read = |row: &Truth| match self.noise {
+            true => ((row.temperature + sigma * random.normal()) / step).round() * step,
+            false => row.temperature,
+        };
+        truth.iter().map(read).collect()
+    }
+
+    fn encoders(&self, schedule: &Schedule, time: &[f64]) -> Vec<[f64; 3]> {
+        let mut random = Random::new(self.seed, Purpose::Encoder);
+        let sigma = [(); 3].map(|()| random.between(2.0, 20.0) * ARC_SECOND);
+        let mut read = |angle: f64, sigma: f64| match self.noise {
+            true => wrap(((angle + sigma * random.normal()) / ENCODER_STEP).round() * ENCODER_STEP),
+            false => wrap(angle),
+        };
+        time.iter()
+            .map(|time| {
+                let mut angles = schedule.encoders(*time).unwrap_or_default();
+                angles.iter_mut().zip(sigma).for_each(|(angle, sigma)| *angle = read(*angle, sigma));
+                angles
+            })
+            .collect()
+    }
+
+    fn manifest(&self, motion: &dyn Motion, unit: &UnitUnderTest) -> Manifest {
+        let place = motion.place();
+        let mut manifest = Manifest {
+            site: Site {
+                latitude_deg: Some(place.latitude_deg),
+                height_m: Some(place.height),
+                gravity: Some(place.gravity),
+                field_ned_ut: Some(place.field_n.into()),
+            },
+            rig: Some(motion.rig()),
+            sensor: Identity { name: Some(unit.name.to_owned()), serial: Some(unit.serial.clone()) },
+            ..Manifest::default()
+        };
+        let of = |value: &dyn Fn(&TriadUnderTest) -> f64| PerSensor {
+            acc: Some(value(&unit.acc)),
+            gyr: Some(value(&unit.gyr)),
+            mag: Some(value(&unit.mag)),
+        };
+        if self.counts {
+            (manifest.units.acc, manifest.units.gyr, manifest.units.mag) =
+                (Unit::Counts, Unit::Counts, Unit::Counts);
+            manifest.counts = PerSensor {
+                acc: Some(unit.acc.counts),
+                gyr: Some(unit.gyr.counts),
+                mag: Some(unit.mag.counts),
+            };
+            manifest.ranges = of(&|triad| triad.full_scale * triad.counts.per_unit);
+        } else {
+            manifest.ranges = of(&|triad| triad.full_scale);
+        }
+        manifest
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,138 @@
+//! What is true at a time: attitude, rate, specific force and field of a moving table. Knows no sensor.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::gimbal::pose;
+use crate::{
+    effect::{Machine, Truth},
+    recording::manifest::Rig,
+};
+
+/// Earth's rotation, rad/s (IERS conventions 2010).
+pub const EARTH_RATE: f64 = 7.292_115e-5;
+
+/// Where the rig stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Geodetic latitude, degrees, north positive.
+    pub latitude_deg: f64,
+    /// Height above the ellipsoid, m.
+    pub height: f64,
+    /// Gravity, m/s².
+    pub gravity: f64,
+    /// Earth's field in n, µT.
+    pub field_n: Vector3<f64>,
+}
+
+impl Place {
+    /// Ankara, where the paper's rig stood (models.md 7).
+    pub fn ankara() -> Self {
+        Self { latitude_deg: 39.87, height: 938.0, gravity: 9.7997, field_n: Vector3::new(25.3, 2.6, 40.1) }
+    }
+
+    /// Earth's rotation in n, rad/s.
+    pub fn earth_rate_n(&self) -> Vector3<f64> {
+        let latitude = self.latitude_deg.to_radians();
+        Vector3::new(libm::cos(latitude), 0.0, -libm::sin(latitude)) * EARTH_RATE
+    }
+}
+
+/// A movement: a source of truth.
+pub trait Motion {
+    /// Its length, s.
+    fn duration(&self) -> f64;
+
+    /// The truth at a time from 0 to [`duration`](Self::duration), s, on a rig that `rig` may alter before; earlier and
+    /// later, that of the nearest end.
+    fn truth(&self, time: f64, rig: &dyn Fn(&mut Machine)) -> Truth;
+
+    /// Angles that exact encoders would show, rad, outermost first, not wrapped; `None` without a rig.
+    fn encoders(&self, time: f64) -> Option<[f64; 3]>;
+
+    /// What turns the sensor.
+    fn rig(&self) -> Rig;
+
+    /// Where.
+    fn place(&self) -> Place;
+}
+
+/// The truth on a three-gimbal rig.
+///
+/// Without lever arm: the unit sits where the axes meet. The table does not travel, so that specific force is gravity.
+pub fn on_rig(time: f64, machine: &Machine, place: &Place, temperature: f64) -> Truth {
+    let pose = pose(machine);
+    let c_t_n = pose.c_p_n * pose.c_t_p;
+    let to_t = |v_n: Vector3<f64>| c_t_n.tr_mul(&v_n);
+    let w_ie_t = to_t(place.earth_rate_n());
+    Truth {
+        time,
+        c_t_p: pose.c_t_p,
+        c_t_o: pose.c_t_o,
+        c_t_m: pose.c_t_m,
+        c_p_n: pose.c_p_n,
+        gimbals: machine.gimbals,
+        w_pt_t: pose.w_pt_t,
+        w_ie_t,
+        w_it_t: pose.w_pt_t + w_ie_t,
+        // Earth's rotation is fixed in n and turns the other way in t.
+        dw_it_t: pose.dw_pt_t - pose.w_pt_t.cross(&w_ie_t),
+        f_t: to_t(Vector3::new(0.0, 0.0, -place.gravity)),
+        b_t: to_t(place.field_n),
+        temperature,
+    }
+}
+
+/// The truth of something without gimbals: base level, outer and middle gimbal resting in it.
+pub fn in_the_open(
+    time: f64,
+    c_t_n: &Matrix3<f64>,
+    w_nt_t: Vector3<f64>,
+    dw_nt_t: Vector3<f64>,
+    place: &Place,
+) -> Truth {
+    let still = Machine::exact([Vector3::z(), Vector3::y(), Vector3::x()]);
+    let w_ie_t = c_t_n.tr_mul(&place.earth_rate_n());
+    Truth {
+        c_t_p: *c_t_n,
+        c_t_o: *c_t_n,
+        c_t_m: *c_t_n,
+        w_pt_t: w_nt_t,
+        w_ie_t,
+        w_it_t: w_nt_t + w_ie_t,
+        dw_it_t: dw_nt_t - w_nt_t.cross(&w_ie_t),
+        f_t: c_t_n.tr_mul(&Vector3::new(0.0, 0.0, -place.gravity)),
+        b_t: c_t_n.tr_mul(&place.field_n),
+        ..on_rig(time, &still, place, 25.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Swing;
+
+    #[test]
+    fn at_rest_there_is_gravity_and_earth_s_rotation_and_nothing_else() {
+        let place = Place::ankara();
+        let mut machine = Machine::exact([Vector3::z(), Vector3::x(), Vector3::y()]);
+        machine.tilt = [2e-3, -1e-3];
+        for k in 0..50 {
+            let angle = 0.37 * f64::from(k);
+            machine.gimbals = [angle, 1.7 * angle, -2.3 * angle].map(Swing::still);
+            let truth = on_rig(0.0, &machine, &place, 25.0);
+            assert!((truth.f_t.norm() - place.gravity).abs() < 1e-13);
+            assert!((truth.w_it_t.norm() - EARTH_RATE).abs() < 1e-18);
+            // Up and Earth's axis: sine of the latitude.
+            let sine = truth.f_t.dot(&truth.w_it_t) / (place.gravity * EARTH_RATE);
+            assert!((sine - place.latitude_deg.to_radians().sin()).abs() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn a_unit_aligned_with_n_reads_minus_g_down() {
+        let machine = Machine::exact([Vector3::z(), Vector3::y(), Vector3::x()]);
+        let truth = on_rig(0.0, &machine, &Place::ankara(), 25.0);
+        assert_eq!(truth.f_t, Vector3::new(0.0, 0.0, -9.7997));
+        assert_eq!(truth.b_t, Vector3::new(25.3, 2.6, 40.1));
+    }
+}
