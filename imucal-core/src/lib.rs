@@ -1,4 +1,45 @@
-//! Apply and fit IMU calibrations beside the sensor.
+//! Apply and fit IMU calibrations on the microcontroller beside the sensor.
+//!
+//! No `std`, no allocation, no `unsafe`, and no panic: an image that links `firmware-example`'s gate cannot hold a path
+//! to one. The same arithmetic runs on a host (`libm` by name, nothing fused, sums in a fixed order), so that `f32`
+//! there equals `f32` here bit for bit.
+//!
+//! # The flow
+//!
+//! ```text
+//! observation → model → solver → accept → record → corrector
+//! ```
+//!
+//! | stage | module | what it holds |
+//! | --- | --- | --- |
+//! | what is given | [`observation`] | rests, blocks of gyroscope samples, turns, points of a cloud |
+//! | what is assumed | [`model`] | residual and Jacobian rows, streamed; [`triad`], [`rotation`], [`temperature`] below it |
+//! | what is found | [`solver`] | Levenberg–Marquardt and particle swarm of fixed size, each with a report |
+//! | whether to believe it | [`coverage`], [`accept`] | typed refusals with their figures |
+//! | what is kept | [`record`] | bytes with a version and a CRC |
+//! | what is applied | [`corrector`] | `calibrated = gain · (raw − bias)`, sample by sample |
+//!
+//! A device that only applies needs the last two.
+//!
+//! # Parameterisation
+//!
+//! Values are run-time data, shapes are types: the number of parameters and of particles is const, the number of
+//! observations is whatever the caller's slice holds. The core does no I/O, keeps no clock and draws no randomness of
+//! its own; the caller gives slices, buffers and a generator, and gets values back.
+//!
+//! # Frames and units
+//!
+//! `C_a_b` takes components from frame `a` to frame `b`.
+//!
+//! | letter | frame |
+//! | --- | --- |
+//! | `n` | local north, east, down |
+//! | `p` | platform base of a rig: `n` up to levelling tilt and heading |
+//! | `o`, `m`, `t` | outer gimbal, middle gimbal, table |
+//! | `q` | enclosure of the sensor |
+//! | `s` | sensitivity axes of one triad, not orthogonal |
+//!
+//! Inside all is SI: s, rad, m/s², rad/s; fields in µT. What a record's triad takes and gives is named in it.
 #![no_std]
 #![cfg_attr(
     not(test),

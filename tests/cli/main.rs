@@ -11,6 +11,7 @@ use tempfile::TempDir;
 mod applying;
 mod end_to_end;
 mod exit_status;
+mod importing;
 mod json_contract;
 mod outputs;
 mod printing;

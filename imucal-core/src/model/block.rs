@@ -58,7 +58,7 @@ impl<T: Scalar> BlockRotation<T> {
         self.gain * block.s0 - still * duration + swing * T::of(0.5)
     }
 
-    /// Derivative of φ by the bias: −T A − ½ cof(A) [s1]×.
+    /// Derivative of φ by the bias: −T A − ½ cof(A) \[s1\]×.
     #[inline]
     pub(super) fn by_bias(&self, block: &Block<T>, duration: T) -> Matrix3<T> {
         -(self.gain * duration) - self.cofactor * cross_matrix(&block.s1) * T::of(0.5)
