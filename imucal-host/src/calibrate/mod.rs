@@ -208,6 +208,7 @@ fn inertial(
     let gyr_outcome =
         recording.gyr.as_ref().filter(|_| !options.skip.contains(&SensorKind::Gyr)).map(|gyr| {
             progress("fitting the gyroscope");
+            let usable = self::usable(integrity, SensorKind::Gyr, recording.rows());
             let shared = GyrShared { recording, gyr, usable: &usable, interval };
             match (&acc_outcome.verdict, acc_outcome.fit.as_ref()) {
                 (Ok(()), Some(fit)) => shared.outcome(chosen, &cuts, &fit.triad, &result.used, &mut trials),

@@ -64,9 +64,10 @@ pub struct SampledTurn {
 fn carry(theta: &[f64], turn: &SampledTurn, time: &[f64], gyr: &[Vector3<f64>]) -> Vector3<f64> {
     let gain: [[f64; 3]; 3] = [0, 1, 2].map(|i| [theta[3 * i], theta[3 * i + 1], theta[3 * i + 2]]);
     let mut attitude = UnitQuaternion::identity();
-    for k in turn.rows.clone() {
-        let since = if k > turn.rows.start { time[k] - time[k - 1] } else { 0.0 };
-        let until = if k + 1 < turn.rows.end { time[k + 1] - time[k] } else { 0.0 };
+    let measured: Vec<usize> = turn.rows.clone().filter(|k| gyr[*k].iter().all(|w| w.is_finite())).collect();
+    for (index, k) in measured.iter().copied().enumerate() {
+        let since = if index > 0 { time[k] - time[measured[index - 1]] } else { 0.0 };
+        let until = measured.get(index + 1).map_or(0.0, |next| time[*next] - time[k]);
         let rate = correct(&gain, &turn.bias.at(time[k]).into(), gyr[k].into());
         attitude *= UnitQuaternion::from_scaled_axis(Vector3::from(rate) * (0.5 * (since + until)));
     }

@@ -28,6 +28,8 @@ const INITIAL_EXCESS: f64 = 8.0;
 const NOISIEST: f64 = 0.25;
 /// Rows further apart than this are single shots, each a rest of its own, s.
 const SHOT_INTERVAL: f64 = 0.2;
+/// A window tells something while this share of its rows is usable: dropouts are common, clipping is long.
+const USABLE_SHARE: f64 = 0.8;
 /// A gap longer than this many usual intervals ends a rest.
 const GAP: f64 = 5.0;
 
@@ -50,7 +52,7 @@ pub struct Samples<'a> {
 #[derive(Clone, Debug)]
 pub struct RestDetector<'a> {
     samples: Samples<'a>,
-    /// Variance of the window around each row, (m/s²)²; infinite where a row in it is not usable.
+    /// Variance of the window around each row, (m/s²)²; infinite where too little of it is usable.
     variance: Vec<f64>,
     /// Mean rate of the window around each row, rad/s.
     rate: Option<Vec<Vector3<f64>>>,
@@ -178,36 +180,49 @@ fn reference_noise(variance: &[f64], initial_rows: usize, half: usize) -> (f64, 
 
 /// Rows around each row that its window holds.
 fn window(k: usize, half: usize, rows: usize) -> Range<usize> {
-    k.saturating_sub(half)..(k + half + 1).min(rows)
+    k.saturating_sub(half)..k.saturating_add(half).saturating_add(1).min(rows)
 }
 
+/// Running sums of the usable rows so far, and of the gaps.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    sum: Vector3<f64>,
+    square: f64,
+    count: u32,
+    gaps: u32,
+}
+
+/// Variance of the usable rows around each row; infinite where too few of them are, or time jumps.
 fn windowed_variance(samples: Samples<'_>, half: usize, longest_gap: f64) -> Vec<f64> {
     let rows = samples.acc.len();
-    let origin = samples.acc.iter().find(|v| v.iter().all(|x| x.is_finite())).copied().unwrap_or_default();
+    let first_usable = samples.acc.iter().zip(samples.usable).find(|(_, usable)| **usable);
+    let origin = first_usable.map(|(value, _)| *value).unwrap_or_default();
     // Running sums from a value near the data: differences of sums then lose no digits that matter.
     let mut sums = Vec::with_capacity(rows + 1);
-    let (mut sum, mut square, mut broken) = (Vector3::zeros(), 0.0, 0u32);
-    sums.push((sum, square, broken));
+    let mut now = Sums::default();
+    sums.push(now);
     for k in 0..rows {
-        let gap = k > 0 && samples.time[k] - samples.time[k - 1] > longest_gap;
-        if samples.usable[k] && !gap {
-            let x = samples.acc[k] - origin;
-            sum += x;
-            square += x.norm_squared();
-        } else {
-            broken += 1;
+        if k > 0 && samples.time[k] - samples.time[k - 1] > longest_gap {
+            now.gaps += 1;
         }
-        sums.push((sum, square, broken));
+        if samples.usable[k] {
+            let x = samples.acc[k] - origin;
+            now.sum += x;
+            now.square += x.norm_squared();
+            now.count += 1;
+        }
+        sums.push(now);
     }
     (0..rows)
         .map(|k| {
             let w = window(k, half, rows);
-            let ((s1, q1, b1), (s0, q0, b0)) = (sums[w.end], sums[w.start]);
-            if b1 > b0 {
+            let (from, to) = (sums[w.start], sums[w.end]);
+            let n = f64::from(to.count - from.count);
+            if to.gaps > from.gaps || n < USABLE_SHARE * w.len() as f64 {
                 return f64::INFINITY;
             }
-            let n = w.len() as f64;
-            ((q1 - q0) / n - ((s1 - s0) / n).norm_squared()).max(0.0)
+            let mean = (to.sum - from.sum) / n;
+            ((to.square - from.square) / n - mean.norm_squared()).max(0.0)
         })
         .collect()
 }
@@ -287,13 +302,18 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_or_an_unusable_row_ends_a_rest() {
-        let (mut time, acc) = shaken();
+    fn a_gap_or_a_clipped_stretch_ends_a_rest_and_dropouts_do_not() {
+        let (mut time, mut acc) = shaken();
         time.iter_mut().skip(200).for_each(|t| *t += 1.0);
         let mut usable = vec![true; time.len()];
-        usable[800] = false;
+        usable[780..820].fill(false);
+        for k in (10..700).step_by(40) {
+            usable[k] = false;
+            acc[k] = Vector3::repeat(f64::NAN);
+        }
         let samples = Samples { time: &time, acc: &acc, gyr: None, temperature: None, usable: &usable };
         let cut = RestDetector::new(samples, DT).cut(4.0);
+        assert!(cut.rests.iter().any(|rows| [10, 50, 90].iter().all(|k| rows.contains(k))), "{cut:?}");
         assert!(cut.rests.iter().all(|rows| !rows.contains(&800)));
         assert!(cut.rests.iter().all(|rows| !rows.contains(&199) || !rows.contains(&200)));
     }

@@ -109,11 +109,16 @@ pub fn compress(
 ) -> Result<TurnData, TurnGap> {
     let (rest_before, before, rest_after, after) = rests;
     let rows = turn_rows(time, before, after);
-    if let Some(row) = rows.clone().find(|k| !usable[*k]) {
-        return Err(TurnGap::Unusable { row });
+    // A dropout is bridged by its neighbours; what was clipped or stuck is not what was turned.
+    let measured: Vec<usize> = rows.clone().filter(|k| gyr[*k].iter().all(|w| w.is_finite())).collect();
+    if let Some(row) = measured.iter().find(|k| !usable[**k]) {
+        return Err(TurnGap::Unusable { row: *row });
     }
-    if let Some(row) = rows.clone().skip(1).find(|k| time[*k] - time[k - 1] > GAP * interval) {
-        return Err(TurnGap::Jump { row });
+    if measured.len() < 2 {
+        return Err(TurnGap::Unusable { row: rows.start });
+    }
+    if let Some(pair) = measured.windows(2).find(|pair| time[pair[1]] - time[pair[0]] > GAP * interval) {
+        return Err(TurnGap::Jump { row: pair[1] });
     }
     let count = rows.len() / usize::from(BLOCK) + 1;
     let (mut blocks, mut durations) = (Vec::with_capacity(count), Vec::with_capacity(count));
@@ -123,9 +128,9 @@ pub fn compress(
         blocks.push(block);
         durations.push(duration);
     };
-    for k in rows.clone() {
-        let from = if k == rows.start { time[k] } else { time[k - 1] };
-        let to = if k + 1 == rows.end { time[k] } else { time[k + 1] };
+    for (index, k) in measured.iter().copied().enumerate() {
+        let from = if index == 0 { time[k] } else { time[measured[index - 1]] };
+        let to = measured.get(index + 1).map_or(time[k], |next| time[*next]);
         builder.push(&(gyr[k] - bias.at(time[k])), 0.5 * (to - from));
         if builder.count() == BLOCK {
             keep(&mut builder);
