@@ -200,7 +200,10 @@ fn inertial(
     }
     let mut trials: Vec<_> = cuts.iter().map(Cut::trial).collect();
     let mut acc_outcome = result.outcome;
-    if let Some(fit) = &mut acc_outcome.fit {
+    // A refused gain moves as it likes, and encoders say where a rig stood still whatever the threshold.
+    if acc_outcome.evidence.is_some()
+        && let Some(fit) = &mut acc_outcome.fit
+    {
         let gains: Vec<_> =
             segmentation::comparable(&cuts).filter_map(|cut| Some(cut.fit?.0.gain.diagonal())).collect();
         fit.gain_spread = Some(outcome::gain_spread(gains.iter().copied()));

@@ -82,13 +82,14 @@ fn write_comparison(text: &mut String, comparison: &Comparison) -> fmt::Result {
 
 fn write_segmentation(text: &mut String, segmentation: &SegmentationReport) -> fmt::Result {
     let reference = if segmentation.from_initial_rest { "the initial rest" } else { "the quietest tenth" };
-    writeln!(
-        text,
-        "{} rests at {} times the variance of {reference}; over the thresholds tried, gains move by {:.2} % at most",
-        segmentation.rests.len(),
-        segmentation.multiplier,
-        100.0 * segmentation.gain_spread
-    )
+    let count = segmentation.rests.len();
+    let rests = if count == 1 { "rest" } else { "rests" };
+    write!(text, "{count} {rests} at {} times the variance of {reference}", segmentation.multiplier)?;
+    if segmentation.gain_spread > 0.0 {
+        let percent = 100.0 * segmentation.gain_spread;
+        write!(text, "; over the thresholds tried, gains move by {percent:.2} % at most")?;
+    }
+    writeln!(text)
 }
 
 fn write_sensor(text: &mut String, outcome: &SensorOutcome) -> fmt::Result {
