@@ -56,7 +56,7 @@ impl Default for Options {
             skip: Vec::new(),
             multipliers: segmentation::MULTIPLIERS.to_vec(),
             rig_acc: Some("I14"),
-            rig_mag: Some("X18"),
+            rig_mag: Some("X21"),
             compare: false,
         }
     }

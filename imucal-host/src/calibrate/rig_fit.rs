@@ -2,7 +2,11 @@
 
 use imucal_core::{
     model::unified::{Terms, UnifiedModel, UnifiedParameters},
-    solver::{LevenbergMarquardt, SolveReport, gauge::Gauge, lm::Settings},
+    solver::{
+        LevenbergMarquardt, SolveReport,
+        gauge::{Gauge, bit},
+        lm::Settings,
+    },
     triad::Triad,
 };
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
@@ -39,12 +43,19 @@ pub struct RigFit {
 
 /// Fits `terms` from `base`.
 pub fn fit<const P: usize>(poses: &Poses, base: &UnifiedParameters<f64>, terms: Terms<P>) -> RigFit {
-    let free = UnifiedModel { poses: &poses.poses, axes: poses.axes, base: *base, terms, held: 0 };
+    let free = UnifiedModel {
+        poses: &poses.poses,
+        axes: poses.axes,
+        base: *base,
+        terms,
+        held: length_of(base, &terms),
+    };
     let mut solver = LevenbergMarquardt::new(terms.theta(base), Settings::default());
     solver.run(&free);
-    let gauge = Gauge::of(solver.factor().r(), TOLERANCE, |k| terms.class(k));
+    let mut gauge = Gauge::of(solver.factor().r(), TOLERANCE, |k| terms.class(k));
+    gauge.held |= free.held;
     let model = UnifiedModel { held: gauge.held, ..free };
-    if gauge.held != 0 {
+    if gauge.held != free.held {
         let mut start = *solver.theta();
         let at = terms.theta(base);
         for k in (0..P).filter(|k| gauge.is_held(*k)) {
@@ -54,6 +65,13 @@ pub fn fit<const P: usize>(poses: &Poses, base: &UnifiedParameters<f64>, terms: 
         solver.run(&model);
     }
     summarise(&model, &solver, &gauge)
+}
+
+/// A field's length cannot be told from K's: its largest component is held from the start, since the length hangs on
+/// it most.
+fn length_of<const P: usize>(base: &UnifiedParameters<f64>, terms: &Terms<P>) -> u32 {
+    let largest = 14 + u8::try_from(base.vector_n.iamax()).unwrap_or(0);
+    terms.entries().iter().position(|entry| *entry == largest).map_or(0, bit)
 }
 
 fn summarise<const P: usize>(
@@ -68,8 +86,11 @@ fn summarise<const P: usize>(
         covariance.column_mut(*k).fill(0.0);
         covariance.row_mut(*k).fill(0.0);
     }
+    let mut parameters = model.terms.parameters(&model.base, solver.theta());
+    let stretch = known_length(&mut parameters, &model.base, entries);
+    scale_covariance(&mut covariance, entries, stretch);
     RigFit {
-        parameters: model.terms.parameters(&model.base, solver.theta()),
+        parameters,
         entries: entries.to_vec(),
         held: held
             .iter()
@@ -81,6 +102,34 @@ fn summarise<const P: usize>(
         held_out_rms: held_out(model, solver.theta()),
         squared_sum: 2.0 * solver.report().cost,
         residuals: 3 * model.poses.len(),
+    }
+}
+
+/// Gauge of a field whose direction is estimated: its length is the known one, and K takes up the rest. The fit holds
+/// one component instead, which changes no prediction. Returns the factor on fields.
+fn known_length(now: &mut UnifiedParameters<f64>, base: &UnifiedParameters<f64>, entries: &[u8]) -> f64 {
+    if !entries.contains(&14) {
+        return 1.0;
+    }
+    let stretch = base.vector_n.norm() / now.vector_n.norm();
+    now.vector_n *= stretch;
+    now.outer_source *= stretch;
+    now.middle_source *= stretch;
+    now.sensitivity /= stretch;
+    stretch
+}
+
+/// The covariance in that gauge; the factor's own uncertainty is of second order, as what is held is the component
+/// that the length hangs on.
+fn scale_covariance<const P: usize>(covariance: &mut SMatrix<f64, P, P>, entries: &[u8; P], stretch: f64) {
+    for (k, entry) in entries.iter().enumerate() {
+        let factor = match entry {
+            0..=8 => 1.0 / stretch,
+            14..=22 => stretch,
+            _ => 1.0,
+        };
+        covariance.row_mut(k).scale_mut(factor);
+        covariance.column_mut(k).scale_mut(factor);
     }
 }
 
