@@ -5,4 +5,5 @@ pub mod data;
 pub mod firmware;
 pub mod golden;
 pub mod program;
+pub mod rig;
 pub mod simulated;

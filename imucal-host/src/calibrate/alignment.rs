@@ -22,8 +22,14 @@ pub struct Alignment {
     pub rotation: Matrix3<f64>,
     /// Rotation vector of it, rad.
     pub phi: Vector3<f64>,
-    /// Covariance of the rotation's error, accelerometer axes, rad².
+    /// Covariance of the rotation's error, accelerometer axes, rad²: of the directions' own errors, for triads as
+    /// they are.
     pub covariance: Matrix3<f64>,
+    /// How the rotation moves with an error of the magnetometer's triad, b → b + E b + c: by E by rows, then c, in
+    /// lengths of the field. See [`Self::turn`].
+    by_mag: SMatrix<f64, 3, 12>,
+    /// Mean length of the field in the pairs.
+    field: f64,
     /// Dip of the field, rad, positive down, and its standard error.
     pub dip: (f64, f64),
     /// Rms of the dip over the rests, rad.
@@ -36,6 +42,7 @@ pub struct Alignment {
 
 /// Finds the rotation from calibrated pairs (specific force, field); `None` where the rests cannot tell it.
 pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Alignment> {
+    let field = pairs.iter().map(|(_, b)| b.norm()).sum::<f64>() / pairs.len() as f64;
     let pairs: Vec<DirectionPair<f64>> = pairs
         .iter()
         .map(|(f, b)| DirectionPair { u_f: f.normalize(), u_b: b.normalize() })
@@ -56,6 +63,7 @@ pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Alignment> {
     {
         return None;
     }
+    let by_mag = moved_by_mag(&model, solver.theta(), &jacobian)?;
     let cos = solver.theta().w.clamp(-1.0, 1.0);
     // An error of the cosine is one of the angle, by the sine between gravity and field.
     let per_angle = (1.0 - cos * cos).sqrt().max(1e-3);
@@ -63,11 +71,37 @@ pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Alignment> {
         rotation,
         phi: solver.theta().xyz(),
         covariance: own,
+        by_mag,
+        field,
         dip: ((-cos).asin(), covariance[(3, 3)].sqrt() / per_angle),
         rms: solver.variance()?.sqrt() / per_angle,
         held_out_rms: held_out(&model, solver.theta()).map(|rms| rms / per_angle),
         rests: pairs.len(),
     })
+}
+
+/// Derivative of the rotation's error δ by an error of the magnetometer's triad, b → b + E b + c with |b| = 1:
+/// `dr = u_fᵀ R (1 − u_b u_bᵀ)(E u_b + c)` moves the optimum by `−(JᵀJ)⁻¹ Jᵀ dr`.
+fn moved_by_mag(
+    model: &DipModel<'_, f64>,
+    theta: &SVector<f64, 4>,
+    jacobian: &Matrix3<f64>,
+) -> Option<SMatrix<f64, 3, 12>> {
+    let rows = Rows::of(model, theta);
+    let rotation = imucal_core::rotation::exp(&theta.xyz());
+    let (mut normal, mut right) = (SMatrix::<f64, 4, 4>::zeros(), SMatrix::<f64, 4, 12>::zeros());
+    for (pair, row) in model.pairs.iter().zip(&rows.jacobian) {
+        let seen = rotation.tr_mul(&pair.u_f);
+        let across = seen - pair.u_b * pair.u_b.dot(&seen);
+        let by = SVector::<f64, 12>::from_fn(|k, _| match k {
+            0..9 => across[k / 3] * pair.u_b[k % 3],
+            _ => across[k - 9],
+        });
+        normal += row * row.transpose();
+        right += row * by.transpose();
+    }
+    let moved = -(normal.try_inverse()? * right);
+    Some(jacobian * moved.fixed_rows::<3>(0))
 }
 
 /// The best of fits from the 24 ways in which axes can be relabelled without a mirror: a magnetometer may lie any way
@@ -113,7 +147,10 @@ fn held_out(model: &DipModel<'_, f64>, theta: &SVector<f64, 4>) -> Option<f64> {
 
 impl Alignment {
     /// The triad in the accelerometer's axes, and the covariance of its twelve entries (gain by rows, bias).
-    /// `covariance` is that of the entries `of` before. By `dG' = R dG + [δ]× R G`.
+    /// `covariance` is that of the entries `of` before.
+    ///
+    /// With `dG' = R dG + [δ]× R G`. An error of the triad moves the rotation with it, most of all one that turns its
+    /// axes: δ is that of the directions plus what follows dG and db, by `E = dG G⁻¹`, `c = −G db`.
     pub fn turn(
         &self,
         triad: &Triad<f64>,
@@ -121,23 +158,32 @@ impl Alignment {
         of: &[u8],
     ) -> (Triad<f64>, SMatrix<f64, 12, 12>) {
         let gain = self.rotation * triad.gain;
-        let mut by_entries = nalgebra::DMatrix::zeros(12, of.len());
-        for (column, entry) in of.iter().enumerate() {
-            match usize::from(*entry) {
-                k @ 0..9 => {
-                    for row in 0..3 {
-                        by_entries[(3 * row + k % 3, column)] = self.rotation[(row, k / 3)];
-                    }
-                }
-                k => by_entries[(k, column)] = 1.0,
-            }
-        }
         let mut by_rotation = SMatrix::<f64, 12, 3>::zeros();
         for axis in 0..3 {
             let moved = cross_matrix(&Vector3::ith(axis, 1.0)) * gain;
             for k in 0..9 {
                 by_rotation[(k, axis)] = moved[(k / 3, k % 3)];
             }
+        }
+        let inverse = triad.gain.try_inverse().unwrap_or_else(Matrix3::zeros);
+        let mut by_entries = nalgebra::DMatrix::zeros(12, of.len());
+        for (column, entry) in of.iter().enumerate() {
+            let mut moved = SVector::<f64, 12>::zeros();
+            let mut carried = SVector::<f64, 12>::zeros();
+            match usize::from(*entry) {
+                k @ 0..9 => {
+                    for at in 0..3 {
+                        moved[3 * at + k % 3] = self.rotation[(at, k / 3)];
+                        carried[3 * (k / 3) + at] = inverse[(k % 3, at)];
+                    }
+                }
+                k => {
+                    moved[k] = 1.0;
+                    let shift = -triad.gain.column(k - 9) / self.field;
+                    carried.fixed_rows_mut::<3>(9).copy_from(&shift);
+                }
+            }
+            by_entries.set_column(column, &(moved + by_rotation * (self.by_mag * carried)));
         }
         let own = &by_entries * covariance * by_entries.transpose();
         let turned = by_rotation * self.covariance * by_rotation.transpose();

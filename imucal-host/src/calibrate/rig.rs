@@ -20,6 +20,9 @@ use crate::{
 /// Poses at least: the affine part has twelve parameters, and each pose tells three.
 const LEAST_POSES: usize = 6;
 
+/// A tilt with a larger standard error is not told, rad: a spirit level knows it to 0.2°.
+const LEVELLED: f64 = 3.5e-3;
+
 /// The accelerometer on a rig; `None` where there is none, or the field form is asked for.
 pub fn accelerometer(
     recording: &Recording,
@@ -41,14 +44,24 @@ pub fn accelerometer(
     let Some(mut rung) = ladder::rung(name, &poses, down) else {
         return Some(too_few(SensorKind::Acc, name, &poses));
     };
-    let tilt_held = rung.fit.held.iter().any(|(entry, _)| matches!(entry, 12 | 13));
-    if tilt_held && let Some(lower) = ladder::rung("T12", &poses, down) {
+    if !tells_tilt(&rung.fit)
+        && let Some(lower) = ladder::rung("T12", &poses, down)
+    {
         calibration.warnings.push(format!(
             "acc: the poses cannot tell the base's tilt from K; kept T12 instead of {name}, base taken as level"
         ));
         rung = lower;
     }
     Some(outcome(SensorKind::Acc, &rung, &poses, sensor, gravity))
+}
+
+/// The poses tell the base's tilt, where it was asked for. Held is the exact case; noise, scatter of the stops and a
+/// tilted base leave poses that ought to be exact a little of their own, and an error far beyond any base.
+fn tells_tilt(fit: &RigFit) -> bool {
+    [12, 13].iter().all(|entry| {
+        let held = fit.held.iter().any(|(held, _)| held == entry);
+        !held && fit.std(*entry).is_none_or(|std| std <= LEVELLED)
+    })
 }
 
 /// The magnetometer on a rig whose site has a known field; `None` otherwise, or where the field form is asked for.
