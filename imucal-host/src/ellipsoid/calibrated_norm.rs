@@ -4,8 +4,9 @@
 //! y = A (m − b),   r = |y| − F,   ∂r/∂A = u (m − b)ᵀ,   ∂r/∂b = −Aᵀu,   u = y/|y|
 //! ```
 //!
-//! Source: Vasconcelos et al. 2011 and models.md 5. Kept for comparison: its residual is in calibrated units and vanishes for
-//! A → 0, b → ∞ whatever was measured, which draws the centre away from the points. [`super::distance`] does not.
+//! Source: Vasconcelos et al. 2011 and models.md 5. Kept for comparison: its residual is in calibrated units and
+//! vanishes for A → 0, b → ∞ whatever was measured, which draws the centre away from the points.
+//! [`super::distance`] does not.
 
 use imucal_core::{
     model::{Model, RowSink, parameterisation::UPPER_TRIANGULAR},

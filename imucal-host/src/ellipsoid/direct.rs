@@ -4,9 +4,9 @@
 //! min Σ (ψᵀ m(x))²   subject to   |ψ| = 1
 //! ```
 //!
-//! Source: models.md 5 (algebraic, SVD). Any quadric may come out, so it can fail where
-//! [`super::li_griffiths`] cannot. Biased under noise where a part of the sphere is unseen, and by how much depends on
-//! origin and unit, since |ψ| = 1 changes its meaning with them.
+//! Source: models.md 5 (algebraic, SVD). Any quadric may come out, so it can fail where [`super::li_griffiths`]
+//! cannot. Biased under noise where a part of the sphere is unseen, and by how much depends on origin and unit,
+//! since |ψ| = 1 changes its meaning with them.
 
 use imucal_core::{observation::ShellPoint, triad::Triad};
 

@@ -1,11 +1,12 @@
-//! Our geometric fit: distance from the ellipsoid in raw units, less what noise alone makes of it on a curved surface.
+//! Our geometric fit: distance from the ellipsoid in raw units, less what noise alone makes of it on a curved
+//! surface.
 //!
 //! ```text
 //! r = (|A(m − b)| − F) / |Aᵀu| − e(σ²),   σ² from the residuals of the round before
 //! ```
 //!
-//! The residual and its source: [`imucal_core::model::norm`]. It is the fit of a calibration by the field form, without its care
-//! for outliers. Estimated noise, so that nothing but the points is needed.
+//! The residual and its source: [`imucal_core::model::norm`]. It is the fit of a calibration by the field form,
+//! without its care for outliers. Estimated noise, so that nothing but the points is needed.
 
 use imucal_core::{
     model::{

@@ -5,13 +5,13 @@
 //! I = a + b + c,   J = ab + bc + ac − f² − g² − h²     of Q = [a h g; h b f; g f c]
 //! ```
 //!
-//! With linear and constant coefficients eliminated (triangular factor of their columns first, the block T left for the
-//! quadratic ones), `TᵀT v = λ C v`; the solution belongs to the one positive eigenvalue of T⁻ᵀ C T⁻¹.
+//! With linear and constant coefficients eliminated (triangular factor of their columns first, the block T left
+//! for the quadratic ones), `TᵀT v = λ C v`; the solution belongs to the one positive eigenvalue of T⁻ᵀ C T⁻¹.
 //!
 //! Source: Li & Griffiths 2004, *Least squares ellipsoid specific fitting*. For k = 4 the constraint admits every
-//! ellipsoid whose shortest radius is at least half of the longest, and nothing but ellipsoids; sensors are rounder by far.
-//! Unlike that of |ψ| = 1, the answer does not depend on origin and unit. It is biased under noise towards ellipsoids that
-//! are too round and too large.
+//! ellipsoid whose shortest radius is at least half of the longest, and nothing but ellipsoids; sensors are
+//! rounder by far. Unlike that of |ψ| = 1, the answer does not depend on origin and unit. It is biased under noise
+//! towards ellipsoids that are too round and too large.
 
 use imucal_core::{observation::ShellPoint, triad::Triad};
 use nalgebra::{SMatrix, SVector};
