@@ -25,4 +25,6 @@ pub mod equivalence;
 
 pub mod report;
 
+pub mod study;
+
 pub mod cli;

@@ -14,6 +14,7 @@ mod inspect;
 mod output;
 mod progress;
 mod simulate;
+mod study;
 mod verify;
 
 /// Calibrates inertial and magnetic sensors from recordings, through the code that runs on their microcontroller.
@@ -40,6 +41,8 @@ enum Command {
     Simulate(simulate::Arguments),
     /// The whole way on a simulated sensor: record, calibrate, pack, apply, verify.
     Demo(demo::Arguments),
+    /// Simulated comparisons of estimators and models, each printed as a table.
+    Study(study::Arguments),
 }
 
 /// How a command ended, when nothing went wrong on the way.
@@ -61,6 +64,7 @@ pub fn run() -> ExitCode {
         Command::Import(arguments) => import::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
     };
     match result {
         Ok(Ending::Done) => ExitCode::SUCCESS,

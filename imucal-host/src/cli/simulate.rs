@@ -117,6 +117,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         rate: arguments.rate,
         duration: arguments.duration,
         seed: arguments.seed,
+        unit_seed: None,
         noise: !arguments.no_noise,
         counts: !arguments.si,
         doses: Vec::new(),

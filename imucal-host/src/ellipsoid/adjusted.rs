@@ -8,25 +8,15 @@
 //! ```
 //!
 //! Source: Markovsky, Kukush & Van Huffel 2004, with the noise estimated beside the ellipsoid; models.md 5. The
-//! ordinary algebraic fit (σ² = 0) is off by several times its noise where a part of the sphere is unseen.
-//! Not modelled: noise that differs between axes, or that is correlated in time.
+//! ordinary algebraic fit (σ² = 0) is off by several times its noise where a part of the sphere is unseen. Where
+//! the noise is known, [`with_noise`] is the textbook estimator, consistent under it. Not modelled: noise that
+//! differs between axes, or that is correlated in time.
 
 use imucal_core::{observation::ShellPoint, triad::Triad};
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::SMatrix;
 
-/// Exponents of the monomials m(x).
-const MONOMIALS: [[usize; 3]; 10] = [
-    [2, 0, 0],
-    [0, 2, 0],
-    [0, 0, 2],
-    [1, 1, 0],
-    [1, 0, 1],
-    [0, 1, 1],
-    [1, 0, 0],
-    [0, 1, 0],
-    [0, 0, 1],
-    [0, 0, 0],
-];
+use super::quadric::{Frame, MONOMIALS, Quadric};
+
 /// Coefficient of σ^{2k} x^{n−2k} in the unbiased monomial of degree n.
 const UNBIASED: [[f64; 3]; 5] =
     [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, -1.0, 0.0], [1.0, -3.0, 0.0], [1.0, -6.0, 3.0]];
@@ -38,21 +28,16 @@ type Design = SMatrix<f64, 10, 10>;
 /// Raw moments of a cloud, mean of x^a y^b z^c for a + b + c ≤ 4, after the cloud is centred and scaled.
 struct Moments {
     sums: [[[f64; 5]; 5]; 5],
-    middle: Vector3<f64>,
-    extent: f64,
+    frame: Frame,
 }
 
 impl Moments {
     fn of(points: &[ShellPoint<f64>]) -> Option<Self> {
         let count = points.len() as f64;
-        let middle: Vector3<f64> = points.iter().map(|p| p.value).sum::<Vector3<f64>>() / count;
-        let extent = (points.iter().map(|p| (p.value - middle).norm_squared()).sum::<f64>() / count).sqrt();
-        if !(extent.is_finite() && extent > 0.0) {
-            return None;
-        }
+        let frame = Frame::of(points)?;
         let mut sums = [[[0.0; 5]; 5]; 5];
         for p in points {
-            let x = (p.value - middle) / extent;
+            let x = frame.inside(&p.value);
             let powers = [x.x, x.y, x.z].map(|v| [1.0, v, v * v, v * v * v, v * v * v * v]);
             for a in 0..5 {
                 for b in 0..5 - a {
@@ -62,7 +47,7 @@ impl Moments {
                 }
             }
         }
-        Some(Self { sums, middle, extent })
+        Some(Self { sums, frame })
     }
 
     /// Moment of the unbiased monomial x^a y^b z^c under noise of variance `s`.
@@ -88,7 +73,7 @@ impl Moments {
 }
 
 /// Least eigenvalue of the design and its eigenvector.
-fn least(design: Design) -> (f64, SVector<f64, 10>) {
+fn least(design: Design) -> (f64, Quadric) {
     let eigen = design.symmetric_eigen();
     let (index, value) = eigen.eigenvalues.argmin();
     (value, eigen.eigenvectors.column(index).into_owned())
@@ -119,66 +104,37 @@ fn noise_variance(moments: &Moments) -> f64 {
 pub fn start(points: &[ShellPoint<f64>], norm: f64) -> Option<Triad<f64>> {
     let moments = Moments::of(points)?;
     let (_, psi) = least(moments.design(noise_variance(&moments)));
-    let q = Matrix3::new(
-        psi[0],
-        0.5 * psi[3],
-        0.5 * psi[4],
-        0.5 * psi[3],
-        psi[1],
-        0.5 * psi[5],
-        0.5 * psi[4],
-        0.5 * psi[5],
-        psi[2],
-    );
-    let linear = Vector3::new(psi[6], psi[7], psi[8]) * 0.5;
-    let centre = -(q.try_inverse()? * linear);
-    let scale = centre.dot(&(q * centre)) - psi[9];
-    let upper = (q / scale).cholesky()?.l().transpose();
-    let triad =
-        Triad { gain: upper * (norm / moments.extent), bias: moments.middle + centre * moments.extent };
-    triad.is_finite().then_some(triad)
+    moments.frame.triad(&psi, norm)
+}
+
+/// The same for noise whose standard deviation on each axis is known, raw unit.
+pub fn with_noise(points: &[ShellPoint<f64>], norm: f64, noise: f64) -> Option<Triad<f64>> {
+    let moments = Moments::of(points)?;
+    let (_, psi) = least(moments.design((noise / moments.frame.extent).powi(2)));
+    moments.frame.triad(&psi, norm)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::quadric::tests::{CENTRE, assert_found, cap, circle};
     use super::*;
-    use rand::SeedableRng;
-    use rand_distr::{Distribution, Normal};
-
-    /// Points on the top `share` of an ellipsoid, with noise.
-    fn cap(share: f64, count: u32, noise: f64) -> Vec<ShellPoint<f64>> {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
-        let normal = Normal::new(0.0, noise).unwrap();
-        let k = Matrix3::new(1.05, 0.02, 0.0, 0.02, 0.95, -0.03, 0.0, -0.03, 1.1);
-        (0..count)
-            .map(|i| {
-                let z = 1.0 - 2.0 * share * (f64::from(i) + 0.5) / f64::from(count);
-                let r = (1.0 - z * z).sqrt();
-                let a = 2.399_963 * f64::from(i);
-                let u = Vector3::new(r * a.cos(), r * a.sin(), z) * 475.0;
-                let n = Vector3::from_fn(|_, _| normal.sample(&mut rng));
-                ShellPoint::new(k * u + Vector3::new(100.0, -50.0, 20.0) + n)
-            })
-            .collect()
-    }
 
     #[test]
     fn without_noise_the_ellipsoid_is_exact() {
-        let triad = start(&cap(1.0, 300, 0.0), 475.0).unwrap();
-        assert!((triad.bias - Vector3::new(100.0, -50.0, 20.0)).norm() < 1e-3, "{}", triad.bias);
+        assert_found(&start(&cap(1.0, 300, 0.0), 475.0).unwrap(), 1e-5);
+        assert_found(&with_noise(&cap(1.0, 300, 0.0), 475.0, 0.0).unwrap(), 1e-8);
     }
 
     #[test]
     fn on_the_top_third_noise_does_not_shift_the_centre() {
-        let triad = start(&cap(0.3, 200_000, 2.0), 475.0).unwrap();
-        assert!((triad.bias - Vector3::new(100.0, -50.0, 20.0)).norm() < 2.5, "{}", triad.bias);
+        let points = cap(0.3, 200_000, 2.0);
+        for triad in [start(&points, 475.0).unwrap(), with_noise(&points, 475.0, 2.0).unwrap()] {
+            assert!((triad.bias - CENTRE).norm() < 2.5, "{}", triad.bias);
+        }
     }
 
     #[test]
     fn points_in_a_plane_have_no_ellipsoid() {
-        let points: Vec<_> = (0..50)
-            .map(|k| ShellPoint::new(Vector3::new(f64::from(k).cos(), f64::from(k).sin(), 0.0)))
-            .collect();
-        assert!(start(&points, 1.0).is_none());
+        assert!(start(&circle(), 1.0).is_none());
     }
 }

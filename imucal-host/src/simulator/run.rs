@@ -45,6 +45,8 @@ pub struct Simulation {
     pub duration: Option<f64>,
     /// Everything random follows from it.
     pub seed: u64,
+    /// The unit's own seed, for further recordings of one unit; `None`: that of the recording.
+    pub unit_seed: Option<u64>,
     /// Noise, drift, scatter of the rests and rounding; without, a recording is a smooth function of the effects'
     /// parameters.
     pub noise: bool,
@@ -63,6 +65,7 @@ impl Default for Simulation {
             rate: 100.0,
             duration: None,
             seed: 1,
+            unit_seed: None,
             noise: true,
             counts: true,
             doses: Vec::new(),
@@ -94,7 +97,7 @@ impl Simulation {
 
     /// The unit, without effects.
     pub fn unit_under_test(&self) -> UnitUnderTest {
-        UnitUnderTest::draw(self.unit, self.seed, self.rate)
+        UnitUnderTest::draw(self.unit, self.unit_seed.unwrap_or(self.seed), self.rate)
     }
 
     /// Adds an effect of a size, see [`Dose::sized`].

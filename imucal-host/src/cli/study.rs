@@ -1,0 +1,39 @@
+//! `imucal study`
+
+use clap::{Args, Subcommand};
+
+use super::{Ending, output};
+use crate::study::{coverage, units};
+
+#[derive(Args, Debug)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    study: Study,
+}
+
+#[derive(Debug, Subcommand)]
+enum Study {
+    /// How far noise shifts an ellipsoid's centre where only a part of the sphere is seen, by estimator
+    Coverage {
+        /// Clouds a figure at 30 % is the mean of; the sweep takes a fifth
+        #[arg(long, value_name = "N", default_value_t = 500)]
+        runs: u32,
+        /// Everything random follows from it
+        #[arg(long, value_name = "N", default_value_t = 1)]
+        seed: u64,
+    },
+    /// Two simulated units on the simulated rig, before and after calibration by each model
+    Units {
+        /// Everything random follows from it
+        #[arg(long, value_name = "N", default_value_t = 1)]
+        seed: u64,
+    },
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    match arguments.study {
+        Study::Coverage { runs, seed } => output::text(&coverage::report(runs, seed))?,
+        Study::Units { seed } => output::text(&units::report(seed)?)?,
+    }
+    Ok(Ending::Done)
+}
