@@ -3,7 +3,7 @@
 //! | attitudes | a motion goes | and starts |
 //! | --- | --- | --- |
 //! | encoders | from inside one still stretch to inside the next | from the encoders' mean |
-//! | optical reference | over [`OPTICAL`] s | from the reference |
+//! | optical reference | over [`OPTICAL`](super::gyr_motions::OPTICAL) s | from the reference |
 //!
 //! No motion starts from where another ended, so drift does not accumulate. The gain is full, in the table's axes: any
 //! constant rotation between the sensor and the table, or the optical body, is part of it. Source: models.md 3, a
@@ -13,24 +13,18 @@ use imucal_core::{
     accept::{self, Limits, Refusal},
     coverage::Coverage,
     model::parameterisation::{FULL, FULL_WITH_SENSITIVITY},
-    observation::Moments,
 };
 use nalgebra::{Matrix3, Vector3};
-use std::ops::Range;
 
 use super::{
     Options, compare,
-    gyr_path::{Still, Wander},
+    gyr_motions::{Observations, lagging, on_encoders},
     gyr_rig_fit::{self, LARGEST_RMS, MotionFit, REACH, Search},
-    outcome::{BiasWander, Calibration, FitSummary, Refused, RigFindings, SensorOutcome},
+    outcome::{Calibration, FitSummary, Refused, RigFindings, SensorOutcome},
 };
 use crate::{
-    observe::{
-        motion::{self, Attitudes, MotionData, MotionInput},
-        pose,
-    },
-    recording::{Recording, SensorKind, Triple, Unit, unit::STANDARD_GRAVITY},
-    simulator::truth::EARTH_RATE,
+    observe::{motion, pose},
+    recording::{Recording, SensorKind, Triple, Unit},
 };
 
 /// Gain and bias.
@@ -40,25 +34,10 @@ pub const G21: &str = "G21";
 /// Models of a gyroscope against known attitudes, with what each adds.
 pub const MODELS: [(&str, &str); 2] = [(G12, "gain and bias"), (G21, "g-sensitivity")];
 
-/// How far into a still stretch a motion reaches, s; to its middle where that is nearer.
-const MARGIN: f64 = 1.0;
-/// Length of a motion between optical references, s.
-pub const OPTICAL: f64 = 1.5;
 /// Motions at least, per nine parameters of the gain.
 const LEAST_MOTIONS: usize = 8;
 /// A motion tells something of the gain once it turns by this much, rad (5°).
 const LEAST_ANGLE: f64 = 0.087;
-
-/// What a gyroscope is calibrated from.
-#[derive(Clone, Debug)]
-struct Observations {
-    data: Vec<MotionData>,
-    /// Static bias, where there is a rest to tell it, rad/s.
-    bias: Vector3<f64>,
-    wander: Option<BiasWander>,
-    left_out: Vec<String>,
-    notes: Vec<String>,
-}
 
 /// Calibrates against attitudes; `None` where the recording has none, or the field form is asked for.
 pub fn gyroscope(
@@ -83,7 +62,7 @@ pub fn gyroscope(
             }
         }
     } else {
-        on_reference(recording, sensor, usable, &motion::of_reference(recording.reference.as_deref()?))
+        lagging(recording, sensor, usable, &motion::of_reference(recording.reference.as_deref()?))
     };
     if recording.manifest.site.latitude_deg.is_none() {
         calibration.warnings.push(
@@ -98,137 +77,6 @@ pub fn gyroscope(
         calibration.comparisons.extend(comparison(&observations));
     }
     Some(outcome(name, sensor, &observations))
-}
-
-/// Motions between the still stretches of the encoders.
-fn on_encoders(
-    recording: &Recording,
-    sensor: &Triple,
-    usable: &[bool],
-    gimbal: &[[f64; 3]],
-    attitudes: &Attitudes,
-    axes: &imucal_core::model::rig::RigAxes,
-) -> Observations {
-    let input = input(recording, sensor, usable, attitudes);
-    let stretches: Vec<(Range<usize>, Matrix3<f64>)> = pose::still_stretches(&recording.time, gimbal)
-        .into_iter()
-        .filter_map(|rows| {
-            let attitude = motion::of_angles(&pose::mean_angles(&gimbal[rows.clone()])?, axes)?;
-            Some((rows, attitude))
-        })
-        .collect();
-    let stills: Vec<Still> =
-        stretches.iter().filter_map(|(rows, attitude)| still(&input, rows, attitude)).collect();
-    let (path, bias, wander) = Wander::of(&stills);
-    let mut found = Observations {
-        data: Vec::new(),
-        bias,
-        wander: Some(wander),
-        left_out: Vec::new(),
-        notes: vec!["against the encoders' attitude, from one still stretch of the table to the next".into()],
-    };
-    for (k, pair) in stretches.windows(2).enumerate() {
-        let [(before, start), (after, end)] = pair else { continue };
-        let rows = leave(input.time, before)..arrive(input.time, after);
-        match input.compress(rows, [start, end], &|time| path.at(time)) {
-            Ok(data) => found.data.push(data),
-            Err(gap) => {
-                found.left_out.push(format!("motion from still stretch {} to {}: {gap}", k + 1, k + 2));
-            }
-        }
-    }
-    found
-}
-
-/// Row at which a motion leaves a still stretch.
-fn leave(time: &[f64], still: &Range<usize>) -> usize {
-    let (first, last) = (time[still.start], time[still.end - 1]);
-    let from = last - MARGIN.min(0.5 * (last - first));
-    still.start + time[still.clone()].partition_point(|t| *t < from)
-}
-
-/// One beyond the row at which a motion arrives in a still stretch.
-fn arrive(time: &[f64], still: &Range<usize>) -> usize {
-    let (first, last) = (time[still.start], time[still.end - 1]);
-    let to = first + MARGIN.min(0.5 * (last - first));
-    still.start + time[still.clone()].partition_point(|t| *t <= to)
-}
-
-/// The mean rate of a still stretch less Earth's rotation; `None` where hardly a sample is usable.
-fn still(input: &MotionInput<'_>, rows: &Range<usize>, attitude: &Matrix3<f64>) -> Option<Still> {
-    let mut moments = Moments::default();
-    rows.clone().filter(|k| input.usable[*k]).for_each(|k| moments.push(&input.rates[k]));
-    let count = f64::from(moments.count());
-    (moments.count() > 10).then(|| Still {
-        time: 0.5 * (input.time[rows.start] + input.time[rows.end - 1]),
-        mean: moments.mean() - attitude.tr_mul(&input.earth_p),
-        // Rounding to counts may leave no spread at all.
-        variance: (moments.variance() / count).map(|v| v.max(1e-14)),
-    })
-}
-
-/// Motions of equal length between optical references; each starts at the reference after the one that ended the
-/// motion before, so that no two share one.
-fn on_reference(
-    recording: &Recording,
-    sensor: &Triple,
-    usable: &[bool],
-    attitudes: &Attitudes,
-) -> Observations {
-    let input = input(recording, sensor, usable, attitudes);
-    let valid = attitudes.iter().flatten().count();
-    let mut found = Observations {
-        data: Vec::new(),
-        bias: Vector3::zeros(),
-        wander: None,
-        left_out: Vec::new(),
-        notes: vec![format!(
-            "against the reference attitude, {OPTICAL} s a motion; {valid} of {} rows have one",
-            attitudes.len()
-        )],
-    };
-    let next = |from: usize| (from..attitudes.len()).find_map(|k| Some((k, attitudes[k].as_ref()?)));
-    let mut from = 0;
-    let mut broken = 0;
-    while let Some((first, start)) = next(from) {
-        let reach = input.time.partition_point(|t| *t < input.time[first] + OPTICAL);
-        let Some((last, end)) = next(reach) else { break };
-        if input.time[last] - input.time[first] > 2.0 * OPTICAL {
-            broken += 1;
-        } else {
-            match input.compress(first..last + 1, [start, end], &|_| Vector3::zeros()) {
-                Ok(data) => found.data.push(data),
-                Err(_) => broken += 1,
-            }
-        }
-        from = last + 1;
-    }
-    if broken > 0 {
-        found.left_out.push(format!("{broken} motions in which the reference or the rates are missing"));
-    }
-    found
-}
-
-fn input<'a>(
-    recording: &'a Recording,
-    sensor: &'a Triple,
-    usable: &'a [bool],
-    attitudes: &'a Attitudes,
-) -> MotionInput<'a> {
-    let site = &recording.manifest.site;
-    let earth_p = site.latitude_deg.map_or_else(Vector3::zeros, |degrees| {
-        let (sin, cos) = degrees.to_radians().sin_cos();
-        Vector3::new(cos, 0.0, -sin) * EARTH_RATE
-    });
-    MotionInput {
-        time: &recording.time,
-        rates: &sensor.values,
-        usable,
-        interval: recording.median_interval().unwrap_or(1.0),
-        attitudes,
-        earth_p,
-        force_p: Vector3::new(0.0, 0.0, -site.gravity().unwrap_or(STANDARD_GRAVITY)),
-    }
 }
 
 /// Motions that turn, and enough of them.

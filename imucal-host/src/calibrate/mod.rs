@@ -17,6 +17,7 @@ pub mod acc;
 pub mod alignment;
 pub mod compare;
 pub mod gyr;
+pub mod gyr_motions;
 pub mod gyr_path;
 pub mod gyr_rig;
 pub mod gyr_rig_fit;

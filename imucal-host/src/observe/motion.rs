@@ -8,7 +8,7 @@ use std::ops::Range;
 use imucal_core::{
     model::rig::{GimbalPose, RigAxes},
     observation::{Block, BlockBuilder, Compared, Durations, Motion},
-    rotation::{matrix, quaternion},
+    rotation::{exp, log, matrix, quaternion, quaternion_log},
 };
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
@@ -42,6 +42,21 @@ pub fn of_reference(reference: &[[f64; 4]]) -> Attitudes {
         .map(|[w, x, y, z]| {
             let q = Quaternion::new(*w, *x, *y, *z);
             ((q.norm() - 1.0).abs() < UNIT).then(|| matrix(&q))
+        })
+        .collect()
+}
+
+/// Attitudes as a sensor that lags by `lag`, s, shows them: at each row, that of `lag` before, on the way between two
+/// rows; `None` where either of them has none.
+pub fn later(time: &[f64], attitudes: &[Option<Matrix3<f64>>], lag: f64) -> Attitudes {
+    time.iter()
+        .map(|now| {
+            let then = now - lag;
+            let next = time.partition_point(|t| *t <= then);
+            let (before, after) = (next.checked_sub(1)?, attitudes.get(next)?.as_ref()?);
+            let from = attitudes.get(before)?.as_ref()?;
+            let share = (then - time[before]) / (time[next] - time[before]);
+            Some(from * exp(&(log(&from.tr_mul(after)) * share)))
         })
         .collect()
 }
@@ -97,7 +112,7 @@ impl MotionData {
 
     /// Rotation vector from the attitude before to the one after, table axes, rad, the shorter way round.
     pub fn turned(&self) -> Vector3<f64> {
-        imucal_core::rotation::quaternion_log(&(self.start.conjugate() * self.end[0]))
+        quaternion_log(&(self.start.conjugate() * self.end[0]))
     }
 }
 
@@ -167,7 +182,6 @@ mod tests {
     use super::*;
     use imucal_core::{
         model::{attitude::AttitudeModel, parameterisation::FULL},
-        rotation::exp,
         triad::Triad,
     };
 
@@ -194,6 +208,17 @@ mod tests {
         let error = imucal_core::model::Cost::cost(&model, &FULL.theta(&Triad::identity())).sqrt();
         assert!(error < 1e-5, "{error}");
         assert!((data.turned() - Vector3::z() * 1.5).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_sensor_that_lags_shows_the_attitude_of_before() {
+        let time: Vec<f64> = (0..50).map(|k| f64::from(k) * 0.01).collect();
+        let at = |t: f64| exp(&(Vector3::new(1.0, -2.0, 0.5) * t));
+        let attitudes: Attitudes = time.iter().map(|t| Some(at(*t))).collect();
+        let late = later(&time, &attitudes, 0.004);
+        assert!(late[0].is_none());
+        assert!((late[20].unwrap() - at(0.196)).norm() < 1e-12);
+        assert!((later(&time, &attitudes, -0.004)[20].unwrap() - at(0.204)).norm() < 1e-12);
     }
 
     #[test]
