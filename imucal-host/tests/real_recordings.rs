@@ -4,6 +4,7 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use imucal_host::calibrate::{Options, calibrate};
 use imucal_host::recording::integrity::{Integrity, inspect};
 use imucal_host::recording::{Recording, SensorKind};
 
@@ -95,4 +96,18 @@ fn a_real_recording_written_again_holds_the_same_values() {
     let (again, _) = read(&path);
     assert_eq!(again.time, recording.time);
     assert_eq!((again.acc, again.gyr), (recording.acc, recording.gyr));
+}
+
+#[test]
+fn a_factory_calibrated_gyroscope_agrees_with_its_optical_reference() {
+    let Some(folder) = data("real") else { return };
+    let (recording, _) = read(&folder.join("broad-01-undisturbed.csv.gz"));
+    let options = Options { skip: vec![SensorKind::Acc, SensorKind::Mag], ..Options::default() };
+    let calibration = calibrate(&recording, &options, &|_| ());
+    let outcome = calibration.sensor(SensorKind::Gyr).unwrap();
+    assert_eq!(outcome.model, "G12");
+    let fit = outcome.accepted().unwrap();
+    println!("{:.4} rms {:.3}°", fit.triad.gain, fit.rms.to_degrees());
+    assert!((fit.triad.gain - nalgebra::Matrix3::identity()).amax() < 0.01, "{}", fit.triad.gain);
+    assert!(fit.rms.to_degrees() < 0.6 && fit.observations > 120);
 }

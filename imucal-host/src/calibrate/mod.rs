@@ -17,6 +17,10 @@ pub mod acc;
 pub mod alignment;
 pub mod compare;
 pub mod gyr;
+pub mod gyr_motions;
+pub mod gyr_path;
+pub mod gyr_rig;
+pub mod gyr_rig_fit;
 pub mod ladder;
 pub mod mag;
 pub mod norm_fit;
@@ -43,6 +47,8 @@ pub struct Options {
     pub multipliers: Vec<f64>,
     /// The accelerometer's rung of [`ladder::ACCELEROMETER`] where the recording has a rig; `None` for the field form.
     pub rig_acc: Option<&'static str>,
+    /// The gyroscope's model of [`gyr_rig::MODELS`] where the recording has attitudes; `None` for the field form.
+    pub rig_gyr: Option<&'static str>,
     /// The magnetometer's rung of [`ladder::MAGNETOMETER`]; `None` for the field form.
     pub rig_mag: Option<&'static str>,
     /// Climb the ladders and say which rung to use.
@@ -56,6 +62,7 @@ impl Default for Options {
             skip: Vec::new(),
             multipliers: segmentation::MULTIPLIERS.to_vec(),
             rig_acc: Some("I14"),
+            rig_gyr: Some(gyr_rig::G12),
             rig_mag: Some("X21"),
             compare: false,
         }
@@ -154,10 +161,15 @@ fn inertial(
     progress: &(dyn Fn(&str) + Sync),
     calibration: &mut Calibration,
 ) {
+    let wanted = recording.gyr.as_ref().filter(|_| !options.skip.contains(&SensorKind::Gyr));
+    let gyr_on_rig = wanted.and_then(|gyr| {
+        progress("fitting the gyroscope");
+        let usable = usable(integrity, SensorKind::Gyr, recording.rows());
+        gyr_rig::gyroscope(recording, gyr, &usable, options, calibration)
+    });
     let Some(acc) = &recording.acc else {
-        if recording.gyr.is_some() && !options.skip.contains(&SensorKind::Gyr) {
-            calibration.sensors.push(gyr::without_accelerometer(Refusal::NoRest));
-        }
+        let without = || wanted.map(|_| gyr::without_accelerometer(Refusal::NoRest));
+        calibration.sensors.extend(gyr_on_rig.or_else(without));
         return;
     };
     let gravity = recording.manifest.site.gravity().unwrap_or_else(|| {
@@ -185,6 +197,7 @@ fn inertial(
     );
     let cuts = segmentation::cuts(&detector, &options.multipliers, gravity);
     let Some(chosen) = segmentation::choose(&cuts) else {
+        calibration.sensors.extend(gyr_on_rig);
         return;
     };
 
@@ -208,17 +221,17 @@ fn inertial(
             segmentation::comparable(&cuts).filter_map(|cut| Some(cut.fit?.0.gain.diagonal())).collect();
         fit.gain_spread = Some(outcome::gain_spread(gains.iter().copied()));
     }
-    let gyr_outcome =
-        recording.gyr.as_ref().filter(|_| !options.skip.contains(&SensorKind::Gyr)).map(|gyr| {
-            progress("fitting the gyroscope");
-            let usable = self::usable(integrity, SensorKind::Gyr, recording.rows());
-            let shared = GyrShared { recording, gyr, usable: &usable, interval };
-            match (&acc_outcome.verdict, acc_outcome.fit.as_ref()) {
-                (Ok(()), Some(fit)) => shared.outcome(chosen, &cuts, &fit.triad, &result.used, &mut trials),
-                (Err(refused), _) => gyr::without_accelerometer(refused.refusal),
-                (Ok(()), None) => gyr::without_accelerometer(Refusal::NoRest),
-            }
-        });
+    let gyr_outcome = gyr_on_rig.or_else(|| {
+        let gyr = wanted?;
+        progress("fitting the gyroscope");
+        let usable = self::usable(integrity, SensorKind::Gyr, recording.rows());
+        let shared = GyrShared { recording, gyr, usable: &usable, interval };
+        Some(match (&acc_outcome.verdict, acc_outcome.fit.as_ref()) {
+            (Ok(()), Some(fit)) => shared.outcome(chosen, &cuts, &fit.triad, &result.used, &mut trials),
+            (Err(refused), _) => gyr::without_accelerometer(refused.refusal),
+            (Ok(()), None) => gyr::without_accelerometer(Refusal::NoRest),
+        })
+    });
     if !options.skip.contains(&SensorKind::Acc) {
         calibration.sensors.push(acc_outcome);
     }

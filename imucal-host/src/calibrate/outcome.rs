@@ -33,7 +33,7 @@ pub struct Calibration {
 pub struct SensorOutcome {
     /// Which sensor.
     pub kind: SensorKind,
-    /// Model's name: T9, T6, K9, E9.
+    /// Model's name: T9, T6, K9, G12, E9.
     pub model: &'static str,
     /// Accepted, or refused with the reason.
     pub verdict: Result<(), Refused>,
@@ -147,6 +147,10 @@ pub struct RigFindings {
     pub field_n: Option<Vector3<f64>>,
     /// Parameters that the poses cannot tell, and what each is like.
     pub not_told: Vec<String>,
+    /// How a fit against attitudes was made, in words.
+    pub notes: Vec<String>,
+    /// The gyroscope's g-sensitivity, table axes in, raw rad/s per m/s², with standard errors, where it was estimated.
+    pub g_sensitivity: Option<(Matrix3<f64>, Matrix3<f64>)>,
 }
 
 /// How a bias moved from rest to rest.

@@ -226,6 +226,7 @@ fn findings(fit: &RigFit) -> RigFindings {
                 None => unified_name(*entry),
             })
             .collect(),
+        ..RigFindings::default()
     }
 }
 

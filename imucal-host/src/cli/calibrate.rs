@@ -7,7 +7,7 @@ use imucal_core::record::Date;
 
 use super::{Ending, output, progress::Progress, read, warn};
 use crate::{
-    calibrate::{AccModel, Calibration, Options, calibrate, gyr, ladder, mag},
+    calibrate::{AccModel, Calibration, Options, calibrate, gyr, gyr_rig, ladder, mag},
     observe::pose,
     recording::{Recording, SensorKind},
     report,
@@ -19,7 +19,7 @@ pub(super) struct Arguments {
     /// The recording: NAME.csv, NAME.csv.gz (or NAME.parquet), with NAME.toml beside it
     recording: PathBuf,
     /// Models, e.g. acc=T9,gyr=K9,mag=E9; acc=T6 fits six parameters from six faces; on a rig acc=I14 (T12, I17, I20,
-    /// I23) and mag=X18 (M12, M15, X21). A sensor named here must be accepted for the program to end with 0
+    /// I23), gyr=G12 (G21) and mag=X18 (M12, M15, X21). A sensor named here must be accepted for the program to end with 0
     #[arg(long, value_delimiter = ',', value_parser = model)]
     model: Vec<(SensorKind, ModelChoice)>,
     /// Write the calibration for people
@@ -60,16 +60,20 @@ fn model(text: &str) -> Result<(SensorKind, ModelChoice), String> {
         Some(("acc", "T6")) => Some((SensorKind::Acc, ModelChoice::Acc(AccModel::T6))),
         Some(("acc", name)) => rung(&ladder::ACCELEROMETER, name).map(|choice| (SensorKind::Acc, choice)),
         Some(("gyr", name)) if name == gyr::MODEL => Some((SensorKind::Gyr, ModelChoice::Field)),
+        Some(("gyr", name)) => rung(&gyr_rig::MODELS, name).map(|choice| (SensorKind::Gyr, choice)),
         Some(("mag", name)) if name == mag::MODEL => Some((SensorKind::Mag, ModelChoice::Field)),
         Some(("mag", name)) => rung(&ladder::MAGNETOMETER, name).map(|choice| (SensorKind::Mag, choice)),
         _ => None,
     };
     found.ok_or_else(|| {
-        let names = |ladder: &[(&str, &str)]| ladder.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+        let names =
+            |ladder: &[(&str, &str)]| ladder.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
         format!(
-            "`{text}` is no model; expected acc=T9 or acc=T6, on a rig acc= {}; gyr={}; mag={}, on a rig mag= {}",
+            "`{text}` is no model; expected acc=T9 or acc=T6, on a rig acc= {}; gyr={}, on a rig gyr= {}; \
+             mag={}, on a rig mag= {}",
             names(&ladder::ACCELEROMETER),
             gyr::MODEL,
+            names(&gyr_rig::MODELS),
             mag::MODEL,
             names(&ladder::MAGNETOMETER)
         )
@@ -110,6 +114,8 @@ fn options(arguments: &Arguments) -> Options {
         match *choice {
             (SensorKind::Acc, ModelChoice::Acc(field)) => (options.acc, options.rig_acc) = (field, None),
             (SensorKind::Acc, ModelChoice::Rig(name)) => options.rig_acc = Some(name),
+            (SensorKind::Gyr, ModelChoice::Rig(name)) => options.rig_gyr = Some(name),
+            (SensorKind::Gyr, ModelChoice::Field) => options.rig_gyr = None,
             (SensorKind::Mag, ModelChoice::Rig(name)) => options.rig_mag = Some(name),
             (SensorKind::Mag, ModelChoice::Field) => options.rig_mag = None,
             _ => {}
@@ -126,6 +132,9 @@ fn check_rig(recording: &Recording, models: &[(SensorKind, ModelChoice)]) -> any
     for (kind, choice) in models {
         let ModelChoice::Rig(name) = choice else { continue };
         let file = &recording.name;
+        if *kind == SensorKind::Gyr && recording.gimbal.is_none() && recording.reference.is_some() {
+            continue;
+        }
         if let Err(why) = pose::axes_and_encoders(recording) {
             anyhow::bail!(
                 "{file}: --model {kind}={name} needs a rig: {why}; leave it out for the field form"

@@ -132,7 +132,7 @@ pub fn poses(recording: &Recording, sensor: &Triple, usable: &[bool]) -> Result<
 }
 
 /// Mean encoder angles of a stretch, through the wrap at ±π; `None` where none is measured.
-fn mean_angles(rows: &[[f64; 3]]) -> Option<Vector3<f64>> {
+pub fn mean_angles(rows: &[[f64; 3]]) -> Option<Vector3<f64>> {
     let first = rows.first()?;
     let sum: Vector3<f64> = rows.iter().map(|row| turned(row, first)).sum();
     let mean = Vector3::from(*first) + sum / rows.len() as f64;

@@ -74,6 +74,11 @@ pub enum TurnGap {
         /// Row after the jump.
         row: usize,
     },
+    /// No encoder or reference tells the attitude in it.
+    NoAttitude {
+        /// First row without one.
+        row: usize,
+    },
 }
 
 impl std::fmt::Display for TurnGap {
@@ -81,6 +86,7 @@ impl std::fmt::Display for TurnGap {
         match self {
             Self::Unusable { row } => write!(f, "samples missing, clipped or stuck from row {row}"),
             Self::Jump { row } => write!(f, "time jumps at row {row}"),
+            Self::NoAttitude { row } => write!(f, "no attitude is known from row {row}"),
         }
     }
 }

@@ -132,7 +132,14 @@ fn rig(kind: SensorKind, found: Option<&RigFindings>) -> Value {
                 "not_told": not_told,
             })
         }
-        SensorKind::Gyr => Value::Null,
+        SensorKind::Gyr => found.map_or(Value::Null, |rig| {
+            let sensitivity = rig.g_sensitivity.as_ref();
+            json!({
+                "notes": rig.notes,
+                "g_sensitivity": sensitivity.map(|(value, _)| rows(value)),
+                "g_sensitivity_std": sensitivity.map(|(_, std)| rows(std)),
+            })
+        }),
         SensorKind::Mag => {
             let sources = found.and_then(|rig| rig.sources);
             json!({

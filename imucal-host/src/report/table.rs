@@ -7,7 +7,7 @@ use crate::{
     calibrate::{
         Calibration, FitSummary, SegmentationReport, SensorOutcome, compare::Comparison, outcome::RigFindings,
     },
-    recording::SensorKind,
+    recording::{SensorKind, unit::STANDARD_GRAVITY},
 };
 
 /// Sensor's name in words.
@@ -199,6 +199,18 @@ fn write_rig(text: &mut String, rig: &RigFindings) -> fmt::Result {
     for (name, (source, std)) in ["outer", "middle"].into_iter().zip(rig.sources.iter().flatten()) {
         let parts: Vec<String> = (0..3).map(|k| measure(source[k], std[k])).collect();
         writeln!(text, "  of the rig: hard iron on the {name} gimbal {} uT", parts.join(", "))?;
+    }
+    if let Some((value, std)) = &rig.g_sensitivity {
+        writeln!(text, "  g-sensitivity, °/s per g, not stored in the record:")?;
+        let per_g = STANDARD_GRAVITY.to_degrees();
+        for row in 0..3 {
+            let parts: Vec<String> =
+                (0..3).map(|k| measure(value[(row, k)] * per_g, std[(row, k)] * per_g)).collect();
+            writeln!(text, "     {}", parts.join(", "))?;
+        }
+    }
+    for note in &rig.notes {
+        writeln!(text, "  {note}")?;
     }
     if !rig.not_told.is_empty() {
         writeln!(text, "  not told by these poses, held: {}", rig.not_told.join(", "))?;

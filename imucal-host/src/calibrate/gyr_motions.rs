@@ -1,0 +1,219 @@
+//! The motions that a gyroscope is calibrated from: between rests of a rig, or along an optical reference.
+
+use std::ops::Range;
+
+use imucal_core::{model::parameterisation::FULL, observation::Moments};
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+use super::{
+    gyr_path::{Still, Wander},
+    gyr_rig_fit,
+    outcome::BiasWander,
+};
+use crate::{
+    observe::{
+        motion::{self, Attitudes, MotionData, MotionInput},
+        pose,
+    },
+    recording::{Recording, Triple, unit::STANDARD_GRAVITY},
+    simulator::truth::EARTH_RATE,
+};
+
+/// How far the clocks of sensor and optical reference are looked for apart, s, and the first step of that search.
+const LAG: f64 = 0.048;
+const LAG_STEP: f64 = 0.008;
+/// Halvings of the step: the last is an eighth of a millisecond.
+const LAG_HALVINGS: usize = 6;
+/// How far into a still stretch a motion reaches, s; to its middle where that is nearer.
+const MARGIN: f64 = 1.0;
+/// Fewer motions do not tell a lag beside the gain.
+const LEAST_FOR_LAG: usize = 16;
+/// Length of a motion between optical references, s.
+pub const OPTICAL: f64 = 1.5;
+/// What a gyroscope is calibrated from.
+#[derive(Clone, Debug)]
+pub struct Observations {
+    /// The motions.
+    pub data: Vec<MotionData>,
+    /// Static bias, where there is a rest to tell it, rad/s.
+    pub bias: Vector3<f64>,
+    /// How the bias moved from one still stretch to another, where there are any.
+    pub wander: Option<BiasWander>,
+    /// Motions left out, in words.
+    pub left_out: Vec<String>,
+    /// How the motions were made, in words.
+    pub notes: Vec<String>,
+}
+
+/// Motions between the still stretches of the encoders.
+pub fn on_encoders(
+    recording: &Recording,
+    sensor: &Triple,
+    usable: &[bool],
+    gimbal: &[[f64; 3]],
+    attitudes: &Attitudes,
+    axes: &imucal_core::model::rig::RigAxes,
+) -> Observations {
+    let input = input(recording, sensor, usable, attitudes);
+    let stretches: Vec<(Range<usize>, Matrix3<f64>)> = pose::still_stretches(&recording.time, gimbal)
+        .into_iter()
+        .filter_map(|rows| {
+            let attitude = motion::of_angles(&pose::mean_angles(&gimbal[rows.clone()])?, axes)?;
+            Some((rows, attitude))
+        })
+        .collect();
+    let stills: Vec<Still> =
+        stretches.iter().filter_map(|(rows, attitude)| still(&input, rows, attitude)).collect();
+    let (path, bias, wander) = Wander::of(&stills);
+    let mut found = Observations {
+        data: Vec::new(),
+        bias,
+        wander: Some(wander),
+        left_out: Vec::new(),
+        notes: vec!["against the encoders' attitude, from one still stretch of the table to the next".into()],
+    };
+    for (k, pair) in stretches.windows(2).enumerate() {
+        let [(before, start), (after, end)] = pair else { continue };
+        let rows = leave(input.time, before)..arrive(input.time, after);
+        match input.compress(rows, [start, end], &|time| path.at(time)) {
+            Ok(data) => found.data.push(data),
+            Err(gap) => {
+                found.left_out.push(format!("motion from still stretch {} to {}: {gap}", k + 1, k + 2));
+            }
+        }
+    }
+    found
+}
+
+/// Row at which a motion leaves a still stretch.
+fn leave(time: &[f64], still: &Range<usize>) -> usize {
+    let (first, last) = (time[still.start], time[still.end - 1]);
+    let from = last - MARGIN.min(0.5 * (last - first));
+    still.start + time[still.clone()].partition_point(|t| *t < from)
+}
+
+/// One beyond the row at which a motion arrives in a still stretch.
+fn arrive(time: &[f64], still: &Range<usize>) -> usize {
+    let (first, last) = (time[still.start], time[still.end - 1]);
+    let to = first + MARGIN.min(0.5 * (last - first));
+    still.start + time[still.clone()].partition_point(|t| *t <= to)
+}
+
+/// The mean rate of a still stretch less Earth's rotation; `None` where hardly a sample is usable.
+fn still(input: &MotionInput<'_>, rows: &Range<usize>, attitude: &Matrix3<f64>) -> Option<Still> {
+    let mut moments = Moments::default();
+    rows.clone().filter(|k| input.usable[*k]).for_each(|k| moments.push(&input.rates[k]));
+    let count = f64::from(moments.count());
+    (moments.count() > 10).then(|| Still {
+        time: 0.5 * (input.time[rows.start] + input.time[rows.end - 1]),
+        mean: moments.mean() - attitude.tr_mul(&input.earth_p),
+        // Rounding to counts may leave no spread at all.
+        variance: (moments.variance() / count).map(|v| v.max(1e-14)),
+    })
+}
+
+/// Motions of equal length between optical references; each starts at the reference after the one that ended the
+/// motion before, so that no two share one.
+pub fn on_reference(
+    recording: &Recording,
+    sensor: &Triple,
+    usable: &[bool],
+    attitudes: &Attitudes,
+) -> Observations {
+    let input = input(recording, sensor, usable, attitudes);
+    let valid = attitudes.iter().flatten().count();
+    let mut found = Observations {
+        data: Vec::new(),
+        bias: Vector3::zeros(),
+        wander: None,
+        left_out: Vec::new(),
+        notes: vec![format!(
+            "against the reference attitude, {OPTICAL} s a motion; {valid} of {} rows have one",
+            attitudes.len()
+        )],
+    };
+    let next = |from: usize| (from..attitudes.len()).find_map(|k| Some((k, attitudes[k].as_ref()?)));
+    let mut from = 0;
+    let mut broken = 0;
+    while let Some((first, start)) = next(from) {
+        let reach = input.time.partition_point(|t| *t < input.time[first] + OPTICAL);
+        let Some((last, end)) = next(reach) else { break };
+        if input.time[last] - input.time[first] > 2.0 * OPTICAL {
+            broken += 1;
+        } else {
+            match input.compress(first..last + 1, [start, end], &|_| Vector3::zeros()) {
+                Ok(data) => found.data.push(data),
+                Err(_) => broken += 1,
+            }
+        }
+        from = last + 1;
+    }
+    if broken > 0 {
+        found.left_out.push(format!("{broken} motions in which the reference or the rates are missing"));
+    }
+    found
+}
+
+/// Motions along an optical reference whose clock is as far from the sensor's as fits best.
+///
+/// On the way, a lag of 4 ms at changes of rate of 1 rad/s is an error of 0.2°, more than an optical system's own. (At
+/// the rests of a rig it is none.)
+pub fn lagging(
+    recording: &Recording,
+    sensor: &Triple,
+    usable: &[bool],
+    attitudes: &Attitudes,
+) -> Observations {
+    let at =
+        |lag: f64| on_reference(recording, sensor, usable, &motion::later(&recording.time, attitudes, lag));
+    let plain = on_reference(recording, sensor, usable, attitudes);
+    if plain.data.len() < LEAST_FOR_LAG {
+        return plain;
+    }
+    let rms = |lag: f64| gyr_rig_fit::fit(&at(lag).data, FULL, plain.bias).rms;
+    let least = |lags: Vec<f64>| {
+        let all: Vec<(f64, f64)> = lags.into_par_iter().map(|lag| (rms(lag), lag)).collect();
+        all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    let steps = (LAG / LAG_STEP).round() as i32;
+    let Some(mut best) = least((-steps..=steps).map(|k| f64::from(k) * LAG_STEP).collect()) else {
+        return plain;
+    };
+    if best.1.abs() > LAG - 0.5 * LAG_STEP {
+        let note = format!("no lag within {LAG} s of the reference fits best; none is taken out");
+        return Observations { notes: [plain.notes, vec![note]].concat(), ..plain };
+    }
+    let mut step = LAG_STEP;
+    for _ in 0..LAG_HALVINGS {
+        step *= 0.5;
+        let beside = least(vec![best.1 - step, best.1 + step]).filter(|other| other.0 < best.0);
+        best = beside.unwrap_or(best);
+    }
+    let mut found = at(best.1);
+    let words = if best.1 < 0.0 { "ahead of" } else { "behind" };
+    found.notes.push(format!("the sensor is {:.1} ms {words} the reference; taken out", 1e3 * best.1.abs()));
+    found
+}
+
+fn input<'a>(
+    recording: &'a Recording,
+    sensor: &'a Triple,
+    usable: &'a [bool],
+    attitudes: &'a Attitudes,
+) -> MotionInput<'a> {
+    let site = &recording.manifest.site;
+    let earth_p = site.latitude_deg.map_or_else(Vector3::zeros, |degrees| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        Vector3::new(cos, 0.0, -sin) * EARTH_RATE
+    });
+    MotionInput {
+        time: &recording.time,
+        rates: &sensor.values,
+        usable,
+        interval: recording.median_interval().unwrap_or(1.0),
+        attitudes,
+        earth_p,
+        force_p: Vector3::new(0.0, 0.0, -site.gravity().unwrap_or(STANDARD_GRAVITY)),
+    }
+}

@@ -1,0 +1,218 @@
+//! The gyroscope against known attitudes: a rig's encoders at rests, or an optical reference on the way.
+//!
+//! | attitudes | a motion goes | and starts |
+//! | --- | --- | --- |
+//! | encoders | from inside one still stretch to inside the next | from the encoders' mean |
+//! | optical reference | over [`OPTICAL`](super::gyr_motions::OPTICAL) s | from the reference |
+//!
+//! No motion starts from where another ended, so drift does not accumulate. The gain is full, in the table's axes: any
+//! constant rotation between the sensor and the table, or the optical body, is part of it. Source: models.md 3, a
+//! reconstruction; the model is [`imucal_core::model::attitude`].
+
+use imucal_core::{
+    accept::{self, Limits, Refusal},
+    coverage::Coverage,
+    model::parameterisation::{FULL, FULL_WITH_SENSITIVITY},
+};
+use nalgebra::{Matrix3, Vector3};
+
+use super::{
+    Options, compare,
+    gyr_motions::{Observations, lagging, on_encoders},
+    gyr_rig_fit::{self, LARGEST_RMS, MotionFit, REACH, Search},
+    outcome::{Calibration, FitSummary, Refused, RigFindings, SensorOutcome},
+};
+use crate::{
+    observe::{motion, pose},
+    recording::{Recording, SensorKind, Triple, Unit},
+};
+
+/// Gain and bias.
+pub const G12: &str = "G12";
+/// And g-sensitivity.
+pub const G21: &str = "G21";
+/// Models of a gyroscope against known attitudes, with what each adds.
+pub const MODELS: [(&str, &str); 2] = [(G12, "gain and bias"), (G21, "g-sensitivity")];
+
+/// Motions at least, per nine parameters of the gain.
+const LEAST_MOTIONS: usize = 8;
+/// A motion tells something of the gain once it turns by this much, rad (5°).
+const LEAST_ANGLE: f64 = 0.087;
+
+/// Calibrates against attitudes; `None` where the recording has none, or the field form is asked for.
+pub fn gyroscope(
+    recording: &Recording,
+    sensor: &Triple,
+    usable: &[bool],
+    options: &Options,
+    calibration: &mut Calibration,
+) -> Option<SensorOutcome> {
+    let name = options.rig_gyr?;
+    let observations = if recording.gimbal.is_some() {
+        match pose::axes_and_encoders(recording) {
+            Ok((axes, gimbal)) => {
+                on_encoders(recording, sensor, usable, gimbal, &motion::of_encoders(gimbal, &axes), &axes)
+            }
+            Err(why) => {
+                let warning = format!("the rig is not used: {why}");
+                if !calibration.warnings.contains(&warning) {
+                    calibration.warnings.push(warning);
+                }
+                return None;
+            }
+        }
+    } else {
+        lagging(recording, sensor, usable, &motion::of_reference(recording.reference.as_deref()?))
+    };
+    if recording.manifest.site.latitude_deg.is_none() {
+        calibration.warnings.push(
+            "gyr: no [site] latitude_deg: Earth's rotation is left in the bias, where it does not belong"
+                .into(),
+        );
+    }
+    if let Err(refusal) = check(&observations, name) {
+        return Some(refused(name, refusal, None));
+    }
+    if options.compare {
+        calibration.comparisons.extend(comparison(&observations));
+    }
+    Some(outcome(name, sensor, &observations))
+}
+
+/// Motions that turn, and enough of them.
+fn check(observations: &Observations, name: &str) -> Result<(), Refusal> {
+    let need = if name == G21 { 2 * LEAST_MOTIONS } else { LEAST_MOTIONS };
+    let telling = observations.data.iter().filter(|d| d.turned().norm() > LEAST_ANGLE).count();
+    match telling {
+        0 if observations.data.len() >= need => Err(Refusal::NoMotion),
+        have if have < need => Err(Refusal::TooFewObservations { have, need }),
+        _ => Ok(()),
+    }
+}
+
+fn fit(name: &str, observations: &Observations) -> MotionFit {
+    let (data, bias) = (&observations.data, observations.bias);
+    if name == G21 {
+        gyr_rig_fit::fit(data, FULL_WITH_SENSITIVITY, bias)
+    } else {
+        gyr_rig_fit::fit(data, FULL, bias)
+    }
+}
+
+/// Nominal, bias only, G12 and, where there are motions enough, G21; all over the motions that G12 keeps.
+fn comparison(observations: &Observations) -> Option<compare::Comparison> {
+    let full = fit(G12, observations);
+    let mut steps = Vec::from(gyr_rig_fit::lower_steps(&observations.data, &full.kept, observations.bias));
+    steps.push(full.step(G12, "gain"));
+    if check(observations, G21).is_ok() {
+        let kept = full.kept.iter().map(|k| observations.data[*k].clone()).collect();
+        let same = Observations { data: kept, ..observations.clone() };
+        let with = fit(G21, &same);
+        if with.gross.is_empty() {
+            steps.push(with.step(G21, "g-sensitivity"));
+        }
+    }
+    compare::climb(SensorKind::Gyr, steps)
+}
+
+fn outcome(name: &'static str, sensor: &Triple, observations: &Observations) -> SensorOutcome {
+    let fit = fit(name, observations);
+    let summary = summarise(&fit, sensor, observations);
+    match judge(&fit, &summary) {
+        Ok(()) => SensorOutcome {
+            kind: SensorKind::Gyr,
+            model: name,
+            verdict: Ok(()),
+            fit: Some(summary),
+            evidence: None,
+        },
+        Err(refusal) => refused(name, refusal, Some(summary)),
+    }
+}
+
+fn judge(fit: &MotionFit, summary: &FitSummary) -> Result<(), Refusal> {
+    let limits = Limits { rms: LARGEST_RMS, ..Limits::for_norm(fit.entries.len(), LEAST_MOTIONS) };
+    accept::check_report(&fit.report, &limits)?;
+    accept::check_nonlinearity(fit.nonlinearity, &limits)?;
+    accept::check_plausibility(&summary.triad, true, fit.rms, &limits)
+}
+
+fn refused(model: &'static str, refusal: Refusal, fit: Option<FitSummary>) -> SensorOutcome {
+    let advice = match refusal {
+        Refusal::NoMotion | Refusal::TooFewObservations { .. } => {
+            "record more: on a rig, slews by 30° or more about all three axes with rests of 2 s between them; with an \
+             optical reference, half a minute of turning about all axes in view of the cameras; or --model gyr=K9 for \
+             the field form"
+        }
+        Refusal::IllConditioned { .. } | Refusal::TooNonlinear { .. } => {
+            "turn the table about all three of its axes, by large angles and in both senses; with G21, in many \
+             attitudes"
+        }
+        Refusal::Implausible { .. } => {
+            "check the gyroscope's unit, axes and signs, [rig] axes, and the encoders' or the reference's unit and \
+             direction (table to n)"
+        }
+        _ => "check the recording for clipping and wrong units",
+    };
+    let verdict = Err(Refused { refusal, advice: advice.into() });
+    SensorOutcome { kind: SensorKind::Gyr, model, verdict, fit, evidence: None }
+}
+
+fn summarise(fit: &MotionFit, sensor: &Triple, observations: &Observations) -> FitSummary {
+    let std = |k: usize| fit.covariance[(k, k)].sqrt();
+    let used = || fit.kept.iter().map(|k| &observations.data[*k]);
+    let axes = used().filter_map(|d| d.turned().try_normalize(1e-6)).flat_map(|a| [a, -a]);
+    let axes: Vec<Vector3<f64>> = axes.collect();
+    let mut left_out = observations.left_out.clone();
+    left_out.extend(fit.gross.iter().map(|(k, size)| {
+        let from = observations.data[*k].rows.start;
+        format!("motion from row {from}: {size:.1} robust standard deviations")
+    }));
+    let mut notes = observations.notes.clone();
+    notes.push(match fit.search {
+        Search::Direct => "found by Levenberg–Marquardt from the static bias".into(),
+        Search::Swarm => format!(
+            "found by a particle swarm (gain within ±{}, bias within ±{:.0} °/s), polished by Levenberg–Marquardt",
+            REACH.0,
+            REACH.1.to_degrees()
+        ),
+    });
+    let sensitivity = (fit.entries.len() == 21).then(|| {
+        let at = |of: &dyn Fn(usize) -> f64| Matrix3::from_fn(|i, j| of(12 + 3 * i + j));
+        (at(&|k| fit.parameters[k]), at(&std))
+    });
+    // A bias that wanders is not told better than its own mean is.
+    let wandering = observations.wander.filter(|w| w.interpolated).map_or_else(Vector3::zeros, |w| {
+        let count = (observations.data.len() + 1) as f64;
+        w.spread.zip_map(&w.expected, |s, e| (s * s - e * e).max(0.0) / count)
+    });
+    FitSummary {
+        triad: fit.triad,
+        gain_std: Matrix3::from_fn(|i, j| std(3 * i + j)),
+        bias_std: Vector3::from_fn(|i, _| std(9 + i).hypot(wandering[i].sqrt())),
+        covariance: fit.covariance.view((0, 0), (12, 12)).into_owned(),
+        covariance_of: fit.entries[..12].to_vec(),
+        unit_in: sensor.unit,
+        unit_out: Unit::RadianPerSecond,
+        nominal: sensor.nominal,
+        rms: fit.rms,
+        held_out_rms: fit.held_out_rms,
+        observations: fit.kept.len(),
+        parameters: fit.entries.len(),
+        condition: fit.report.condition,
+        coverage: Coverage::of(axes.iter().copied()).share,
+        nonlinearity: fit.nonlinearity,
+        inflation: 1.0,
+        iterations: fit.report.iterations,
+        termination: fit.report.termination,
+        field_norm: None,
+        left_out,
+        gain_spread: None,
+        bias_wander: observations.wander,
+        rig: Some(RigFindings { notes, g_sensitivity: sensitivity, ..RigFindings::default() }),
+        alignment: None,
+    }
+}
+
+#[cfg(test)]
+mod tests;

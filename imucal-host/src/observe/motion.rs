@@ -1,0 +1,229 @@
+//! Motions: the gyroscope's samples between attitudes that something else knows, compressed to blocks.
+//!
+//! The attitudes are those of the table, from a rig's encoders or from an optical reference. A motion on a rig goes
+//! from inside one still stretch to inside the next: standing still, an encoder's clock does not matter.
+
+use std::ops::Range;
+
+use imucal_core::{
+    model::rig::{GimbalPose, RigAxes},
+    observation::{Block, BlockBuilder, Compared, Durations, Motion},
+    rotation::{exp, log, matrix, quaternion, quaternion_log},
+};
+use nalgebra::{Matrix3, Quaternion, Vector3};
+
+use super::turn::TurnGap;
+
+/// A block lasts about this long, s: five samples at 100 Hz.
+const BLOCK: f64 = 0.05;
+/// A motion across a gap longer than this many usual intervals is not known.
+const GAP: f64 = 5.0;
+/// A quaternion whose length is further from one is none.
+const UNIT: f64 = 0.1;
+
+/// What is known of the table at each row: `C_t_p`, or nothing.
+pub type Attitudes = Vec<Option<Matrix3<f64>>>;
+
+/// Attitudes that encoders show.
+pub fn of_encoders(gimbal: &[[f64; 3]], axes: &RigAxes) -> Attitudes {
+    gimbal.iter().map(|angles| of_angles(&Vector3::from(*angles), axes)).collect()
+}
+
+/// `C_t_p` at encoder angles, rad; `None` where one is missing.
+pub fn of_angles(angles: &Vector3<f64>, axes: &RigAxes) -> Option<Matrix3<f64>> {
+    let pose = GimbalPose::new(Vector3::zeros(), angles);
+    angles.iter().all(|angle| angle.is_finite()).then(|| pose.rotations(axes).c_p_t.transpose())
+}
+
+/// Attitudes of reference quaternions, w first; a row that holds no rotation is left out.
+pub fn of_reference(reference: &[[f64; 4]]) -> Attitudes {
+    reference
+        .iter()
+        .map(|[w, x, y, z]| {
+            let q = Quaternion::new(*w, *x, *y, *z);
+            ((q.norm() - 1.0).abs() < UNIT).then(|| matrix(&q))
+        })
+        .collect()
+}
+
+/// Attitudes as a sensor that lags by `lag`, s, shows them: at each row, that of `lag` before, on the way between two
+/// rows; `None` where either of them has none.
+pub fn later(time: &[f64], attitudes: &[Option<Matrix3<f64>>], lag: f64) -> Attitudes {
+    time.iter()
+        .map(|now| {
+            let then = now - lag;
+            let next = time.partition_point(|t| *t <= then);
+            let (before, after) = (next.checked_sub(1)?, attitudes.get(next)?.as_ref()?);
+            let from = attitudes.get(before)?.as_ref()?;
+            let share = (then - time[before]) / (time[next] - time[before]);
+            Some(from * exp(&(log(&from.tr_mul(after)) * share)))
+        })
+        .collect()
+}
+
+/// The gyroscope's samples and what is known beside them.
+#[derive(Clone, Copy, Debug)]
+pub struct MotionInput<'a> {
+    /// Time, s.
+    pub time: &'a [f64],
+    /// Rates, nominal SI, rad/s.
+    pub rates: &'a [Vector3<f64>],
+    /// Rows in which they are usable.
+    pub usable: &'a [bool],
+    /// Usual interval, s.
+    pub interval: f64,
+    /// The table's attitude at each row.
+    pub attitudes: &'a [Option<Matrix3<f64>>],
+    /// Earth's rotation in p, rad/s; zero where the latitude is not known.
+    pub earth_p: Vector3<f64>,
+    /// Specific force of something at rest in p, m/s².
+    pub force_p: Vector3<f64>,
+}
+
+/// One motion, owned, with the attitude before it and the one after.
+#[derive(Clone, Debug)]
+pub struct MotionData {
+    /// Rows whose rates were integrated.
+    pub rows: Range<usize>,
+    /// How long it lasts, s.
+    pub duration: f64,
+    blocks: Vec<Block<f64>>,
+    durations: Vec<f64>,
+    earth: Vec<Vector3<f64>>,
+    force: Vec<Vector3<f64>>,
+    start: Quaternion<f64>,
+    end: [Quaternion<f64>; 1],
+    after: [u32; 1],
+}
+
+impl MotionData {
+    /// The motion as the model takes it.
+    pub fn motion(&self) -> Motion<'_, f64> {
+        Motion {
+            blocks: &self.blocks,
+            durations: Durations::Each(&self.durations),
+            earth: &self.earth,
+            force: &self.force,
+            start: self.start,
+            references: &self.end,
+            compared: Compared::After(&self.after),
+        }
+    }
+
+    /// Rotation vector from the attitude before to the one after, table axes, rad, the shorter way round.
+    pub fn turned(&self) -> Vector3<f64> {
+        quaternion_log(&(self.start.conjugate() * self.end[0]))
+    }
+}
+
+impl MotionInput<'_> {
+    /// The motion over some rows (two at the least) from one attitude to another. Rates are taken less
+    /// `wander(time)`, and each is held from half-way to the sample before it to half-way to the one after.
+    ///
+    /// # Errors
+    /// [`TurnGap`], with the row, where rates or attitudes are missing or time jumps.
+    pub fn compress(
+        &self,
+        rows: Range<usize>,
+        ends: [&Matrix3<f64>; 2],
+        wander: &dyn Fn(f64) -> Vector3<f64>,
+    ) -> Result<MotionData, TurnGap> {
+        if let Some(row) = rows.clone().find(|k| !self.usable[*k]) {
+            return Err(TurnGap::Unusable { row });
+        }
+        let gap = GAP * self.interval;
+        if let Some(row) = rows.clone().skip(1).find(|k| self.time[*k] - self.time[k - 1] > gap) {
+            return Err(TurnGap::Jump { row });
+        }
+        let [start, end] = ends.map(quaternion);
+        let size = (BLOCK / self.interval).round().clamp(1.0, 20.0) as u16;
+        let mut data = MotionData {
+            duration: self.time[rows.end - 1] - self.time[rows.start],
+            rows: rows.clone(),
+            blocks: Vec::new(),
+            durations: Vec::new(),
+            earth: Vec::new(),
+            force: Vec::new(),
+            start,
+            end: [end],
+            after: [0],
+        };
+        let mut builder = BlockBuilder::default();
+        let mut first = rows.start;
+        for k in rows.clone() {
+            let from = if k == rows.start { self.time[k] } else { self.time[k - 1] };
+            let to = if k + 1 == rows.end { self.time[k] } else { self.time[k + 1] };
+            builder.push(&(self.rates[k] - wander(self.time[k])), 0.5 * (to - from));
+            if builder.count() < size && k + 1 < rows.end {
+                continue;
+            }
+            let c_t_p = self.attitude_near(first..k + 1).ok_or(TurnGap::NoAttitude { row: first })?;
+            let (block, duration) = builder.finish();
+            data.blocks.push(block);
+            data.durations.push(duration);
+            data.earth.push(c_t_p.tr_mul(&self.earth_p));
+            data.force.push(c_t_p.tr_mul(&self.force_p));
+            first = k + 1;
+        }
+        data.after = [u32::try_from(data.blocks.len()).unwrap_or(u32::MAX)];
+        Ok(data)
+    }
+
+    /// A block's attitude: of its middle row, or of the first other row that has one within a block to either side.
+    fn attitude_near(&self, rows: Range<usize>) -> Option<Matrix3<f64>> {
+        let (middle, reach) = ((rows.start + rows.end - 1) / 2, rows.len());
+        let near = rows.start.saturating_sub(reach)..(rows.end + reach).min(self.attitudes.len());
+        self.attitudes[middle].or_else(|| self.attitudes[near].iter().flatten().next().copied())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use imucal_core::{
+        model::{attitude::AttitudeModel, parameterisation::FULL},
+        triad::Triad,
+    };
+
+    #[test]
+    fn a_perfect_gyroscope_arrives_where_the_encoders_do_with_earth_s_rotation_taken_out() {
+        let time: Vec<f64> = (0..301).map(|k| f64::from(k) * 0.01).collect();
+        let earth_p = Vector3::new(5e-3, 0.0, -5e-3);
+        let attitudes: Attitudes = time.iter().map(|t| Some(exp(&(Vector3::z() * 0.5 * *t)))).collect();
+        let rates: Vec<_> =
+            attitudes.iter().flatten().map(|c| Vector3::z() * 0.5 + c.tr_mul(&earth_p)).collect();
+        let input = MotionInput {
+            time: &time,
+            rates: &rates,
+            usable: &vec![true; 301],
+            interval: 0.01,
+            attitudes: &attitudes,
+            earth_p,
+            force_p: Vector3::zeros(),
+        };
+        let ends = [&attitudes[0].unwrap(), &attitudes[300].unwrap()];
+        let data = input.compress(0..301, ends, &|_| Vector3::zeros()).unwrap();
+        let motions = [data.motion()];
+        let model = AttitudeModel { motions: &motions, form: FULL };
+        let error = imucal_core::model::Cost::cost(&model, &FULL.theta(&Triad::identity())).sqrt();
+        assert!(error < 1e-5, "{error}");
+        assert!((data.turned() - Vector3::z() * 1.5).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_sensor_that_lags_shows_the_attitude_of_before() {
+        let time: Vec<f64> = (0..50).map(|k| f64::from(k) * 0.01).collect();
+        let at = |t: f64| exp(&(Vector3::new(1.0, -2.0, 0.5) * t));
+        let attitudes: Attitudes = time.iter().map(|t| Some(at(*t))).collect();
+        let late = later(&time, &attitudes, 0.004);
+        assert!(late[0].is_none());
+        assert!((late[20].unwrap() - at(0.196)).norm() < 1e-12);
+        assert!((later(&time, &attitudes, -0.004)[20].unwrap() - at(0.204)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_quaternion_that_is_no_rotation_gives_no_attitude() {
+        let rows = of_reference(&[[1.0, 0.0, 0.0, 0.0], [f64::NAN; 4], [0.0; 4], [2.0, 0.0, 0.0, 0.0]]);
+        assert_eq!(rows.iter().map(Option::is_some).collect::<Vec<_>>(), [true, false, false, false]);
+    }
+}
