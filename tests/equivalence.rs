@@ -64,7 +64,12 @@ fn on_device(stored: &StoredCalibration, kind: SensorKind) -> TriadRecord {
 }
 
 fn calibrated(recording: &Recording) -> Calibration {
-    calibrate(recording, &Options::default(), &|_| {})
+    calibrate(recording, &field_forms(), &|_| {})
+}
+
+/// The device has the field forms; a gyroscope against an optical reference is fitted on the host alone.
+fn field_forms() -> Options {
+    Options { rig_gyr: None, ..Options::default() }
 }
 
 /// Compares every sensor; gives how many, and how many fits.

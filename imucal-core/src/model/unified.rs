@@ -192,13 +192,13 @@ impl<const P: usize> Terms<P> {
         &self.entries
     }
 
-    /// Order in which parameter `k` is taken when the gauge is sought: what belongs to the sensor, then the base's
-    /// tilt and the field, and last the sources on gimbals. A source along the outer axis cannot be told from the
-    /// field; of the two it is the source that is held at none.
+    /// Order in which parameter `k` is taken when the gauge is sought: what belongs to the sensor, then what belongs
+    /// to the machine, and last the field. Of a source along the outer axis and the field's component there it is the
+    /// field that is held: a survey knows its dip better than anyone knows the iron.
     pub fn class(&self, k: usize) -> u8 {
         match self.entries.get(k) {
             Some(0..=11 | 23..=31) => 0,
-            Some(17..=22) => 2,
+            Some(14..=16) => 2,
             _ => 1,
         }
     }

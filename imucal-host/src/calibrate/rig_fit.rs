@@ -2,11 +2,7 @@
 
 use imucal_core::{
     model::unified::{Terms, UnifiedModel, UnifiedParameters},
-    solver::{
-        LevenbergMarquardt, SolveReport,
-        gauge::{Gauge, bit},
-        lm::Settings,
-    },
+    solver::{LevenbergMarquardt, SolveReport, gauge::Gauge, lm::Settings},
     triad::Triad,
 };
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
@@ -43,19 +39,12 @@ pub struct RigFit {
 
 /// Fits `terms` from `base`.
 pub fn fit<const P: usize>(poses: &Poses, base: &UnifiedParameters<f64>, terms: Terms<P>) -> RigFit {
-    let free = UnifiedModel {
-        poses: &poses.poses,
-        axes: poses.axes,
-        base: *base,
-        terms,
-        held: length_of(base, &terms),
-    };
+    let free = UnifiedModel { poses: &poses.poses, axes: poses.axes, base: *base, terms, held: 0 };
     let mut solver = LevenbergMarquardt::new(terms.theta(base), Settings::default());
     solver.run(&free);
-    let mut gauge = Gauge::of(solver.factor().r(), TOLERANCE, |k| terms.class(k));
-    gauge.held |= free.held;
+    let gauge = Gauge::of(solver.factor().r(), TOLERANCE, |k| terms.class(k));
     let model = UnifiedModel { held: gauge.held, ..free };
-    if gauge.held != free.held {
+    if gauge.held != 0 {
         let mut start = *solver.theta();
         let at = terms.theta(base);
         for k in (0..P).filter(|k| gauge.is_held(*k)) {
@@ -65,13 +54,6 @@ pub fn fit<const P: usize>(poses: &Poses, base: &UnifiedParameters<f64>, terms: 
         solver.run(&model);
     }
     summarise(&model, &solver, &gauge)
-}
-
-/// A field's length cannot be told from K's: its largest component is held from the start, since the length hangs on
-/// it most.
-fn length_of<const P: usize>(base: &UnifiedParameters<f64>, terms: &Terms<P>) -> u32 {
-    let largest = 14 + u8::try_from(base.vector_n.iamax()).unwrap_or(0);
-    terms.entries().iter().position(|entry| *entry == largest).map_or(0, bit)
 }
 
 fn summarise<const P: usize>(

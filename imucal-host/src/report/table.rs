@@ -20,8 +20,9 @@ pub fn words(kind: SensorKind) -> &'static str {
 }
 
 /// What an observation of the sensor is called, many of them.
-fn observations(kind: SensorKind) -> &'static str {
+fn observations(kind: SensorKind, fit: &FitSummary) -> &'static str {
     match kind {
+        SensorKind::Gyr if fit.rig.is_some() => "motions",
         SensorKind::Acc => "rests",
         SensorKind::Gyr => "turns",
         SensorKind::Mag => "points",
@@ -124,7 +125,7 @@ fn write_fit(text: &mut String, kind: SensorKind, fit: &FitSummary) -> fmt::Resu
         text,
         "  {} {}, {} parameters; rms {}, held out {held}",
         fit.observations,
-        observations(kind),
+        observations(kind, fit),
         fit.parameters,
         rms_text(kind, fit, fit.rms)
     )?;
@@ -141,6 +142,7 @@ fn write_fit(text: &mut String, kind: SensorKind, fit: &FitSummary) -> fmt::Resu
 
 fn rms_text(kind: SensorKind, fit: &FitSummary, rms: f64) -> String {
     match kind {
+        SensorKind::Gyr if fit.rig.is_some() => format!("{:.3}° a motion", rms.to_degrees()),
         SensorKind::Gyr => format!("{:.3}° a turn", rms.to_degrees()),
         _ => format!("{} {}", plain(rms), fit.unit_out),
     }

@@ -120,6 +120,23 @@ fn a_reference_attitude_tells_what_encoders_tell() {
 }
 
 #[test]
+fn a_reference_whose_clock_is_early_is_found_so_and_costs_nothing() {
+    let (mut recording, gain, _) = simulated(Programme::Gyroscope, 5);
+    let axes = pose::rig_axes(recording.manifest.rig.as_ref()).unwrap();
+    let attitudes = motion::of_encoders(recording.gimbal.as_deref().unwrap(), &axes);
+    let early = motion::later(&recording.time, &attitudes, -0.012);
+    recording.gimbal = None;
+    let sensor = recording.gyr.as_ref().unwrap();
+    let usable = vec![true; recording.rows()];
+    let found = lagging(&recording, sensor, &usable, &early);
+    let note = found.notes.last().unwrap();
+    let lag: f64 = note.split(' ').find_map(|word| word.parse().ok()).unwrap();
+    assert!(note.contains("behind") && (lag - 12.0).abs() < 1.5, "{note}");
+    let fit = gyr_rig_fit::fit(&found.data, FULL, found.bias);
+    assert!((fit.triad.gain - gain).amax() < 0.01, "{}", fit.triad.gain);
+}
+
+#[test]
 fn a_comparison_finds_that_the_gain_matters_and_climbs_no_further_without_cause() {
     let (recording, ..) = simulated(Programme::Full, 6);
     let calibration = calibrated(&recording, &Options { compare: true, ..Options::default() });
