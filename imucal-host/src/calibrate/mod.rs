@@ -16,6 +16,7 @@ use crate::{
 pub mod acc;
 pub mod alignment;
 pub mod compare;
+pub mod drift;
 pub mod gyr;
 pub mod ladder;
 pub mod mag;
