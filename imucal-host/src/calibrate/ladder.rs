@@ -80,18 +80,22 @@ pub const X21: Terms<21> = with(&[17, 18, 19, 20, 21, 22, 14, 15, 16]);
 /// One rung of either ladder; `vector_n` is gravity's or the field's, n, SI. `None` for a name that is on no ladder,
 /// or where the poses leave no residual to judge it by.
 pub fn rung(name: &str, poses: &Poses, vector_n: Vector3<f64>) -> Option<Rung> {
+    rung_from(name, poses, &UnifiedParameters::nominal(vector_n))
+}
+
+/// The same, with what is known beforehand: entries that are not estimated keep their value in `base`.
+pub fn rung_from(name: &str, poses: &Poses, base: &UnifiedParameters<f64>) -> Option<Rung> {
     let (name, adds) = ACCELEROMETER.into_iter().chain(MAGNETOMETER).find(|(known, _)| *known == name)?;
-    let base = UnifiedParameters::nominal(vector_n);
     let enough = |parameters: usize| 3 * poses.poses.len() > parameters + 3;
     let fit = match name {
-        "T12" | "M12" if enough(12) => fit(poses, &base, T12),
-        "I14" if enough(14) => fit(poses, &base, I14),
-        "I17" if enough(17) => fit(poses, &base, I17),
-        "I20" if enough(20) => fit(poses, &base, I20),
-        "I23" if enough(23) => fit(poses, &base, I23),
-        "M15" if enough(15) => fit(poses, &base, M15),
-        "X18" if enough(18) => fit(poses, &base, X18),
-        "X21" if enough(21) => fit(poses, &base, X21),
+        "T12" | "M12" if enough(12) => fit(poses, base, T12),
+        "I14" if enough(14) => fit(poses, base, I14),
+        "I17" if enough(17) => fit(poses, base, I17),
+        "I20" if enough(20) => fit(poses, base, I20),
+        "I23" if enough(23) => fit(poses, base, I23),
+        "M15" if enough(15) => fit(poses, base, M15),
+        "X18" if enough(18) => fit(poses, base, X18),
+        "X21" if enough(21) => fit(poses, base, X21),
         _ => return None,
     };
     Some(Rung { name, adds, fit })

@@ -3,6 +3,7 @@
 use imucal_core::{
     accept::{self, Limits, Refusal},
     coverage::Coverage,
+    model::unified::UnifiedParameters,
 };
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -22,6 +23,8 @@ const LEAST_POSES: usize = 6;
 
 /// A tilt with a larger standard error is not told, rad: a spirit level knows it to 0.2°.
 const LEVELLED: f64 = 3.5e-3;
+/// A tilt is one from so many standard errors on.
+const SIGNIFICANT_TILT: f64 = 4.0;
 
 /// The accelerometer on a rig; `None` where there is none, or the field form is asked for.
 pub fn accelerometer(
@@ -64,6 +67,14 @@ fn tells_tilt(fit: &RigFit) -> bool {
     })
 }
 
+/// The base's tilt as the accelerometer has it; `None` where it is none or hardly told: an error of its own would pass
+/// for one of the field.
+fn known_tilt(calibration: &Calibration) -> Option<[f64; 2]> {
+    let fit = calibration.sensor(SensorKind::Acc)?.accepted()?;
+    let (tilt, std) = fit.rig.as_ref()?.tilt?;
+    tilt.iter().zip(std).any(|(tilt, std)| tilt.abs() > SIGNIFICANT_TILT * std).then_some(tilt)
+}
+
 /// The magnetometer on a rig whose site has a known field; `None` otherwise, or where the field form is asked for.
 pub fn magnetometer(
     recording: &Recording,
@@ -75,15 +86,37 @@ pub fn magnetometer(
     let name = options.rig_mag?;
     let field = Vector3::from(recording.manifest.site.field_ned_ut?);
     let poses = poses(recording, sensor, usable, calibration)?;
+    // The base stands for both sensors: a tilt of 0.05° is 0.1 % of the horizontal field, and of K where that alone
+    // tells its scale.
+    let mut base = UnifiedParameters::nominal(field);
+    if let Some(tilt) = known_tilt(calibration) {
+        base.tilt = tilt;
+    }
     if options.compare {
-        let steps = ladder::MAGNETOMETER.iter().filter_map(|(name, _)| ladder::rung(name, &poses, field));
+        let steps =
+            ladder::MAGNETOMETER.iter().filter_map(|(name, _)| ladder::rung_from(name, &poses, &base));
         calibration
             .comparisons
             .extend(compare::climb(SensorKind::Mag, steps.map(|rung| rung.step()).collect()));
     }
-    let Some(rung) = ladder::rung(name, &poses, field) else {
+    let Some(rung) = ladder::rung_from(name, &poses, &base) else {
         return Some(too_few(SensorKind::Mag, name, &poses));
     };
+    let pointed = match name {
+        "X18" => Some("X21"),
+        "M12" => Some("M15"),
+        _ => None,
+    };
+    let pointed = pointed.and_then(|name| ladder::rung_from(name, &poses, &base));
+    if let Some(pointed) = pointed
+        && compare::p_value(&rung.step(), &pointed.step()).is_some_and(|p| p < compare::SIGNIFICANT)
+    {
+        let (name, better) = (rung.name, pointed.name);
+        calibration.warnings.push(format!(
+            "mag: {name} takes the field's direction as known, and the poses contradict it: the base's heading or \
+             [site] field is off; use mag={better}, or point the base"
+        ));
+    }
     Some(outcome(SensorKind::Mag, &rung, &poses, sensor, field.norm()))
 }
 

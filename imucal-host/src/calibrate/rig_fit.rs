@@ -5,9 +5,12 @@ use imucal_core::{
     solver::{LevenbergMarquardt, SolveReport, gauge::Gauge, lm::Settings},
     triad::Triad,
 };
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
 
-use super::rows::{Residuals, Rows};
+use super::{
+    drift,
+    rows::{Residuals, Rows},
+};
 use crate::observe::pose::Poses;
 
 /// A column that its predecessors leave less than this share of is told by them: far below what noise leaves of an
@@ -25,7 +28,7 @@ pub struct RigFit {
     pub held: Vec<(u8, Option<u8>)>,
     /// The solver's report.
     pub report: SolveReport<f64>,
-    /// Covariance of the estimated entries; zero where held.
+    /// Covariance of the estimated entries, for noise that may drift from pose to pose; zero where held.
     pub covariance: DMatrix<f64>,
     /// Rms residual of an axis, with the degrees of freedom left.
     pub rms: f64,
@@ -53,7 +56,58 @@ pub fn fit<const P: usize>(poses: &Poses, base: &UnifiedParameters<f64>, terms: 
         solver = LevenbergMarquardt::new(start, Settings::default());
         solver.run(&model);
     }
+    let found = terms.parameters(base, solver.theta());
+    let Some(field) = of_known_length(poses, base, &found, &terms, &gauge) else {
+        return summarise(&model, &solver, &gauge);
+    };
+    // Held anew where the field has its length: K and sources are then those of the field that is known.
+    let model = UnifiedModel { base: UnifiedParameters { vector_n: field, ..*base }, ..model };
+    let start = terms.theta(&UnifiedParameters { vector_n: field, ..found });
+    solver = LevenbergMarquardt::new(start, Settings::default());
+    solver.run(&model);
     summarise(&model, &solver, &gauge)
+}
+
+/// The field that is known, where what was found of it allows; `None` where nothing of it is held.
+///
+/// Its length is told by K alone, so that one entry is held; with a source on the outer gimbal, its component along
+/// the outer axis as well. The entries that are held are not these, and in a base that points elsewhere they are off,
+/// K and the sources with them: by 8e-4 for half a degree at a declination of 5°. So the field keeps its length, and
+/// where its direction is told but in part, that part by a heading of the base.
+fn of_known_length<const P: usize>(
+    poses: &Poses,
+    base: &UnifiedParameters<f64>,
+    found: &UnifiedParameters<f64>,
+    terms: &Terms<P>,
+    gauge: &Gauge<f64, P>,
+) -> Option<Vector3<f64>> {
+    let of_field = |k: &usize| gauge.is_held(*k) && (14..17).contains(&terms.entries()[*k]);
+    let (known, now) = (base.vector_n, found.vector_n);
+    let field = match (0..P).filter(of_field).count() {
+        1 => now * (known.norm() / now.norm()),
+        2 => {
+            let outer = Vector3::ith(poses.axes.0[0] as usize, 1.0);
+            headed(&known, &outer.cross(&now))?
+        }
+        _ => return None,
+    };
+    field.iter().all(|x| x.is_finite()).then_some(field)
+}
+
+/// `known` turned about the vertical until it is across `normal`, by Newton from no turn; `None` where no turn below
+/// some 30° does it.
+fn headed(known: &Vector3<f64>, normal: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let (mut heading, mut field) = (0.0f64, *known);
+    for _ in 0..20 {
+        let slope = normal.dot(&Vector3::new(-field.y, field.x, 0.0));
+        heading -= normal.dot(&field) / slope;
+        if heading.is_nan() || heading.abs() > 0.5 {
+            return None;
+        }
+        let (sin, cos) = heading.sin_cos();
+        field = Vector3::new(cos * known.x - sin * known.y, sin * known.x + cos * known.y, known.z);
+    }
+    Some(field)
 }
 
 fn summarise<const P: usize>(
@@ -63,7 +117,9 @@ fn summarise<const P: usize>(
 ) -> RigFit {
     let entries = model.terms.entries();
     let held: Vec<usize> = (0..P).filter(|k| gauge.is_held(*k)).collect();
-    let mut covariance = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
+    let rows = Rows::of(model, solver.theta());
+    let white = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
+    let mut covariance = drift::covariance(&rows, 3 * model.poses.len(), &held).unwrap_or(white);
     for k in &held {
         covariance.column_mut(*k).fill(0.0);
         covariance.row_mut(*k).fill(0.0);
