@@ -147,7 +147,12 @@ fn on_a_base_as_it_stands_errors_with_the_field_s_direction_estimated_are_as_lar
 fn a_field_taken_as_known_on_a_base_that_points_elsewhere_is_warned_of() {
     let warned = |seed: u64, north: bool| {
         let recording = simulation(seed, north).record("rig.csv").expect("a possible recording");
-        let options = Options { skip: vec![SensorKind::Gyr], multipliers: vec![4.0], ..Options::default() };
+        let options = Options {
+            skip: vec![SensorKind::Gyr],
+            multipliers: vec![4.0],
+            rig_mag: Some("X18"),
+            ..Options::default()
+        };
         let calibration = calibrate(&recording, &options, &|_| {});
         calibration.warnings.iter().any(|warning| warning.contains("heading"))
     };

@@ -124,9 +124,7 @@ fn summarise<const P: usize>(
         covariance.column_mut(*k).fill(0.0);
         covariance.row_mut(*k).fill(0.0);
     }
-    let mut parameters = model.terms.parameters(&model.base, solver.theta());
-    let stretch = known_length(&mut parameters, &model.base, entries);
-    scale_covariance(&mut covariance, entries, stretch);
+    let parameters = model.terms.parameters(&model.base, solver.theta());
     RigFit {
         parameters,
         entries: entries.to_vec(),
@@ -140,34 +138,6 @@ fn summarise<const P: usize>(
         held_out_rms: held_out(model, solver.theta()),
         squared_sum: 2.0 * solver.report().cost,
         residuals: 3 * model.poses.len(),
-    }
-}
-
-/// Gauge of a field whose direction is estimated: its length is the known one, and K takes up the rest. The fit holds
-/// one component instead, which changes no prediction. Returns the factor on fields.
-fn known_length(now: &mut UnifiedParameters<f64>, base: &UnifiedParameters<f64>, entries: &[u8]) -> f64 {
-    if !entries.contains(&14) {
-        return 1.0;
-    }
-    let stretch = base.vector_n.norm() / now.vector_n.norm();
-    now.vector_n *= stretch;
-    now.outer_source *= stretch;
-    now.middle_source *= stretch;
-    now.sensitivity /= stretch;
-    stretch
-}
-
-/// The covariance in that gauge; the factor's own uncertainty is of second order, as what is held is the component
-/// that the length hangs on.
-fn scale_covariance<const P: usize>(covariance: &mut SMatrix<f64, P, P>, entries: &[u8; P], stretch: f64) {
-    for (k, entry) in entries.iter().enumerate() {
-        let factor = match entry {
-            0..=8 => 1.0 / stretch,
-            14..=22 => stretch,
-            _ => 1.0,
-        };
-        covariance.row_mut(k).scale_mut(factor);
-        covariance.column_mut(k).scale_mut(factor);
     }
 }
 

@@ -242,7 +242,7 @@ mod tests {
             let (acc, gyr, mag) = (SensorKind::Acc, SensorKind::Gyr, SensorKind::Mag);
             assert!(error(acc, "I14") < error(acc, "T12") && error(acc, "T12") < 0.2 * error(acc, "before"));
             assert!(error(mag, "X21") < error(mag, "X18"));
-            assert!(error(gyr, "K9") < 0.5 * error(gyr, "static bias"));
+            assert!(error(gyr, "G12") < 0.5 * error(gyr, "static bias"));
             assert!(error(gyr, "static bias") < error(gyr, "before"));
             assert!(error(mag, "X18") < error(mag, "M12") && error(mag, "M12") < 0.2 * error(mag, "before"));
         }
