@@ -17,7 +17,7 @@ use nalgebra::Vector3;
 use super::outcome::BiasWander;
 
 /// Least gain of the log-likelihood for which a bias is taken to walk: chance explains it once in 200 times.
-const WALKS: f64 = 3.3;
+pub const WALKS: f64 = 3.3;
 
 /// The mean rate of one still stretch.
 #[derive(Clone, Copy, Debug)]

@@ -26,9 +26,9 @@ use super::{
 const ROUNDS: usize = 4;
 
 /// More observations than this are left out in [`PARTS`] parts instead of one by one.
-const SINGLES: usize = 400;
+pub const SINGLES: usize = 400;
 /// See [`SINGLES`].
-const PARTS: usize = 20;
+pub const PARTS: usize = 20;
 
 /// What to fit.
 #[derive(Clone, Copy, Debug)]
