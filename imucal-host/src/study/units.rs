@@ -116,7 +116,7 @@ fn models(kind: SensorKind, recording: &Recording, by: &[Calibration]) -> Vec<Mo
     let mut models = vec![Model::plain("before", Triad::identity())];
     let used: &[(usize, &str)] = match kind {
         SensorKind::Acc => &[(0, "field form"), (1, "traditional"), (2, "improved")],
-        SensorKind::Gyr => &[(2, "turns")],
+        SensorKind::Gyr => &[(2, "attitude")],
         SensorKind::Mag => {
             &[(0, "field form"), (1, "traditional"), (2, "improved"), (3, "improved, field's direction")]
         }
