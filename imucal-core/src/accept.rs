@@ -8,6 +8,7 @@
 use core::fmt;
 
 use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     coverage::Coverage,
@@ -55,8 +56,9 @@ impl Limits {
     }
 }
 
-/// Why a fit was refused. The figures are those that led to it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Why a fit was refused. The figures are those that led to it. The order of the variants is the messages' format:
+/// append only.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Refusal {
@@ -124,7 +126,7 @@ pub enum Refusal {
 }
 
 /// A quantity that [`Refusal::Implausible`] speaks of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Quantity {
