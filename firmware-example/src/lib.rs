@@ -12,17 +12,21 @@
 //! | `empty` | start-up code and the record's bytes, to compare the size of `correct` with |
 #![no_std]
 
+pub mod board;
 #[cfg(target_os = "none")]
 pub mod console;
+pub mod coprocessor;
 pub mod correct;
 pub mod fit;
+pub mod fitting;
 #[cfg(target_os = "none")]
 mod gate;
+pub mod judgement;
 pub mod replay;
 pub mod scene;
-pub mod storage;
 #[cfg(target_os = "none")]
 pub mod stack;
+pub mod storage;
 
 /// A record as it would lie in flash: the golden bytes of the format's version 1.0.
 pub static RECORD: &[u8] = include_bytes!("../../imucal-core/tests/golden/record-1.0.bin");

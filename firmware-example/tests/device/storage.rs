@@ -89,7 +89,8 @@ fn ten_thousand_updates_wear_all_pages_within_a_factor_of_two() {
         for number in 1..=10_000 {
             assert_eq!(store(&mut nor, &record(&mut rng)), Ok(number));
         }
-        let (least, most) = (nor.erases.iter().min().expect("pages"), nor.erases.iter().max().expect("pages"));
+        let (least, most) =
+            (nor.erases.iter().min().expect("pages"), nor.erases.iter().max().expect("pages"));
         println!("{pages} pages: {least} to {most} erases each for 10 000 updates");
         assert!(*most <= 2 * *least && *most <= 10_000 / 6 / pages as u32 + 1, "{:?}", nor.erases);
     }

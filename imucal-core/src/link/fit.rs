@@ -3,7 +3,12 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::{accept::Refusal, observation::Block, solver::Termination};
+use crate::{
+    accept::Refusal,
+    observation::Block,
+    record::{RawUnit, Sensor},
+    solver::Termination,
+};
 
 /// Parameters of the largest fit.
 pub const MOST_PARAMETERS: usize = 14;
@@ -23,13 +28,24 @@ pub enum FitModel {
     I14,
     /// Magnetometer, an ellipsoid, from single samples.
     E9,
+    /// Gyroscope, full gain, from turns between rests whose blocks are taken less the bias of the task.
+    K9,
     /// Gyroscope, full gain and bias, from turns between rests.
     K12,
 }
 
 impl FitModel {
     /// All, in the order of the messages.
-    pub const ALL: [Self; 5] = [Self::T9, Self::T6, Self::I14, Self::E9, Self::K12];
+    pub const ALL: [Self; 6] = [Self::T9, Self::T6, Self::I14, Self::E9, Self::K9, Self::K12];
+
+    /// The sensor it calibrates.
+    pub fn sensor(self) -> Sensor {
+        match self {
+            Self::T9 | Self::T6 | Self::I14 => Sensor::Accelerometer,
+            Self::E9 => Sensor::Magnetometer,
+            Self::K9 | Self::K12 => Sensor::Gyroscope,
+        }
+    }
 
     /// Its name in a record.
     pub fn name(self) -> &'static str {
@@ -38,6 +54,7 @@ impl FitModel {
             Self::T6 => "T6",
             Self::I14 => "I14",
             Self::E9 => "E9",
+            Self::K9 => "K9",
             Self::K12 => "K12",
         }
     }
@@ -54,7 +71,13 @@ pub struct FitTask {
     pub axes: [u8; 3],
     /// Bias to start from, nominal SI; zero, or for a gyroscope what it puts out at rest.
     pub bias: [f32; 3],
-    /// Search with a swarm of this seed before descending: of a gyroscope alone.
+    /// Unit of the raw samples that the calibration is for.
+    pub unit_in: RawUnit,
+    /// `raw = offset + per_unit · nominal SI`: what the result is restated by.
+    pub offset: f32,
+    /// See `offset`.
+    pub per_unit: f32,
+    /// Search with a swarm of this seed before descending: of K12 alone.
     pub search: Option<u64>,
 }
 

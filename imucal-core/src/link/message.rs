@@ -77,7 +77,6 @@ pub enum Request<'a> {
 /// From device to host. The order of the variants is the format: append only.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
-#[expect(clippy::large_enum_variant, reason = "one at a time, on its way into a buffer of its size")]
 pub enum Reply<'a> {
     /// To [`Request::Identify`].
     Identity(Identity),
@@ -129,8 +128,10 @@ pub struct Identity {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Capacity {
-    /// Points or poses of a fit.
+    /// Points of a fit.
     pub points: u16,
+    /// Poses of a fit on a rig.
+    pub poses: u16,
     /// Turns of a gyroscope's fit.
     pub turns: u16,
     /// Blocks of all turns together.
@@ -177,7 +178,7 @@ pub struct Status {
     pub fit: Option<FitProgress>,
 }
 
-/// Why a request was not done. Nothing has changed.
+/// Why a request was not done. Nothing has changed, but that observations before the one refused are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -242,12 +243,17 @@ mod tests {
     #[test]
     fn the_longest_messages_fit_a_frame() {
         let values = Values::from([[1e30; 3]; 4 * BATCH]);
-        assert!(fits(&Request::Correct { sensor: Sensor::Magnetometer, temperature: 1e30, raw: values.clone() }));
+        assert!(fits(&Request::Correct {
+            sensor: Sensor::Magnetometer,
+            temperature: 1e30,
+            raw: values.clone()
+        }));
         assert!(fits(&Reply::Corrected(values)));
         assert!(fits(&Request::PutRecord { record: &[1; record::MAX_LEN], replace: true }));
         let block = Observation::Block([1.0; 3], [1.0; 3], [1.0; 3], 1.0);
         assert!(fits(&Request::Feed { index: u16::MAX, observations: Vec::from([block; BATCH]) }));
-        let refusal = Refusal::PoorCoverage { coverage: 1.0, flatness: 1.0, need_coverage: 1.0, need_flatness: 1.0 };
+        let refusal =
+            Refusal::PoorCoverage { coverage: 1.0, flatness: 1.0, need_coverage: 1.0, need_flatness: 1.0 };
         assert!(fits(&Reply::Report(FitReport {
             model: FitModel::I14,
             termination: Termination::NotFinite,

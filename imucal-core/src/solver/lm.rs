@@ -218,6 +218,11 @@ impl<T: Scalar, const P: usize> LevenbergMarquardt<T, P> {
         &self.theta
     }
 
+    /// Steps tried so far; [`report`](Self::report) tells the rest, and works for it.
+    pub fn iterations(&self) -> u16 {
+        self.iterations
+    }
+
     /// The triangular factor of the rows at the last parameters that were differentiated: those of
     /// [`theta`](Self::theta) once the fit has stopped.
     pub fn factor(&self) -> &Triangular<T, P> {

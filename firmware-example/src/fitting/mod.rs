@@ -1,0 +1,341 @@
+//! A fit under way: what it is made to, and its solver, which goes on by slices.
+//!
+//! A slice is one iteration of Levenberg–Marquardt, or [`SLICE`] blocks of a swarm's cost: below a millisecond at
+//! 100 MHz (`tests/device_cost.rs`). What follows a stop (the judgement, and a cloud's refinement) is one more.
+
+use imucal_core::{
+    accept::Limits,
+    link::{Capacity, Fault, FitModel, FitProgress, FitTask, Observation},
+    model::{
+        Parameterisation,
+        norm::curvature_excess,
+        parameterisation::{DIAGONAL, FULL, FULL_GAIN, UPPER_TRIANGULAR},
+        turn::TurnPass,
+        unified::UnifiedParameters,
+    },
+    record::Sensor,
+    solver::{LevenbergMarquardt, Swarm, swarm},
+    triad::Triad,
+};
+use nalgebra::{Matrix3, Vector3};
+use rand_core::SeedableRng;
+use rand_pcg::Pcg32;
+
+mod models;
+mod observations;
+mod report;
+
+use models::{LEVELLED, level, norm_model, rig_axes, rig_model};
+use observations::Observations;
+pub use report::Finished;
+use report::{errors, finished, inverse_errors};
+
+use crate::judgement::{Judgement, Question, Seen};
+
+/// Blocks of a swarm's cost in one slice.
+pub const SLICE: usize = 256;
+/// Poses at least: the affine part has twelve parameters, and each pose tells three.
+const LEAST_POSES: usize = 6;
+/// Turns at least.
+const LEAST_TURNS: usize = 8;
+/// Largest rms error of a turn, rad (5.7°): beyond it axes are swapped or a unit is wrong.
+const LARGEST_TURN: f64 = 0.1;
+/// Where a swarm searches, about nominal: scale, skew, and bias, rad/s (15°/s).
+const REACH: (f32, f32, f32) = (0.2, 0.1, 0.262);
+
+/// Levenberg–Marquardt of all sizes, one at a time.
+#[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one, and no heap")]
+enum Descent {
+    Six(LevenbergMarquardt<f32, 6>),
+    Nine(LevenbergMarquardt<f32, 9>),
+    Twelve(LevenbergMarquardt<f32, 12>),
+    Fourteen(LevenbergMarquardt<f32, 14>),
+}
+
+type Search<const PARTICLES: usize> = (Swarm<f32, PARTICLES, 12, TurnPass<f32>>, Pcg32);
+
+/// A fit under way, or none. All memory that fits take, and it can be a `static`.
+#[derive(Clone, Debug)]
+pub struct Fitting<
+    const POINTS: usize,
+    const POSES: usize,
+    const TURNS: usize,
+    const BLOCKS: usize,
+    const PARTICLES: usize,
+> {
+    task: Option<FitTask>,
+    seen: Observations<POINTS, POSES, TURNS, BLOCKS>,
+    taken: u16,
+    /// While a swarm searches.
+    search: Option<Search<PARTICLES>>,
+    descent: Option<Descent>,
+    /// Iterations of the swarm, once it is done.
+    searched: u16,
+    /// The cloud's noise has been taken into account.
+    refined: bool,
+    stopped: bool,
+}
+
+impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: usize, const PARTICLES: usize>
+    Fitting<POINTS, POSES, TURNS, BLOCKS, PARTICLES>
+{
+    /// What there is room for.
+    pub const CAPACITY: Capacity = Capacity {
+        points: POINTS as u16,
+        poses: POSES as u16,
+        turns: TURNS as u16,
+        blocks: BLOCKS as u16,
+        particles: PARTICLES as u16,
+    };
+
+    /// No fit.
+    pub const fn new() -> Self {
+        Self {
+            task: None,
+            seen: Observations::new(),
+            taken: 0,
+            search: None,
+            descent: None,
+            searched: 0,
+            refined: false,
+            stopped: false,
+        }
+    }
+
+    /// Gives up what there is.
+    pub fn clear(&mut self) {
+        self.task = None;
+        self.seen.clear();
+        (self.search, self.descent) = (None, None);
+        (self.taken, self.searched) = (0, 0);
+        (self.refined, self.stopped) = (false, false);
+    }
+
+    /// Begins a fit, without observations.
+    ///
+    /// # Errors
+    ///
+    /// [`Fault::Malformed`] for figures that cannot be, [`Fault::Unsuited`] for what this device has not. What there
+    /// was goes on.
+    pub fn begin(&mut self, task: FitTask) -> Result<(), Fault> {
+        let finite = [task.norm, task.offset, task.per_unit].iter().chain(&task.bias).all(|x| x.is_finite());
+        let sized = task.model.sensor() == Sensor::Gyroscope || task.norm > 0.0;
+        if !finite || !sized || task.per_unit <= 0.0 || rig_axes(&task).is_none() {
+            return Err(Fault::Malformed);
+        }
+        if task.search.is_some() && (PARTICLES == 0 || task.model != FitModel::K12) {
+            return Err(Fault::Unsuited);
+        }
+        self.clear();
+        self.task = Some(task);
+        Ok(())
+    }
+
+    /// Takes an observation.
+    ///
+    /// # Errors
+    ///
+    /// [`Fault::NotReady`] without a fit begun; [`Fault::Full`]; [`Fault::Unsuited`] for the model or after the first
+    /// slice; [`Fault::Malformed`].
+    pub fn take(&mut self, observation: &Observation) -> Result<(), Fault> {
+        let task = self.task.as_ref().ok_or(Fault::NotReady)?;
+        if self.search.is_some() || self.descent.is_some() {
+            return Err(Fault::Unsuited);
+        }
+        self.seen.take(task.model, observation)?;
+        self.taken = self.taken.saturating_add(1);
+        Ok(())
+    }
+
+    /// How far it is; `None` where no fit was begun.
+    pub fn progress(&self) -> Option<FitProgress> {
+        self.task?;
+        let iterations = match &self.descent {
+            None => 0,
+            Some(Descent::Six(solver)) => solver.iterations(),
+            Some(Descent::Nine(solver)) => solver.iterations(),
+            Some(Descent::Twelve(solver)) => solver.iterations(),
+            Some(Descent::Fourteen(solver)) => solver.iterations(),
+        };
+        let searched = self.search.as_ref().map_or(self.searched, |(swarm, _)| swarm.report().iterations);
+        Some(FitProgress { observations: self.taken, searched, iterations, stopped: self.stopped })
+    }
+
+    /// One slice; true once the fit has stopped, or where there is none.
+    pub fn step(&mut self) -> bool {
+        let Some(task) = self.task.filter(|_| !self.stopped) else { return true };
+        if self.search.is_some() {
+            self.search_on();
+        } else if self.descent.is_some() {
+            self.stopped = self.descend(&task);
+        } else {
+            self.start(&task);
+        }
+        self.stopped
+    }
+
+    /// Goes on with the search; a descent from its best follows.
+    #[inline(never)]
+    fn search_on(&mut self) {
+        let Some((swarm, rng)) = &mut self.search else { return };
+        if self.seen.with_turns(FULL, |model| swarm.step(model, rng, SLICE).is_some()) {
+            self.searched = swarm.report().iterations;
+            self.descent = Some(Descent::Twelve(LevenbergMarquardt::new(*swarm.best(), Default::default())));
+            self.search = None;
+        }
+    }
+
+    /// One iteration; true where the last solver has stopped.
+    #[inline(never)]
+    fn descend(&mut self, task: &FitTask) -> bool {
+        let seen = &self.seen;
+        let stopped = match &mut self.descent {
+            None => true,
+            Some(Descent::Six(solver)) => solver.step(&norm_model(task, seen, DIAGONAL)).is_some(),
+            Some(Descent::Fourteen(solver)) => solver.step(&rig_model(task, seen)).is_some(),
+            Some(Descent::Twelve(solver)) => seen.with_turns(FULL, |model| solver.step(model).is_some()),
+            Some(Descent::Nine(solver)) if task.model == FitModel::K9 => {
+                seen.with_turns(FULL_GAIN, |model| solver.step(model).is_some())
+            }
+            Some(Descent::Nine(solver)) => solver.step(&norm_model(task, seen, UPPER_TRIANGULAR)).is_some(),
+        };
+        stopped && !self.refine(task)
+    }
+
+    /// A cloud is fitted once more, once its noise is known: single samples lie outside their shell on average.
+    fn refine(&mut self, task: &FitTask) -> bool {
+        let Some(Descent::Nine(rough)) = &mut self.descent else { return false };
+        if task.model != FitModel::E9 || self.refined {
+            return false;
+        }
+        self.refined = true;
+        let triad = UPPER_TRIANGULAR.triad(rough.theta());
+        let variance = rough.variance().unwrap_or(0.0);
+        for point in &mut self.seen.points {
+            point.excess = curvature_excess(&triad, task.norm, &point.value, variance);
+        }
+        *rough = LevenbergMarquardt::new(*rough.theta(), Default::default());
+        true
+    }
+
+    #[inline(never)]
+    fn start(&mut self, task: &FitTask) {
+        if let Some(seed) = task.search {
+            self.search = search(seed);
+            return;
+        }
+        let bias = Vector3::from(task.bias);
+        let nominal = Triad { gain: Matrix3::identity(), bias };
+        let nine = |form: Parameterisation<9>, triad| {
+            Descent::Nine(LevenbergMarquardt::new(form.theta(&triad), Default::default()))
+        };
+        self.descent = Some(match task.model {
+            FitModel::T6 => {
+                Descent::Six(LevenbergMarquardt::new(DIAGONAL.theta(&nominal), Default::default()))
+            }
+            FitModel::I14 => {
+                let start = LEVELLED.theta(&UnifiedParameters { bias, ..level(task) });
+                Descent::Fourteen(LevenbergMarquardt::new(start, Default::default()))
+            }
+            FitModel::E9 => nine(UPPER_TRIANGULAR, Triad { bias: self.seen.middle(), ..nominal }),
+            FitModel::K9 => nine(FULL_GAIN, nominal),
+            FitModel::K12 => {
+                Descent::Twelve(LevenbergMarquardt::new(FULL.theta(&nominal), Default::default()))
+            }
+            _ => nine(UPPER_TRIANGULAR, nominal),
+        });
+    }
+
+    /// Judges the fit.
+    ///
+    /// # Errors
+    ///
+    /// [`Fault::NotReady`] before it has stopped.
+    pub fn finish(&self) -> Result<Finished, Fault> {
+        match (&self.task, &self.descent) {
+            (Some(task), Some(descent)) if self.stopped => Ok(self.judge(task, descent)),
+            _ => Err(Fault::NotReady),
+        }
+    }
+
+    fn judge(&self, task: &FitTask, descent: &Descent) -> Finished {
+        match descent {
+            Descent::Six(solver) => self.judge_norm(task, solver, DIAGONAL, Limits::for_norm(6, 6)),
+            Descent::Nine(solver) if task.model == FitModel::K9 => self.judge_turns(task, solver, FULL_GAIN),
+            Descent::Nine(solver) => self.judge_norm(task, solver, UPPER_TRIANGULAR, Limits::for_norm(9, 10)),
+            Descent::Twelve(solver) => self.judge_turns(task, solver, FULL),
+            Descent::Fourteen(solver) => self.judge_rig(task, solver),
+        }
+    }
+
+    #[inline(never)]
+    fn judge_norm<const P: usize>(
+        &self,
+        task: &FitTask,
+        solver: &LevenbergMarquardt<f32, P>,
+        form: Parameterisation<P>,
+        limits: Limits,
+    ) -> Finished {
+        let triad = form.triad(solver.theta());
+        let radius = task.norm / libm::cbrtf(triad.gain.determinant());
+        let question = Question { seen: Seen::Points(&self.seen.points), limits, radius, bend: true };
+        let judgement = Judgement::of(solver, &norm_model(task, &self.seen, form), &triad, &question);
+        let std = form.triad(&errors(&judgement.covariance));
+        finished(task, solver.theta(), &judgement, &triad, &std)
+    }
+
+    #[inline(never)]
+    fn judge_turns<const P: usize>(
+        &self,
+        task: &FitTask,
+        solver: &LevenbergMarquardt<f32, P>,
+        form: Parameterisation<P>,
+    ) -> Finished {
+        let mut triad = form.triad(solver.theta());
+        let limits = Limits { rms: LARGEST_TURN, ..Limits::for_norm(9, LEAST_TURNS) };
+        let question = Question { seen: Seen::Ends(&self.seen.ends), limits, radius: 1.0, bend: true };
+        let judgement = self.seen.with_turns(form, |model| Judgement::of(solver, model, &triad, &question));
+        if task.model == FitModel::K9 {
+            triad.bias = Vector3::from(task.bias);
+        }
+        let std = form.triad(&errors(&judgement.covariance));
+        finished(task, solver.theta(), &judgement, &triad, &std)
+    }
+
+    #[inline(never)]
+    fn judge_rig(&self, task: &FitTask, solver: &LevenbergMarquardt<f32, 14>) -> Finished {
+        let found = LEVELLED.parameters(&level(task), solver.theta());
+        let gain = found.sensitivity.try_inverse().unwrap_or_else(Matrix3::zeros);
+        let triad = Triad { gain, bias: found.bias };
+        let limits = Limits {
+            observations: LEAST_POSES,
+            directions: LEAST_POSES,
+            ..Limits::for_norm(12, LEAST_POSES)
+        };
+        let seen = Seen::Poses(&self.seen.poses);
+        let question = Question { seen, limits, radius: task.norm, bend: false };
+        let judgement = Judgement::of(solver, &rig_model(task, &self.seen), &triad, &question);
+        let std = inverse_errors(&gain, &judgement.covariance);
+        finished(task, solver.theta(), &judgement, &triad, &std)
+    }
+}
+
+impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: usize, const PARTICLES: usize>
+    Default for Fitting<POINTS, POSES, TURNS, BLOCKS, PARTICLES>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[inline(never)]
+fn search<const PARTICLES: usize>(seed: u64) -> Option<Search<PARTICLES>> {
+    let (scale, skew, rate) = REACH;
+    let reach = Triad {
+        gain: Matrix3::repeat(skew) + Matrix3::from_diagonal_element(scale - skew),
+        bias: Vector3::repeat(rate),
+    };
+    let bounds = swarm::Bounds::around(&FULL.theta(&Triad::identity()), &FULL.theta(&reach))?;
+    Some((Swarm::new(bounds, Default::default()), Pcg32::seed_from_u64(seed)))
+}
