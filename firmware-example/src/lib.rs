@@ -9,6 +9,7 @@
 //! | `gate` | calls everything a device may want of the core |
 //! | `correct` | reads the record and corrects a sample: the least a device does |
 //! | `fit` | fits all sensors, judges the fits and writes a record, prints the bits as `replay` does |
+//! | `coprocessor` | keeps a record, corrects, fits and stores, at the end of a UART |
 //! | `empty` | start-up code and the record's bytes, to compare the size of `correct` with |
 #![no_std]
 
@@ -22,6 +23,8 @@ pub mod fitting;
 #[cfg(target_os = "none")]
 mod gate;
 pub mod judgement;
+#[cfg(target_os = "none")]
+pub mod machine;
 pub mod replay;
 pub mod scene;
 #[cfg(target_os = "none")]

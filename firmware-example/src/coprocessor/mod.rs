@@ -20,7 +20,7 @@ use imucal_core::{
 
 use crate::{
     board::{Board, ByteLink, Clock, SampleSource},
-    fitting::Fitting,
+    fitting::{Fitting, Memory},
     storage::{SLOT, Slots, Writing},
 };
 use calibration::Calibration;
@@ -57,7 +57,7 @@ struct Stream {
     left: u16,
 }
 
-/// The co-processor on its board. The sizes are those of [`Fitting`].
+/// The co-processor on its board. The sizes are those of [`Memory`].
 #[derive(Debug)]
 pub struct Coprocessor<
     'a,
@@ -96,7 +96,7 @@ struct Device<
     slots: Option<Slots<F>>,
     outgoing: Outgoing,
     calibration: Calibration,
-    fitting: &'a mut Fitting<POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
+    fitting: Fitting<'a, POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
     job: Job,
     due: Option<(u32, Due)>,
     stream: Option<Stream>,
@@ -124,19 +124,18 @@ impl<
     pub fn new(
         board: Board<L, F, C, S>,
         unit: SensorIdentity,
-        fitting: &'a mut Fitting<POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
+        memory: &'a mut Memory<POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
     ) -> Self {
         let Board { link, flash, clock, sensors } = board;
         let mut slots = Slots::open(flash).ok();
         let calibration = boot(unit, slots.as_mut());
-        fitting.clear();
         let device = Device {
             clock,
             sensors,
             slots,
             outgoing: Outgoing::new(),
             calibration,
-            fitting,
+            fitting: Fitting::new(memory),
             job: Job::None,
             due: None,
             stream: None,

@@ -3,6 +3,7 @@
 //! A slice is one iteration of Levenberg–Marquardt, or [`SLICE`] blocks of a swarm's cost: below a millisecond at
 //! 100 MHz (`tests/device_cost.rs`). What follows a stop (the judgement, and a cloud's refinement) is one more.
 
+use heapless::Vec;
 use imucal_core::{
     accept::Limits,
     link::{Capacity, Fault, FitModel, FitProgress, FitTask, Observation},
@@ -55,20 +56,50 @@ enum Descent {
 
 type Search<const PARTICLES: usize> = (Swarm<f32, PARTICLES, 12, TurnPass<f32>>, Pcg32);
 
-/// A fit under way, or none. All memory that fits take, and it can be a `static`.
+/// The memory that fits take: observations and a swarm. All of it zeros at first, so that a `static` costs no flash.
 #[derive(Clone, Debug)]
-pub struct Fitting<
+pub struct Memory<
     const POINTS: usize,
     const POSES: usize,
     const TURNS: usize,
     const BLOCKS: usize,
     const PARTICLES: usize,
 > {
-    task: Option<FitTask>,
     seen: Observations<POINTS, POSES, TURNS, BLOCKS>,
+    /// The swarm, while one searches. A list, since an `Option` without a value need not be zeros.
+    search: Vec<Search<PARTICLES>, 1>,
+}
+
+impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: usize, const PARTICLES: usize>
+    Memory<POINTS, POSES, TURNS, BLOCKS, PARTICLES>
+{
+    /// Empty.
+    pub const fn new() -> Self {
+        Self { seen: Observations::new(), search: Vec::new() }
+    }
+}
+
+impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: usize, const PARTICLES: usize>
+    Default for Memory<POINTS, POSES, TURNS, BLOCKS, PARTICLES>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A fit under way, or none.
+#[derive(Debug)]
+pub struct Fitting<
+    'a,
+    const POINTS: usize,
+    const POSES: usize,
+    const TURNS: usize,
+    const BLOCKS: usize,
+    const PARTICLES: usize,
+> {
+    memory: &'a mut Memory<POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
+    task: Option<FitTask>,
     taken: u16,
-    /// While a swarm searches.
-    search: Option<Search<PARTICLES>>,
     descent: Option<Descent>,
     /// Iterations of the swarm, once it is done.
     searched: u16,
@@ -77,8 +108,14 @@ pub struct Fitting<
     stopped: bool,
 }
 
-impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: usize, const PARTICLES: usize>
-    Fitting<POINTS, POSES, TURNS, BLOCKS, PARTICLES>
+impl<
+    'a,
+    const POINTS: usize,
+    const POSES: usize,
+    const TURNS: usize,
+    const BLOCKS: usize,
+    const PARTICLES: usize,
+> Fitting<'a, POINTS, POSES, TURNS, BLOCKS, PARTICLES>
 {
     /// What there is room for.
     pub const CAPACITY: Capacity = Capacity {
@@ -90,24 +127,19 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
     };
 
     /// No fit.
-    pub const fn new() -> Self {
-        Self {
-            task: None,
-            seen: Observations::new(),
-            taken: 0,
-            search: None,
-            descent: None,
-            searched: 0,
-            refined: false,
-            stopped: false,
-        }
+    pub fn new(memory: &'a mut Memory<POINTS, POSES, TURNS, BLOCKS, PARTICLES>) -> Self {
+        let mut fitting =
+            Self { memory, task: None, taken: 0, descent: None, searched: 0, refined: false, stopped: false };
+        fitting.clear();
+        fitting
     }
 
     /// Gives up what there is.
     pub fn clear(&mut self) {
         self.task = None;
-        self.seen.clear();
-        (self.search, self.descent) = (None, None);
+        self.memory.seen.clear();
+        self.memory.search.clear();
+        self.descent = None;
         (self.taken, self.searched) = (0, 0);
         (self.refined, self.stopped) = (false, false);
     }
@@ -140,10 +172,10 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
     /// slice; [`Fault::Malformed`].
     pub fn take(&mut self, observation: &Observation) -> Result<(), Fault> {
         let task = self.task.as_ref().ok_or(Fault::NotReady)?;
-        if self.search.is_some() || self.descent.is_some() {
+        if !self.memory.search.is_empty() || self.descent.is_some() {
             return Err(Fault::Unsuited);
         }
-        self.seen.take(task.model, observation)?;
+        self.memory.seen.take(task.model, observation)?;
         self.taken = self.taken.saturating_add(1);
         Ok(())
     }
@@ -158,14 +190,15 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
             Some(Descent::Twelve(solver)) => solver.iterations(),
             Some(Descent::Fourteen(solver)) => solver.iterations(),
         };
-        let searched = self.search.as_ref().map_or(self.searched, |(swarm, _)| swarm.report().iterations);
+        let searched =
+            self.memory.search.first().map_or(self.searched, |(swarm, _)| swarm.report().iterations);
         Some(FitProgress { observations: self.taken, searched, iterations, stopped: self.stopped })
     }
 
     /// One slice; true once the fit has stopped, or where there is none.
     pub fn step(&mut self) -> bool {
         let Some(task) = self.task.filter(|_| !self.stopped) else { return true };
-        if self.search.is_some() {
+        if !self.memory.search.is_empty() {
             self.search_on();
         } else if self.descent.is_some() {
             self.stopped = self.descend(&task);
@@ -178,18 +211,19 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
     /// Goes on with the search; a descent from its best follows.
     #[inline(never)]
     fn search_on(&mut self) {
-        let Some((swarm, rng)) = &mut self.search else { return };
-        if self.seen.with_turns(FULL, |model| swarm.step(model, rng, SLICE).is_some()) {
+        let Memory { seen, search } = &mut *self.memory;
+        let Some((swarm, rng)) = search.first_mut() else { return };
+        if seen.with_turns(FULL, |model| swarm.step(model, rng, SLICE).is_some()) {
             self.searched = swarm.report().iterations;
             self.descent = Some(Descent::Twelve(LevenbergMarquardt::new(*swarm.best(), Default::default())));
-            self.search = None;
+            search.clear();
         }
     }
 
     /// One iteration; true where the last solver has stopped.
     #[inline(never)]
     fn descend(&mut self, task: &FitTask) -> bool {
-        let seen = &self.seen;
+        let seen = &self.memory.seen;
         let stopped = match &mut self.descent {
             None => true,
             Some(Descent::Six(solver)) => solver.step(&norm_model(task, seen, DIAGONAL)).is_some(),
@@ -212,7 +246,7 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
         self.refined = true;
         let triad = UPPER_TRIANGULAR.triad(rough.theta());
         let variance = rough.variance().unwrap_or(0.0);
-        for point in &mut self.seen.points {
+        for point in &mut self.memory.seen.points {
             point.excess = curvature_excess(&triad, task.norm, &point.value, variance);
         }
         *rough = LevenbergMarquardt::new(*rough.theta(), Default::default());
@@ -221,8 +255,8 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
 
     #[inline(never)]
     fn start(&mut self, task: &FitTask) {
-        if let Some(seed) = task.search {
-            self.search = search(seed);
+        if let Some(found) = task.search.and_then(search) {
+            let _room = self.memory.search.push(found);
             return;
         }
         let bias = Vector3::from(task.bias);
@@ -238,7 +272,7 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
                 let start = LEVELLED.theta(&UnifiedParameters { bias, ..level(task) });
                 Descent::Fourteen(LevenbergMarquardt::new(start, Default::default()))
             }
-            FitModel::E9 => nine(UPPER_TRIANGULAR, Triad { bias: self.seen.middle(), ..nominal }),
+            FitModel::E9 => nine(UPPER_TRIANGULAR, Triad { bias: self.memory.seen.middle(), ..nominal }),
             FitModel::K9 => nine(FULL_GAIN, nominal),
             FitModel::K12 => {
                 Descent::Twelve(LevenbergMarquardt::new(FULL.theta(&nominal), Default::default()))
@@ -279,8 +313,8 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
     ) -> Finished {
         let triad = form.triad(solver.theta());
         let radius = task.norm / libm::cbrtf(triad.gain.determinant());
-        let question = Question { seen: Seen::Points(&self.seen.points), limits, radius, bend: true };
-        let judgement = Judgement::of(solver, &norm_model(task, &self.seen, form), &triad, &question);
+        let question = Question { seen: Seen::Points(&self.memory.seen.points), limits, radius, bend: true };
+        let judgement = Judgement::of(solver, &norm_model(task, &self.memory.seen, form), &triad, &question);
         let std = form.triad(&errors(&judgement.covariance));
         finished(task, solver.theta(), &judgement, &triad, &std)
     }
@@ -294,8 +328,9 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
     ) -> Finished {
         let mut triad = form.triad(solver.theta());
         let limits = Limits { rms: LARGEST_TURN, ..Limits::for_norm(9, LEAST_TURNS) };
-        let question = Question { seen: Seen::Ends(&self.seen.ends), limits, radius: 1.0, bend: true };
-        let judgement = self.seen.with_turns(form, |model| Judgement::of(solver, model, &triad, &question));
+        let question = Question { seen: Seen::Ends(&self.memory.seen.ends), limits, radius: 1.0, bend: true };
+        let judgement =
+            self.memory.seen.with_turns(form, |model| Judgement::of(solver, model, &triad, &question));
         if task.model == FitModel::K9 {
             triad.bias = Vector3::from(task.bias);
         }
@@ -313,19 +348,11 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
             directions: LEAST_POSES,
             ..Limits::for_norm(12, LEAST_POSES)
         };
-        let seen = Seen::Poses(&self.seen.poses);
+        let seen = Seen::Poses(&self.memory.seen.poses);
         let question = Question { seen, limits, radius: task.norm, bend: false };
-        let judgement = Judgement::of(solver, &rig_model(task, &self.seen), &triad, &question);
+        let judgement = Judgement::of(solver, &rig_model(task, &self.memory.seen), &triad, &question);
         let std = inverse_errors(&gain, &judgement.covariance);
         finished(task, solver.theta(), &judgement, &triad, &std)
-    }
-}
-
-impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: usize, const PARTICLES: usize>
-    Default for Fitting<POINTS, POSES, TURNS, BLOCKS, PARTICLES>
-{
-    fn default() -> Self {
-        Self::new()
     }
 }
 

@@ -11,7 +11,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::{
-    bench::{Bench, BenchFitting, Counting, SERIAL},
+    bench::{Bench, BenchMemory, Counting, SERIAL},
     nor::Nor,
     session,
 };
@@ -64,8 +64,8 @@ fn request<'a>(rng: &mut ChaCha8Rng, records: &'a [Vec<u8>]) -> Request<'a> {
 fn a_hundred_thousand_frames_over_a_bad_link_store_no_wrong_record_and_hang_nothing() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let records = records(20);
-    let mut fitting = BenchFitting::new();
-    let mut bench = Bench::new(Nor::new(3), SERIAL, Counting::default(), &mut fitting);
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(3), SERIAL, Counting::default(), &mut memory);
     let (mut asked, mut waiting): (HashSet<u32>, Vec<Vec<u8>>) = (HashSet::new(), Vec::new());
     let (mut delivered, mut whole, mut answered, mut unread) = (0u32, 0u32, 0u32, 0u32);
     // Ids between are left to the checks.
@@ -152,10 +152,10 @@ fn damage(rng: &mut ChaCha8Rng, frame: &mut Vec<u8>) {
 #[test]
 fn the_state_of_a_record_is_told_whatever_the_flash_holds() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let mut fitting = BenchFitting::new();
+    let mut memory = BenchMemory::new();
     let mut nor = Nor::new(2);
     rng.fill_bytes(&mut nor.bytes);
-    let mut bench = Bench::new(nor, SERIAL, Counting::default(), &mut fitting);
+    let mut bench = Bench::new(nor, SERIAL, Counting::default(), &mut memory);
     let state = bench.ask(&Request::Status, |reply| match reply {
         Reply::Status(status) => status.record,
         other => panic!("{other:?}"),

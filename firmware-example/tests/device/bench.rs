@@ -5,7 +5,7 @@ use std::{cell::RefCell, collections::VecDeque, rc::Rc};
 use firmware_example::{
     board::{Board, ByteLink, Clock, Sample, SampleSource},
     coprocessor::Coprocessor,
-    fitting::Fitting,
+    fitting::Memory,
 };
 use imucal_core::{
     link::{MAX_FRAME, Receiver, Reply, Request, encode, split},
@@ -60,7 +60,7 @@ impl SampleSource for Counting {
 }
 
 /// The sizes of the bench's fits.
-pub type BenchFitting = Fitting<256, 64, 48, 512, 10>;
+pub type BenchMemory = Memory<256, 64, 48, 512, 10>;
 type Device<'a> = Coprocessor<'a, Wire, Nor, Ticks, Counting, 256, 64, 48, 512, 10>;
 
 /// Serial of the record that the images carry.
@@ -78,10 +78,10 @@ pub struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    pub fn new(nor: Nor, serial: &str, sensors: Counting, fitting: &'a mut BenchFitting) -> Self {
+    pub fn new(nor: Nor, serial: &str, sensors: Counting, memory: &'a mut BenchMemory) -> Self {
         let wire = Wire::default();
         let board = Board { link: wire.clone(), flash: nor, clock: Ticks::default(), sensors };
-        let device = Coprocessor::new(board, unit(serial), fitting);
+        let device = Coprocessor::new(board, unit(serial), memory);
         Self { device, wire, receiver: Receiver::default(), next: 1 }
     }
 

@@ -13,7 +13,7 @@ use imucal_core::{
 use nalgebra::Vector3;
 
 use crate::{
-    bench::{Bench, BenchFitting, Counting, SERIAL},
+    bench::{Bench, BenchMemory, Counting, SERIAL},
     nor::Nor,
 };
 
@@ -58,8 +58,8 @@ fn of_another() -> Vec<u8> {
 
 #[test]
 fn a_record_is_stored_used_given_back_and_there_after_a_power_cycle() {
-    let mut fitting = BenchFitting::new();
-    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut fitting);
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
     assert_eq!(state(&mut bench), RecordState::Empty);
     let raw = Values::from_slice(&[[33_000.0, 32_000.0, 31_000.0]]).expect("room");
     let correct = Request::Correct { sensor: Sensor::Accelerometer, temperature: 31.0, raw: raw.clone() };
@@ -67,7 +67,7 @@ fn a_record_is_stored_used_given_back_and_there_after_a_power_cycle() {
     assert_eq!(bench.ask(&put(RECORD), |reply| format!("{reply:?}")), "Stored { sequence: 1 }");
     let nor = bench.off();
 
-    let mut bench = Bench::new(nor, SERIAL, Counting::default(), &mut fitting);
+    let mut bench = Bench::new(nor, SERIAL, Counting::default(), &mut memory);
     assert_eq!(state(&mut bench), RecordState::InUse);
     assert!(
         bench.ask(&Request::GetRecord, |reply| matches!(reply, Reply::Record(bytes) if *bytes == RECORD))
@@ -81,8 +81,8 @@ fn a_record_is_stored_used_given_back_and_there_after_a_power_cycle() {
 
 #[test]
 fn a_record_of_another_sensor_a_newer_format_or_with_damage_is_refused_and_changes_nothing() {
-    let mut fitting = BenchFitting::new();
-    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut fitting);
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
     assert_eq!(bench.ask(&put(RECORD), fault), None);
     assert_eq!(bench.ask(&put(&of_another()), fault), Some(Fault::OtherSensor));
     assert_eq!(bench.ask(&put(&newer()), fault), Some(Fault::NewerFormat));
@@ -97,12 +97,12 @@ fn a_record_of_another_sensor_a_newer_format_or_with_damage_is_refused_and_chang
 
 #[test]
 fn a_stored_record_of_another_sensor_is_kept_unused_until_it_is_to_be_replaced() {
-    let mut fitting = BenchFitting::new();
-    let mut bench = Bench::new(Nor::new(2), "00300018", Counting::default(), &mut fitting);
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), "00300018", Counting::default(), &mut memory);
     assert_eq!(bench.ask(&put(&of_another()), fault), None);
     let nor = bench.off();
     // The flash has moved to another board.
-    let mut bench = Bench::new(nor, SERIAL, Counting::default(), &mut fitting);
+    let mut bench = Bench::new(nor, SERIAL, Counting::default(), &mut memory);
     assert_eq!(state(&mut bench), RecordState::OtherSensor);
     assert_eq!(bench.ask(&put(RECORD), fault), Some(Fault::Occupied));
     let kept = of_another();
@@ -113,8 +113,8 @@ fn a_stored_record_of_another_sensor_is_kept_unused_until_it_is_to_be_replaced()
 
 #[test]
 fn a_request_that_comes_again_or_late_is_told_the_last_id_and_who_asks_the_next() {
-    let mut fitting = BenchFitting::new();
-    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut fitting);
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
     bench.send_as(7, &Request::Status);
     bench.send_as(7, &Request::Status);
     bench.send_as(3, &Request::Status);
@@ -171,12 +171,12 @@ fn feed(bench: &mut Bench<'_>, points: &[ShellPoint<f32>]) {
 
 #[test]
 fn a_fit_on_board_is_the_core_s_and_samples_are_corrected_meanwhile() {
-    let mut fitting = BenchFitting::new();
+    let mut memory = BenchMemory::new();
     let points = rests(40);
     let mut alone = LevenbergMarquardt::new(UPPER_TRIANGULAR.theta(&Triad::identity()), Default::default());
     alone.run(&NormModel { points: &points, norm: 9.80665, form: UPPER_TRIANGULAR });
 
-    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut fitting);
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
     assert_eq!(bench.ask(&put(RECORD), fault), None);
     assert_eq!(bench.ask(&Request::StartFit(task(FitModel::T9)), fault), None);
     feed(&mut bench, &points);
@@ -214,8 +214,8 @@ fn a_fit_on_board_is_the_core_s_and_samples_are_corrected_meanwhile() {
 
 #[test]
 fn too_few_rests_are_refused_on_board_and_the_calibration_stays() {
-    let mut fitting = BenchFitting::new();
-    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut fitting);
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
     assert_eq!(bench.ask(&put(RECORD), fault), None);
     assert_eq!(bench.ask(&Request::StartFit(task(FitModel::T9)), fault), None);
     feed(&mut bench, &rests(9));
@@ -232,9 +232,9 @@ fn too_few_rests_are_refused_on_board_and_the_calibration_stays() {
 
 #[test]
 fn a_stream_sends_every_so_many_samples_under_the_id_that_asked_for_it() {
-    let mut fitting = BenchFitting::new();
+    let mut memory = BenchMemory::new();
     let mut bench =
-        Bench::new(Nor::new(2), SERIAL, Counting { on: true, ..Counting::default() }, &mut fitting);
+        Bench::new(Nor::new(2), SERIAL, Counting { on: true, ..Counting::default() }, &mut memory);
     bench.send(&put(RECORD));
     let stream = bench.send(&Request::Stream { every: 3 });
     for _ in 0..400 {

@@ -1,5 +1,6 @@
 //! Messages to frames and back.
 
+use cobs::{DecodeResult, DecoderState};
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use serde::{Deserialize, Serialize};
 
@@ -106,16 +107,17 @@ impl Header {
 }
 
 /// Gathers bytes to frames, whatever comes: a frame that is too long is passed over to its end.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Receiver {
-    bytes: [u8; MAX_FRAME],
+    bytes: [u8; MAX_PLAIN],
     length: usize,
+    state: DecoderState,
     oversized: bool,
 }
 
 impl Default for Receiver {
     fn default() -> Self {
-        Self { bytes: [0; MAX_FRAME], length: 0, oversized: false }
+        Self { bytes: [0; MAX_PLAIN], length: 0, state: DecoderState::Idle, oversized: false }
     }
 }
 
@@ -123,31 +125,26 @@ impl Receiver {
     /// Takes one byte; a frame without COBS, or why there is none, once its end has come. Zeros between frames are
     /// passed over.
     pub fn push(&mut self, byte: u8) -> Option<Result<&[u8], FrameError>> {
-        if byte != 0 {
-            match self.bytes.get_mut(self.length) {
-                Some(slot) => {
-                    *slot = byte;
-                    self.length += 1;
-                }
-                None => self.oversized = true,
+        match self.state.feed(byte) {
+            Ok(DecodeResult::NoData) => None,
+            Ok(DecodeResult::DataStart) => {
+                (self.length, self.oversized) = (0, false);
+                None
             }
-            return None;
+            Ok(DecodeResult::DataContinue(decoded)) => {
+                match self.bytes.get_mut(self.length) {
+                    Some(slot) => {
+                        *slot = decoded;
+                        self.length += 1;
+                    }
+                    None => self.oversized = true,
+                }
+                None
+            }
+            Ok(DecodeResult::DataComplete) => Some(self.bytes.get(..self.length).ok_or(FrameError::Damaged)),
+            Err(_) => Some(Err(FrameError::Damaged)),
         }
-        let (length, oversized) = (self.length, self.oversized);
-        (self.length, self.oversized) = (0, false);
-        if oversized {
-            return Some(Err(FrameError::Oversized));
-        }
-        if length == 0 {
-            return None;
-        }
-        Some(self.decode(length))
-    }
-
-    fn decode(&mut self, length: usize) -> Result<&[u8], FrameError> {
-        let encoded = self.bytes.get_mut(..length).ok_or(FrameError::Damaged)?;
-        let decoded = cobs::decode_in_place(encoded).map_err(|_| FrameError::Damaged)?;
-        self.bytes.get(..decoded).ok_or(FrameError::Damaged)
+        .map(|frame| if self.oversized { Err(FrameError::Oversized) } else { frame })
     }
 }
 

@@ -27,25 +27,8 @@ impl<T: Scalar, const P: usize> Triangular<T, P> {
     /// Rotates one row into the factor.
     pub fn push(&mut self, residual: T, jacobian: &SVector<T, P>) {
         let mut row = *jacobian;
-        let mut rest = residual;
         self.squared_sum += residual * residual;
-        for k in 0..P {
-            let (Some(d), Some(x)) = (self.r.get((k, k)).copied(), row.get(k).copied()) else {
-                return;
-            };
-            let length = (d * d + x * x).root();
-            // Nothing to rotate, or both squares underflowed: below every rounding here.
-            if x == T::zero() || length == T::zero() {
-                continue;
-            }
-            let (cos, sin) = (d / length, x / length);
-            for (above, below) in self.r.row_mut(k).iter_mut().zip(row.iter_mut()).skip(k) {
-                (*above, *below) = (cos * *above + sin * *below, cos * *below - sin * *above);
-            }
-            if let Some(above) = self.q.get_mut(k) {
-                (*above, rest) = (cos * *above + sin * rest, cos * rest - sin * *above);
-            }
-        }
+        rotate_in(self.r.as_mut_slice(), self.q.as_mut_slice(), row.as_mut_slice(), residual);
     }
 
     /// Σ r² of the rows.
@@ -107,19 +90,52 @@ fn unit<T: Scalar, const P: usize>(k: usize, size: T) -> SVector<T, P> {
     unit
 }
 
+/// Rotates a row and its residual into a factor R, by columns, and q.
+///
+/// Over slices, out of line: one body serves every number of parameters.
+#[inline(never)]
+fn rotate_in<T: Scalar>(r: &mut [T], q: &mut [T], row: &mut [T], residual: T) {
+    let size = q.len();
+    let mut rest = residual;
+    for (k, q_k) in q.iter_mut().enumerate() {
+        // Row k of R from its diagonal on.
+        let above = r.iter_mut().skip(k * size + k).step_by(size);
+        let mut pairs = above.zip(row.iter_mut().skip(k));
+        let Some((d, x)) = pairs.next() else { return };
+        let length = (*d * *d + *x * *x).root();
+        // Nothing to rotate, or both squares underflowed: below every rounding here.
+        if *x == T::zero() || length == T::zero() {
+            continue;
+        }
+        let (cos, sin) = (*d / length, *x / length);
+        for (above, below) in core::iter::once((d, x)).chain(pairs) {
+            (*above, *below) = (cos * *above + sin * *below, cos * *below - sin * *above);
+        }
+        (*q_k, rest) = (cos * *q_k + sin * rest, cos * rest - sin * *q_k);
+    }
+}
+
 /// x with R x = y, R upper triangular; `None` where a pivot vanishes or the answer is not finite.
 pub(super) fn back_substitute<T: Scalar, const P: usize>(
     r: &SMatrix<T, P, P>,
     y: &SVector<T, P>,
 ) -> Option<SVector<T, P>> {
     let mut x = *y;
-    for k in (0..P).rev() {
-        let known: T = r.row(k).iter().zip(x.iter()).skip(k + 1).fold(T::zero(), |sum, (a, b)| sum + *a * *b);
-        let pivot = r.get((k, k)).copied().filter(|pivot| *pivot != T::zero())?;
-        let entry = x.get_mut(k)?;
+    substitute_back(r.as_slice(), x.as_mut_slice()).then_some(x)
+}
+
+/// The same over slices, R by columns, in place; false where there is no answer.
+#[inline(never)]
+fn substitute_back<T: Scalar>(r: &[T], x: &mut [T]) -> bool {
+    let size = x.len();
+    for k in (0..size).rev() {
+        let row = r.iter().skip(k).step_by(size);
+        let known: T = row.zip(x.iter()).skip(k + 1).fold(T::zero(), |sum, (a, b)| sum + *a * *b);
+        let pivot = r.get(k * size + k).copied().filter(|pivot| *pivot != T::zero());
+        let (Some(entry), Some(pivot)) = (x.get_mut(k), pivot) else { return false };
         *entry = (*entry - known) / pivot;
     }
-    x.iter().all(|value| value.finite()).then_some(x)
+    x.iter().all(|value| value.finite())
 }
 
 /// x with Rᵀ x = y, R upper triangular; `None` as above.
@@ -128,13 +144,21 @@ pub(super) fn solve_transposed<T: Scalar, const P: usize>(
     y: &SVector<T, P>,
 ) -> Option<SVector<T, P>> {
     let mut x = *y;
-    for k in 0..P {
-        let known: T = r.column(k).iter().zip(x.iter()).take(k).fold(T::zero(), |sum, (a, b)| sum + *a * *b);
-        let pivot = r.get((k, k)).copied().filter(|pivot| *pivot != T::zero())?;
-        let entry = x.get_mut(k)?;
+    substitute_transposed(r.as_slice(), x.as_mut_slice()).then_some(x)
+}
+
+/// The same over slices.
+#[inline(never)]
+fn substitute_transposed<T: Scalar>(r: &[T], x: &mut [T]) -> bool {
+    let size = x.len();
+    for k in 0..size {
+        let column = r.iter().skip(k * size);
+        let known: T = column.zip(x.iter()).take(k).fold(T::zero(), |sum, (a, b)| sum + *a * *b);
+        let pivot = r.get(k * size + k).copied().filter(|pivot| *pivot != T::zero());
+        let (Some(entry), Some(pivot)) = (x.get_mut(k), pivot) else { return false };
         *entry = (*entry - known) / pivot;
     }
-    x.iter().all(|value| value.finite()).then_some(x)
+    x.iter().all(|value| value.finite())
 }
 
 impl<T: Scalar, const P: usize> RowSink<T, P> for Triangular<T, P> {

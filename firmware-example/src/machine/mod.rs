@@ -1,0 +1,82 @@
+//! The emulated boards: their UART, their flash and their clock, behind the traits of [`crate::board`].
+//!
+//! | machine | core | UART | record's flash |
+//! | --- | --- | --- | --- |
+//! | `mps2-an386` | Cortex-M4F | CMSDK (Arm DDI 0479) | a window of the board's PSRAM under NOR rules, that a file backs |
+//! | `microbit` | Cortex-M0, soft float | nRF51 | the nRF51's own, by its NVMC; lost when QEMU ends |
+#![allow(unsafe_code)] // Registers, and memory that no variable owns.
+
+#[cfg(microbit)]
+mod microbit;
+#[cfg(mps2)]
+mod mps2;
+mod ticks;
+
+#[cfg(microbit)]
+pub use microbit::{Flash, Uart, idle};
+#[cfg(mps2)]
+pub use mps2::{Flash, Uart, idle};
+pub use ticks::Ticks;
+
+use crate::{
+    board::{Board, NoSensor},
+    coprocessor::Coprocessor,
+    fitting::Memory,
+};
+
+/// The fits that there is memory for.
+#[cfg(mps2)]
+pub type MachineMemory = Memory<256, 64, 64, 2048, 40>;
+/// The fits that there is memory for.
+#[cfg(microbit)]
+pub type MachineMemory = Memory<64, 16, 8, 48, 6>;
+
+/// Runs the co-processor on this machine, for ever.
+pub fn run(name: &str, serial: &str) -> ! {
+    static mut MEMORY: MachineMemory = MachineMemory::new();
+    // SAFETY: the entry point calls this once, and nothing else knows the variable.
+    let memory = unsafe { &mut *(&raw mut MEMORY) };
+    let unit = imucal_core::record::SensorIdentity {
+        name: name.parse().unwrap_or_default(),
+        serial: serial.parse().unwrap_or_default(),
+    };
+    let board = Board { link: Uart::start(), flash: Flash::new(), clock: Ticks::start(), sensors: NoSensor };
+    let mut coprocessor = Coprocessor::new(board, unit, memory);
+    loop {
+        if !coprocessor.poll() {
+            idle();
+        }
+    }
+}
+
+/// A register.
+#[derive(Clone, Copy, Debug)]
+struct Register(usize);
+
+impl Register {
+    fn read(self) -> u32 {
+        // SAFETY: addresses are those of the machine's registers, which are read without harm.
+        unsafe { (self.0 as *const u32).read_volatile() }
+    }
+
+    fn write(self, value: u32) {
+        // SAFETY: as above; what is written there is no memory of Rust's.
+        unsafe { (self.0 as *mut u32).write_volatile(value) }
+    }
+}
+
+/// Interrupts stay masked: one that is pending ends the wait, and is cleared by hand.
+const ENABLE: Register = Register(0xE000_E100);
+const CLEAR_PENDING: Register = Register(0xE000_E280);
+
+/// Lets an interrupt line end [`wait`].
+fn wake_by(line: u32) {
+    cortex_m::interrupt::disable();
+    ENABLE.write(1 << line);
+}
+
+/// Waits for an interrupt of that line; not at all, if one is pending.
+fn wait(line: u32) {
+    cortex_m::asm::wfi();
+    CLEAR_PENDING.write(1 << line);
+}
