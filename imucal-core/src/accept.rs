@@ -216,11 +216,10 @@ pub fn check_observations<T: Scalar>(
     if coverage.observations < limits.observations {
         return Err(Refusal::TooFewObservations { have: coverage.observations, need: limits.observations });
     }
-    let (share, flatness) = (coverage.share.wide(), coverage.flatness.wide());
-    if share < limits.coverage || flatness < limits.flatness {
+    if coverage.share < T::of(limits.coverage) || coverage.flatness < T::of(limits.flatness) {
         return Err(Refusal::PoorCoverage {
-            coverage: share,
-            flatness,
+            coverage: coverage.share.wide(),
+            flatness: coverage.flatness.wide(),
             need_coverage: limits.coverage,
             need_flatness: limits.flatness,
         });
@@ -242,8 +241,8 @@ pub fn check_report<T: Scalar>(report: &SolveReport<T>, limits: &Limits) -> Resu
         termination if !termination.was_successful() => return Err(Refusal::DidNotConverge { termination }),
         _ => {}
     }
-    let condition = report.condition.wide();
-    if condition > limits.condition {
+    if report.condition > T::of(limits.condition) {
+        let condition = report.condition.wide();
         return Err(Refusal::IllConditioned { condition, limit: limits.condition });
     }
     Ok(())
@@ -256,7 +255,7 @@ const ROUNDING_SHARE: f64 = 0.1;
 /// How far rounding moves the sum of squares: 2 Σ r e, with e the rounding of the terms that a residual is made of.
 fn rounding_of_cost<T: Scalar, const P: usize>(fit: &LevenbergMarquardt<T, P>, variance: T) -> T {
     let here = fit.factor().squared_sum();
-    let rows = here / variance + T::of(P as f64);
+    let rows = here / variance + T::whole(P as u32);
     let terms = fit.theta().component_mul(&fit.factor().column_norms()).norm_squared();
     (here * terms / rows).root() * T::EPSILON * T::of(2.0)
 }
@@ -304,9 +303,8 @@ pub fn nonlinearity<T: Scalar, const P: usize>(
 /// # Errors
 /// ill-conditioned, with the departure.
 pub fn check_nonlinearity<T: Scalar>(nonlinearity: T, limits: &Limits) -> Result<(), Refusal> {
-    let nonlinearity = nonlinearity.wide();
-    if nonlinearity > limits.nonlinearity {
-        return Err(Refusal::TooNonlinear { nonlinearity, limit: limits.nonlinearity });
+    if nonlinearity > T::of(limits.nonlinearity) {
+        return Err(Refusal::TooNonlinear { nonlinearity: nonlinearity.wide(), limit: limits.nonlinearity });
     }
     Ok(())
 }
@@ -325,23 +323,21 @@ pub fn check_plausibility<T: Scalar>(
     if !triad.is_finite() || !relative_rms.finite() {
         return Err(Refusal::NotFinite);
     }
-    let (least, most) = limits.gain;
-    let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+    let (least, most) = (T::of(limits.gain.0), T::of(limits.gain.1));
+    let (mut low, mut high) = (T::LARGEST, T::zero());
     for column in triad.gain.column_iter() {
-        let gain = libm::sqrt(column.norm_squared().wide());
-        low = low.min(gain);
-        high = high.max(gain);
-        if nominal && !(least..=most).contains(&gain) {
-            let limit = if gain < least { least } else { most };
-            return Err(Refusal::Implausible { what: Quantity::Gain, value: gain, limit });
+        let gain = column.norm_squared().root();
+        low = if gain < low { gain } else { low };
+        high = if gain > high { gain } else { high };
+        if nominal && !(gain >= least && gain <= most) {
+            let limit = if gain < least { limits.gain.0 } else { limits.gain.1 };
+            return Err(Refusal::Implausible { what: Quantity::Gain, value: gain.wide(), limit });
         }
     }
-    if high > most / least * low {
-        return Err(Refusal::Implausible {
-            what: Quantity::AxisRatio,
-            value: high / low,
-            limit: most / least,
-        });
+    let ratio = most / least;
+    if high > ratio * low {
+        let value = (high / low).wide();
+        return Err(Refusal::Implausible { what: Quantity::AxisRatio, value, limit: ratio.wide() });
     }
     check_residual(relative_rms, limits)
 }
@@ -351,11 +347,11 @@ pub fn check_plausibility<T: Scalar>(
 /// # Errors
 /// not-finite or implausible.
 pub fn check_residual<T: Scalar>(relative_rms: T, limits: &Limits) -> Result<(), Refusal> {
-    let value = relative_rms.wide();
     if !relative_rms.finite() {
         return Err(Refusal::NotFinite);
     }
-    if value > limits.rms {
+    if relative_rms > T::of(limits.rms) {
+        let value = relative_rms.wide();
         return Err(Refusal::Implausible { what: Quantity::Residual, value, limit: limits.rms });
     }
     Ok(())

@@ -33,7 +33,7 @@ impl<T: Scalar> Moments<T> {
     pub fn push(&mut self, sample: &Vector3<T>) {
         self.count = self.count.saturating_add(1);
         let before = sample - self.mean;
-        self.mean += before / T::of(f64::from(self.count));
+        self.mean += before / T::whole(self.count);
         self.squares += before.component_mul(&(sample - self.mean));
     }
 
@@ -52,7 +52,7 @@ impl<T: Scalar> Moments<T> {
         if self.count < 2 {
             return Vector3::zeros();
         }
-        self.squares / T::of(f64::from(self.count - 1))
+        self.squares / T::whole(self.count - 1)
     }
 }
 

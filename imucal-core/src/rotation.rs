@@ -12,7 +12,8 @@
 //! ```
 //!
 //! Below one radian the coefficients come from their power series (to φ¹⁶: the remainder is below 1e-15, see
-//! `series_and_closed_form_agree`), above from libm. Source: Rodrigues' formula; the derivative as in Chirikjian,
+//! `series_and_closed_form_agree`), above from those of half the angle: libm's sine takes double precision, which a
+//! device has to emulate. Source: Rodrigues' formula; the derivative as in Chirikjian,
 //! *Stochastic Models, Information Theory, and Lie Groups*, vol. 2, ch. 10; matrix to quaternion as in Shepperd 1978
 //! (J. Guidance and Control 1). Errors, largest entry over angles up to π, asserted by the tests:
 //!
@@ -97,10 +98,35 @@ fn coefficients<T: Scalar>(x: T) -> Coefficients<T> {
     } else if x < T::of(SERIES_LIMIT) {
         series_coefficients::<T, TERMS>(x)
     } else {
-        let angle = x.root();
-        let (sin, cos) = (angle.sin(), angle.cos());
-        Coefficients { a: sin / angle, b: (T::one() - cos) / x, c: (angle - sin) / (x * angle) }
+        doubled_coefficients(x)
     }
+}
+
+/// Halvings of an angle at the most: more have none left.
+const HALVINGS: u32 = 64;
+
+/// The coefficients of a larger angle, from those of its half, as often as need be: sin 2h = 2 sin h cos h.
+#[inline(never)]
+fn doubled_coefficients<T: Scalar>(x: T) -> Coefficients<T> {
+    let (mut small, mut halvings) = (x, 0);
+    while small >= T::of(SERIES_LIMIT) && halvings < HALVINGS {
+        small *= T::of(0.25);
+        halvings += 1;
+    }
+    let mut k = series_coefficients::<T, TERMS>(small);
+    for _ in 0..halvings {
+        let a = k.a * (T::one() - k.b * small);
+        small *= T::of(4.0);
+        k = Coefficients { a, b: k.a * k.a * T::of(0.5), c: (T::one() - a) / small };
+    }
+    k
+}
+
+/// Sine and cosine of an angle, rad, meant for small ones: half a dozen roundings more for each doubling beyond 1 rad.
+pub fn sin_cos<T: Scalar>(angle: T) -> (T, T) {
+    let x = angle * angle;
+    let k = coefficients(x);
+    (k.a * angle, T::one() - k.b * x)
 }
 
 /// `I + first · [φ]× + second · [φ]×²`, the square as φφᵀ − φ² I.

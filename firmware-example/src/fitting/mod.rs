@@ -312,7 +312,8 @@ impl<
         limits: Limits,
     ) -> Finished {
         let triad = form.triad(solver.theta());
-        let radius = task.norm / libm::cbrtf(triad.gain.determinant());
+        // Raw unit; that of a gain of the same size in all directions.
+        let radius = task.norm * libm::sqrtf(3.0 / triad.gain.norm_squared());
         let question = Question { seen: Seen::Points(&self.memory.seen.points), limits, radius, bend: true };
         let judgement = Judgement::of(solver, &norm_model(task, &self.memory.seen, form), &triad, &question);
         let std = form.triad(&errors(&judgement.covariance));

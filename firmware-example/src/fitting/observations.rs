@@ -57,9 +57,10 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
                 let point = ShellPoint { value: Vector3::from(*value), excess: *excess };
                 self.points.push(point).map_err(|_| Fault::Full)
             }
-            (FitModel::I14, Observation::Pose(value, angles)) => {
-                check(value.iter().chain(angles))?;
-                let pose = GimbalPose::new(Vector3::from(*value), &Vector3::from(*angles));
+            (FitModel::I14, Observation::Pose(value, sin, cos)) => {
+                check(value.iter().chain(sin).chain(cos))?;
+                let [value, sin, cos] = [value, sin, cos].map(|three| Vector3::from(*three));
+                let pose = GimbalPose::turned(value, sin, cos);
                 self.poses.push(pose).map_err(|_| Fault::Full)
             }
             (FitModel::K9 | FitModel::K12, Observation::Turn(before, after)) => {

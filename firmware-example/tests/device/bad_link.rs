@@ -44,7 +44,7 @@ fn request<'a>(rng: &mut ChaCha8Rng, records: &'a [Vec<u8>]) -> Request<'a> {
             let any = |rng: &mut ChaCha8Rng| [(); 3].map(|()| rng.random_range(-10.0..10.0));
             let observations = (0..rng.random_range(0..=BATCH))
                 .map(|_| match rng.random_range(0..4) {
-                    0 => Observation::Pose(any(rng), any(rng)),
+                    0 => Observation::Pose(any(rng), any(rng), any(rng)),
                     1 => Observation::Turn(any(rng), any(rng)),
                     2 => Observation::Block(any(rng), any(rng), any(rng), 0.1),
                     _ => Observation::Point(any(rng), 0.0),

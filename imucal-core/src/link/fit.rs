@@ -87,8 +87,8 @@ pub struct FitTask {
 pub enum Observation {
     /// Mean of a rest, or a sample of a field: value, and the distance outside the shell that is expected of it.
     Point([f32; 3], f32),
-    /// Mean of a rest on a rig, and the encoder angles, rad.
-    Pose([f32; 3], [f32; 3]),
+    /// Mean of a rest on a rig, and sines and cosines of the encoder angles, outermost first.
+    Pose([f32; 3], [f32; 3], [f32; 3]),
     /// The next turn: direction of the specific force before and after, unit vectors, calibrated axes.
     Turn([f32; 3], [f32; 3]),
     /// A block of the last turn: s0, s1, c and its duration, s ([`Block`]).

@@ -249,6 +249,6 @@ impl<T: Scalar, const P: usize> Cost<T, P> for AttitudeModel<'_, T, P> {
             pass.terms = pass.terms.saturating_add(1);
             pass.reference += 1;
         }
-        Some(pass.sum / T::of(f64::from(pass.terms)))
+        Some(pass.sum / T::whole(pass.terms))
     }
 }

@@ -62,6 +62,11 @@ impl<T: Scalar> GimbalPose<T> {
         Self { value, sin: angles.map(|a| a.sin()), cos: angles.map(|a| a.cos()) }
     }
 
+    /// A pose at the sines and cosines of its encoder angles.
+    pub fn turned(value: Vector3<T>, sin: Vector3<T>, cos: Vector3<T>) -> Self {
+        Self { value, sin, cos }
+    }
+
     /// Rotations between the rig's frames.
     pub fn rotations(&self, axes: &RigAxes) -> PoseRotations<T> {
         let [outer, middle, inner] = axes.0;

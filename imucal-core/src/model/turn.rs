@@ -136,7 +136,7 @@ impl<T: Scalar, const P: usize> Cost<T, P> for TurnModel<'_, T, P> {
             pass.block = 0;
             pass.attitude = Matrix3::identity();
         }
-        Some(pass.sum / T::of(self.turns.len() as f64))
+        Some(pass.sum / T::whole(self.turns.len() as u32))
     }
 }
 

@@ -27,7 +27,7 @@ use super::{
     parameterisation::{matrix_by_rows, select, vector},
     rig::{GimbalPose, PoseRotations, RigAxes},
 };
-use crate::scalar::Scalar;
+use crate::{rotation::sin_cos, scalar::Scalar};
 
 /// Entries of the unified model.
 pub const UNIFIED: usize = 32;
@@ -165,7 +165,7 @@ struct Tilt<T: Scalar> {
 
 impl<T: Scalar> Tilt<T> {
     fn new([alpha, beta]: [T; 2]) -> Self {
-        let (sa, ca, sb, cb) = (alpha.sin(), alpha.cos(), beta.sin(), beta.cos());
+        let ((sa, ca), (sb, cb)) = (sin_cos(alpha), sin_cos(beta));
         let o = T::zero();
         Self {
             c_n_p: Matrix3::new(cb, o, -sb, sa * sb, ca, sa * cb, ca * sb, -sa, ca * cb),
@@ -256,7 +256,7 @@ impl<T: Scalar, const P: usize> UnifiedModel<'_, T, P> {
         let mut by = ByAll::<T>::zeros();
         for (row, column) in slope.column_iter().enumerate() {
             for (k, component) in v.iter().enumerate() {
-                by.set_column(3 * row + k, &(column * *component));
+                by.set_column(3 * row + k, &column.map(|entry| entry * *component));
             }
         }
         let square = y.component_mul(&y);

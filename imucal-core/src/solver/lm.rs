@@ -245,7 +245,7 @@ impl<T: Scalar, const P: usize> LevenbergMarquardt<T, P> {
     /// Variance of a residual, from the cost and the degrees of freedom left; `None` without any.
     pub fn variance(&self) -> Option<T> {
         let freedom = self.independent_rows.checked_sub(P).filter(|n| *n > 0)?;
-        Some(self.factor.squared_sum() / T::of(freedom as f64))
+        Some(self.factor.squared_sum() / T::whole(freedom as u32))
     }
 
     /// Covariance of the parameters for residuals that are independent and of equal variance; `None` without

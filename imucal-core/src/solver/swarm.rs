@@ -81,8 +81,8 @@ impl Variant {
         match self {
             Self::Constriction => (T::of(0.7298), T::of(1.49618)),
             Self::LinearInertia => {
-                let share = f64::from(done) / f64::from(all.saturating_sub(1).max(1));
-                (T::of(0.9 - 0.5 * share), T::of(2.0))
+                let share = T::whole(done.into()) / T::whole(all.saturating_sub(1).max(1).into());
+                (T::of(0.9) - share * T::of(0.5), T::of(2.0))
             }
         }
     }
@@ -372,5 +372,5 @@ impl<T: Scalar, const P: usize> Particle<T, P> {
 /// draw alike.
 #[inline]
 pub fn uniform<T: Scalar>(rng: &mut impl Rng) -> T {
-    T::of(f64::from(rng.next_u32() >> 8)) * T::of(1.0 / 16_777_216.0)
+    T::whole(rng.next_u32() >> 8) * T::of(1.0 / 16_777_216.0)
 }
