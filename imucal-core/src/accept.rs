@@ -14,7 +14,10 @@ use crate::{
     coverage::Coverage,
     model::{Model, SquaredSum},
     scalar::Scalar,
-    solver::{LevenbergMarquardt, SolveReport, Termination, condition::weakest_direction},
+    solver::{
+        LevenbergMarquardt, SolveReport, Termination, condition::weakest_direction,
+        triangular::weighted_square,
+    },
     triad::Triad,
 };
 
@@ -256,7 +259,7 @@ const ROUNDING_SHARE: f64 = 0.1;
 fn rounding_of_cost<T: Scalar, const P: usize>(fit: &LevenbergMarquardt<T, P>, variance: T) -> T {
     let here = fit.factor().squared_sum();
     let rows = here / variance + T::whole(P as u32);
-    let terms = fit.theta().component_mul(&fit.factor().column_norms()).norm_squared();
+    let terms = weighted_square(fit.theta().as_slice(), fit.factor().column_norms().as_slice());
     (here * terms / rows).root() * T::EPSILON * T::of(2.0)
 }
 
@@ -282,7 +285,7 @@ pub fn nonlinearity<T: Scalar, const P: usize>(
         return T::LARGEST;
     };
     // Scaled so that the parabola rises by inflation² · variance.
-    let rise = (fit.factor().r() * unit).norm_squared().root();
+    let rise = fit.factor().length_of(&unit);
     let step: SVector<T, P> = unit * (variance.root() * inflation / rise);
     let expected = variance * inflation * inflation;
     if rounding_of_cost(fit, variance) > expected * T::of(ROUNDING_SHARE) {

@@ -44,6 +44,12 @@ pub fn cross_matrix<T: Scalar>(v: &Vector3<T>) -> Matrix3<T> {
     Matrix3::new(o, -v.z, v.y, v.z, o, -v.x, -v.y, v.x, o)
 }
 
+/// `a · b`, out of line: a product of 3×3 matrices takes 200 bytes wherever it is written out.
+#[inline(never)]
+pub fn product<T: Scalar>(a: &Matrix3<T>, b: &Matrix3<T>) -> Matrix3<T> {
+    a * b
+}
+
 /// The three coefficients a, b, c of the module's equations at a squared angle.
 #[derive(Clone, Copy, Debug)]
 struct Coefficients<T> {

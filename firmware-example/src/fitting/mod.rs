@@ -10,7 +10,7 @@ use imucal_core::{
     model::{
         Parameterisation,
         norm::curvature_excess,
-        parameterisation::{DIAGONAL, FULL, FULL_GAIN, UPPER_TRIANGULAR},
+        parameterisation::{FULL, UPPER_TRIANGULAR},
         turn::TurnPass,
         unified::UnifiedParameters,
     },
@@ -48,7 +48,6 @@ const REACH: (f32, f32, f32) = (0.2, 0.1, 0.262);
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one, and no heap")]
 enum Descent {
-    Six(LevenbergMarquardt<f32, 6>),
     Nine(LevenbergMarquardt<f32, 9>),
     Twelve(LevenbergMarquardt<f32, 12>),
     Fourteen(LevenbergMarquardt<f32, 14>),
@@ -185,7 +184,6 @@ impl<
         self.task?;
         let iterations = match &self.descent {
             None => 0,
-            Some(Descent::Six(solver)) => solver.iterations(),
             Some(Descent::Nine(solver)) => solver.iterations(),
             Some(Descent::Twelve(solver)) => solver.iterations(),
             Some(Descent::Fourteen(solver)) => solver.iterations(),
@@ -226,12 +224,8 @@ impl<
         let seen = &self.memory.seen;
         let stopped = match &mut self.descent {
             None => true,
-            Some(Descent::Six(solver)) => solver.step(&norm_model(task, seen, DIAGONAL)).is_some(),
             Some(Descent::Fourteen(solver)) => solver.step(&rig_model(task, seen)).is_some(),
             Some(Descent::Twelve(solver)) => seen.with_turns(FULL, |model| solver.step(model).is_some()),
-            Some(Descent::Nine(solver)) if task.model == FitModel::K9 => {
-                seen.with_turns(FULL_GAIN, |model| solver.step(model).is_some())
-            }
             Some(Descent::Nine(solver)) => solver.step(&norm_model(task, seen, UPPER_TRIANGULAR)).is_some(),
         };
         stopped && !self.refine(task)
@@ -265,15 +259,11 @@ impl<
             Descent::Nine(LevenbergMarquardt::new(form.theta(&triad), Default::default()))
         };
         self.descent = Some(match task.model {
-            FitModel::T6 => {
-                Descent::Six(LevenbergMarquardt::new(DIAGONAL.theta(&nominal), Default::default()))
-            }
             FitModel::I14 => {
                 let start = LEVELLED.theta(&UnifiedParameters { bias, ..level(task) });
                 Descent::Fourteen(LevenbergMarquardt::new(start, Default::default()))
             }
             FitModel::E9 => nine(UPPER_TRIANGULAR, Triad { bias: self.memory.seen.middle(), ..nominal }),
-            FitModel::K9 => nine(FULL_GAIN, nominal),
             FitModel::K12 => {
                 Descent::Twelve(LevenbergMarquardt::new(FULL.theta(&nominal), Default::default()))
             }
@@ -295,8 +285,6 @@ impl<
 
     fn judge(&self, task: &FitTask, descent: &Descent) -> Finished {
         match descent {
-            Descent::Six(solver) => self.judge_norm(task, solver, DIAGONAL, Limits::for_norm(6, 6)),
-            Descent::Nine(solver) if task.model == FitModel::K9 => self.judge_turns(task, solver, FULL_GAIN),
             Descent::Nine(solver) => self.judge_norm(task, solver, UPPER_TRIANGULAR, Limits::for_norm(9, 10)),
             Descent::Twelve(solver) => self.judge_turns(task, solver, FULL),
             Descent::Fourteen(solver) => self.judge_rig(task, solver),
@@ -327,14 +315,11 @@ impl<
         solver: &LevenbergMarquardt<f32, P>,
         form: Parameterisation<P>,
     ) -> Finished {
-        let mut triad = form.triad(solver.theta());
+        let triad = form.triad(solver.theta());
         let limits = Limits { rms: LARGEST_TURN, ..Limits::for_norm(9, LEAST_TURNS) };
         let question = Question { seen: Seen::Ends(&self.memory.seen.ends), limits, radius: 1.0, bend: true };
         let judgement =
             self.memory.seen.with_turns(form, |model| Judgement::of(solver, model, &triad, &question));
-        if task.model == FitModel::K9 {
-            triad.bias = Vector3::from(task.bias);
-        }
         let std = form.triad(&errors(&judgement.covariance));
         finished(task, solver.theta(), &judgement, &triad, &std)
     }

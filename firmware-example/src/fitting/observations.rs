@@ -52,7 +52,7 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
     /// Takes one observation, if it suits the model.
     pub(super) fn take(&mut self, model: FitModel, observation: &Observation) -> Result<(), Fault> {
         match (model, observation) {
-            (FitModel::T9 | FitModel::T6 | FitModel::E9, Observation::Point(value, excess)) => {
+            (FitModel::T9 | FitModel::E9, Observation::Point(value, excess)) => {
                 check(value.iter().chain([excess]))?;
                 let point = ShellPoint { value: Vector3::from(*value), excess: *excess };
                 self.points.push(point).map_err(|_| Fault::Full)
@@ -63,11 +63,11 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
                 let pose = GimbalPose::turned(value, sin, cos);
                 self.poses.push(pose).map_err(|_| Fault::Full)
             }
-            (FitModel::K9 | FitModel::K12, Observation::Turn(before, after)) => {
+            (FitModel::K12, Observation::Turn(before, after)) => {
                 check(before.iter().chain(after))?;
                 self.turn(Vector3::from(*before), Vector3::from(*after))
             }
-            (FitModel::K9 | FitModel::K12, Observation::Block(s0, s1, c, duration)) => {
+            (FitModel::K12, Observation::Block(s0, s1, c, duration)) => {
                 check(s0.iter().chain(s1).chain(c).chain([duration]))?;
                 let block = Block { s0: Vector3::from(*s0), s1: Vector3::from(*s1), c: Vector3::from(*c) };
                 self.block(block, *duration)

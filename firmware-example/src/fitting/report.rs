@@ -49,20 +49,25 @@ pub(super) fn inverse_errors(gain: &Matrix3<f32>, covariance: &Option<SMatrix<f3
     std
 }
 
+/// A list of what there is room for: one that is extended beyond its room panics.
+fn list<'a, const N: usize>(figures: impl Iterator<Item = &'a f32>) -> Vec<f32, N> {
+    let mut list = Vec::new();
+    for figure in figures {
+        let _room = list.push(*figure);
+    }
+    list
+}
+
+/// Columns from the top to the diagonal.
+#[inline(never)]
+fn upper(matrix: &[f32], size: usize) -> Vec<f32, MOST_COVARIANCE> {
+    let columns = matrix.chunks_exact(size.max(1)).enumerate();
+    list(columns.flat_map(|(k, column)| column.iter().take(k + 1)))
+}
+
 fn report<const P: usize>(model: FitModel, theta: &SVector<f32, P>, judgement: &Judgement<P>) -> FitReport {
-    let mut covariance = Vec::<f32, MOST_COVARIANCE>::new();
-    if let Some(matrix) = &judgement.covariance {
-        // No larger than the largest: a heapless list that is extended beyond its room panics.
-        for (k, column) in matrix.column_iter().enumerate() {
-            for entry in column.iter().take(k + 1) {
-                let _room = covariance.push(*entry);
-            }
-        }
-    }
-    let mut parameters = Vec::new();
-    for entry in theta {
-        let _room = parameters.push(*entry);
-    }
+    let covariance =
+        judgement.covariance.as_ref().map_or_else(Vec::new, |matrix| upper(matrix.as_slice(), P));
     let report = &judgement.report;
     FitReport {
         model,
@@ -76,7 +81,7 @@ fn report<const P: usize>(model: FitModel, theta: &SVector<f32, P>, judgement: &
         nonlinearity: judgement.nonlinearity,
         coverage: judgement.coverage.share,
         refusal: judgement.verdict.err(),
-        theta: parameters,
+        theta: list(theta.as_slice().iter()),
         covariance,
     }
 }

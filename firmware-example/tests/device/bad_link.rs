@@ -39,7 +39,7 @@ fn request<'a>(rng: &mut ChaCha8Rng, records: &'a [Vec<u8>]) -> Request<'a> {
             let raw = (0..rng.random_range(0..48)).map(|_| [rng.random(), rng.random(), f32::NAN]).collect();
             Request::Correct { sensor: Sensor::Accelerometer, temperature: 20.0, raw }
         }
-        6 => Request::StartFit(session::task(FitModel::ALL[rng.random_range(0..6)])),
+        6 => Request::StartFit(session::task(FitModel::ALL[rng.random_range(0..4)])),
         7 | 8 => {
             let any = |rng: &mut ChaCha8Rng| [(); 3].map(|()| rng.random_range(-10.0..10.0));
             let observations = (0..rng.random_range(0..=BATCH))

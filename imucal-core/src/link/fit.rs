@@ -22,28 +22,24 @@ pub const MOST_COVARIANCE: usize = MOST_PARAMETERS * (MOST_PARAMETERS + 1) / 2;
 pub enum FitModel {
     /// Accelerometer, upper triangular gain and bias, from rests.
     T9,
-    /// Accelerometer, diagonal gain and bias, from rests on six faces.
-    T6,
     /// Accelerometer, full gain and bias and the base's levelling, from rests on a rig.
     I14,
     /// Magnetometer, an ellipsoid, from single samples.
     E9,
-    /// Gyroscope, full gain, from turns between rests whose blocks are taken less the bias of the task.
-    K9,
     /// Gyroscope, full gain and bias, from turns between rests.
     K12,
 }
 
 impl FitModel {
     /// All, in the order of the messages.
-    pub const ALL: [Self; 6] = [Self::T9, Self::T6, Self::I14, Self::E9, Self::K9, Self::K12];
+    pub const ALL: [Self; 4] = [Self::T9, Self::I14, Self::E9, Self::K12];
 
     /// The sensor it calibrates.
     pub fn sensor(self) -> Sensor {
         match self {
-            Self::T9 | Self::T6 | Self::I14 => Sensor::Accelerometer,
+            Self::T9 | Self::I14 => Sensor::Accelerometer,
             Self::E9 => Sensor::Magnetometer,
-            Self::K9 | Self::K12 => Sensor::Gyroscope,
+            Self::K12 => Sensor::Gyroscope,
         }
     }
 
@@ -51,10 +47,8 @@ impl FitModel {
     pub fn name(self) -> &'static str {
         match self {
             Self::T9 => "T9",
-            Self::T6 => "T6",
             Self::I14 => "I14",
             Self::E9 => "E9",
-            Self::K9 => "K9",
             Self::K12 => "K12",
         }
     }
@@ -77,7 +71,7 @@ pub struct FitTask {
     pub offset: f32,
     /// See `offset`.
     pub per_unit: f32,
-    /// Search with a swarm of this seed before descending: of K12 alone.
+    /// Search with a swarm of this seed before descending: of a gyroscope alone.
     pub search: Option<u64>,
 }
 

@@ -153,6 +153,7 @@ impl<T: Scalar> Derivative<T> {
 }
 
 impl<T: Scalar, const P: usize> Model<T, P> for AttitudeModel<'_, T, P> {
+    #[inline(never)]
     fn rows<S: RowSink<T, P>>(&self, theta: &SVector<T, P>, sink: &mut S) {
         let gyroscope = Gyroscope::new(&self.form, theta);
         for motion in self.motions {

@@ -23,7 +23,12 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::parameterisation::ENTRIES;
-use crate::{observation::Block, rotation::cross_matrix, scalar::Scalar, triad::Triad};
+use crate::{
+    observation::Block,
+    rotation::{cross_matrix, product},
+    scalar::Scalar,
+    triad::Triad,
+};
 
 /// Derivative of a rotation vector by the twelve entries of a triad.
 pub(super) type ByEntries<T> = SMatrix<T, 3, ENTRIES>;
@@ -129,7 +134,9 @@ impl<T: Scalar> DerivativeSums<T> {
         let [x, y, z] = columns(gain);
         let [cx, cy, cz] = [x, y, z].map(|c| cross_matrix(&c));
         let [kx, ky, kz] = self.coning;
-        let by_cofactor = [ky * cz - kz * cy, kz * cx - kx * cz, kx * cy - ky * cx];
+        let commuted = |a, y, b, x| product(a, y) - product(b, x);
+        let by_cofactor =
+            [commuted(&ky, &cz, &kz, &cy), commuted(&kz, &cx, &kx, &cz), commuted(&kx, &cy, &ky, &cx)];
         let mut by = ByEntries::zeros();
         for (column, (angle, cofactor)) in self.angle.iter().zip(by_cofactor.iter()).enumerate() {
             let part = angle + cofactor;
@@ -139,10 +146,9 @@ impl<T: Scalar> DerivativeSums<T> {
         }
         let cofactor = BlockRotation::cofactor(gain);
         let [mx, my, mz] = self.moment;
-        let moment = mx * cofactor * cross_matrix(&Vector3::x())
-            + my * cofactor * cross_matrix(&Vector3::y())
-            + mz * cofactor * cross_matrix(&Vector3::z());
-        by.fixed_columns_mut::<3>(9).copy_from(&(-(self.time * gain) - moment * T::of(0.5)));
+        let across = |m, axis| product(&product(m, &cofactor), &cross_matrix(&axis));
+        let moment = across(&mx, Vector3::x()) + across(&my, Vector3::y()) + across(&mz, Vector3::z());
+        by.fixed_columns_mut::<3>(9).copy_from(&(-product(&self.time, gain) - moment * T::of(0.5)));
         by
     }
 }

@@ -15,7 +15,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::scalar::Scalar;
+use crate::{rotation::product, scalar::Scalar};
 
 /// An axis of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,8 +73,12 @@ impl<T: Scalar> GimbalPose<T> {
         let r_0 = about(outer, self.sin.x, self.cos.x);
         let r_1 = about(middle, self.sin.y, self.cos.y);
         let r_2 = about(inner, self.sin.z, self.cos.z);
-        let c_t_o = r_1 * r_2;
-        PoseRotations { c_p_t: (r_0 * c_t_o).transpose(), c_o_t: c_t_o.transpose(), c_m_t: r_2.transpose() }
+        let c_t_o = product(&r_1, &r_2);
+        PoseRotations {
+            c_p_t: product(&r_0, &c_t_o).transpose(),
+            c_o_t: c_t_o.transpose(),
+            c_m_t: r_2.transpose(),
+        }
     }
 }
 

@@ -26,7 +26,7 @@ use super::{
 };
 use crate::{
     observation::Turn,
-    rotation::{cross_matrix, exp, exp_with_jacobian},
+    rotation::{cross_matrix, exp, exp_with_jacobian, product},
     scalar::Scalar,
     triad::Triad,
 };
@@ -61,13 +61,14 @@ fn attitude_with_derivative<T: Scalar>(triad: &Triad<T>, turn: &Turn<'_, T>) -> 
         let duration = turn.durations.get(index);
         let (angle, coning) = reduce(&triad.bias, block, duration);
         let (step, jacobian) = exp_with_jacobian(&rotation.vector(block, duration, &still));
-        sums.add(&(c * jacobian), &angle, &coning, block, duration);
-        c *= step;
+        sums.add(&product(&c, &jacobian), &angle, &coning, block, duration);
+        c = product(&c, &step);
     }
     (c, sums.by_entries(&triad.gain))
 }
 
 impl<T: Scalar, const P: usize> Model<T, P> for TurnModel<'_, T, P> {
+    #[inline(never)]
     fn rows<S: RowSink<T, P>>(&self, theta: &SVector<T, P>, sink: &mut S) {
         let triad = self.form.triad(theta);
         for turn in self.turns {

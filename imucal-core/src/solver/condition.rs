@@ -5,7 +5,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::triangular::{back_substitute, solve_transposed};
+use super::triangular::{dot, substitute_back, substitute_transposed};
 use crate::scalar::Scalar;
 
 /// Sweeps over all pairs; nine parameters need five or six.
@@ -24,7 +24,7 @@ pub fn normalised_condition<T: Scalar, const P: usize>(a: &SMatrix<T, P, P>) -> 
 #[inline(never)]
 fn condition_of<T: Scalar>(columns: &mut [T], size: usize) -> T {
     for column in columns.chunks_exact_mut(size.max(1)) {
-        let length = squared_length(column).root();
+        let length = dot(column, column).root();
         if length <= T::zero() || !length.finite() {
             return T::LARGEST;
         }
@@ -33,15 +33,11 @@ fn condition_of<T: Scalar>(columns: &mut [T], size: usize) -> T {
     orthogonalise_all(columns, size);
     let (mut least, mut most) = (T::LARGEST, T::zero());
     for column in columns.chunks_exact(size.max(1)) {
-        let value = squared_length(column).root();
+        let value = dot(column, column).root();
         least = if value < least { value } else { least };
         most = if value > most { value } else { most };
     }
     if least > T::zero() && most.finite() { most / least } else { T::LARGEST }
-}
-
-fn squared_length<T: Scalar>(column: &[T]) -> T {
-    column.iter().fold(T::zero(), |sum, entry| sum + *entry * *entry)
 }
 
 /// The unit vector along which `|R x|` with columns at unit length is least: the combination of parameters that
@@ -51,17 +47,27 @@ fn squared_length<T: Scalar>(column: &[T]) -> T {
 pub fn weakest_direction<T: Scalar, const P: usize>(r: &SMatrix<T, P, P>) -> Option<SVector<T, P>> {
     let mut unit = *r;
     let mut lengths = SVector::<T, P>::zeros();
-    for (mut column, length) in unit.column_iter_mut().zip(lengths.iter_mut()) {
-        *length = column.norm_squared().root();
-        column /= *length;
-    }
     let mut direction = SVector::<T, P>::repeat(T::one());
-    for _ in 0..ROUNDS {
-        let image = solve_transposed(&unit, &direction)?;
-        direction = back_substitute(&unit, &image)?;
-        direction /= direction.norm_squared().root();
+    weaken(unit.as_mut_slice(), lengths.as_mut_slice(), direction.as_mut_slice()).then_some(direction)
+}
+
+/// The same over slices, R by columns, which it uses up; false where R is singular.
+#[inline(never)]
+fn weaken<T: Scalar>(unit: &mut [T], lengths: &mut [T], direction: &mut [T]) -> bool {
+    let size = direction.len().max(1);
+    for (column, length) in unit.chunks_exact_mut(size).zip(lengths.iter_mut()) {
+        *length = dot(column, column).root();
+        column.iter_mut().for_each(|entry| *entry /= *length);
     }
-    Some(direction.component_div(&lengths))
+    for _ in 0..ROUNDS {
+        if !substitute_transposed(unit, direction) || !substitute_back(unit, direction) {
+            return false;
+        }
+        let length = dot(direction, direction).root();
+        direction.iter_mut().for_each(|entry| *entry /= length);
+    }
+    direction.iter_mut().zip(lengths).for_each(|(entry, length)| *entry /= *length);
+    true
 }
 
 /// Turns columns until their lengths are the singular values.
