@@ -115,7 +115,8 @@ impl<const P: usize> Judgement<P> {
 
     /// The calibration, as the record has it; the figures of quality are this fit's.
     pub fn record(&self, triad: &Triad<f32>, std: &Triad<f32>, model: &str, unit: &Unit) -> TriadRecord {
-        let (triad, std) = (triad.in_unit(unit.offset, unit.per_unit), std.in_unit(0.0, unit.per_unit));
+        let (triad, std) =
+            (triad.in_unit(unit.offset, unit.per_unit), std.in_unit(0.0, libm::fabsf(unit.per_unit)));
         TriadRecord {
             gain: rows(&triad.gain),
             bias: triad.bias.into(),
@@ -147,7 +148,7 @@ pub struct Unit {
     pub calibrated: RawUnit,
     /// See above.
     pub offset: f32,
-    /// See above; positive.
+    /// See above; not zero.
     pub per_unit: f32,
 }
 

@@ -152,7 +152,7 @@ impl<
     pub fn begin(&mut self, task: FitTask) -> Result<(), Fault> {
         let finite = [task.norm, task.offset, task.per_unit].iter().chain(&task.bias).all(|x| x.is_finite());
         let sized = task.model.sensor() == Sensor::Gyroscope || task.norm > 0.0;
-        if !finite || !sized || task.per_unit <= 0.0 || rig_axes(&task).is_none() {
+        if !finite || !sized || task.per_unit == 0.0 || rig_axes(&task).is_none() {
             return Err(Fault::Malformed);
         }
         if task.search.is_some() && (PARTICLES == 0 || task.model != FitModel::K12) {
@@ -265,7 +265,7 @@ impl<
             }
             FitModel::E9 => nine(UPPER_TRIANGULAR, Triad { bias: self.memory.seen.middle(), ..nominal }),
             FitModel::K12 => {
-                Descent::Twelve(LevenbergMarquardt::new(FULL.theta(&nominal), Default::default()))
+                Descent::Twelve(LevenbergMarquardt::new(FULL.theta(&Triad::identity()), Default::default()))
             }
             _ => nine(UPPER_TRIANGULAR, nominal),
         });
@@ -320,8 +320,10 @@ impl<
         let question = Question { seen: Seen::Ends(&self.memory.seen.ends), limits, radius: 1.0, bend: true };
         let judgement =
             self.memory.seen.with_turns(form, |model| Judgement::of(solver, model, &triad, &question));
+        // The blocks were made less the bias of the task.
+        let whole = Triad { bias: triad.bias + Vector3::from(task.bias), ..triad };
         let std = form.triad(&errors(&judgement.covariance));
-        finished(task, solver.theta(), &judgement, &triad, &std)
+        finished(task, solver.theta(), &judgement, &whole, &std)
     }
 
     #[inline(never)]

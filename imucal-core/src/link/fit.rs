@@ -63,7 +63,7 @@ pub struct FitTask {
     pub norm: f32,
     /// Rig axes, outermost first, 0 to 2: of I14 alone.
     pub axes: [u8; 3],
-    /// Bias to start from, nominal SI; zero, or for a gyroscope what it puts out at rest.
+    /// Bias to start from, nominal SI. Of a gyroscope, what its blocks were made less of: the fit adds what is left.
     pub bias: [f32; 3],
     /// Unit of the raw samples that the calibration is for.
     pub unit_in: RawUnit,
