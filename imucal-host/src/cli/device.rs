@@ -226,8 +226,7 @@ fn fit(arguments: &Calibrate) -> anyhow::Result<Ending> {
     let today = Date::from_unix(std::time::UNIX_EPOCH.elapsed()?.as_secs());
     let (mut accepted, mut equal) = (0, true);
     for outcome in &calibration.sensors {
-        let points = usize::from(session.identity().capacity.points);
-        let Some(mut fit) = BoardFit::of(outcome, points) else { continue };
+        let Some(mut fit) = BoardFit::of(outcome, &session.identity().capacity) else { continue };
         fit.task.search = arguments.search.filter(|_| outcome.kind == SensorKind::Gyr);
         let report = session.fit(&fit, today)?;
         accepted += u32::from(report.refusal.is_none());
@@ -265,9 +264,10 @@ fn print(
         let std = report.covariance.get(k * (k + 3) / 2).map_or(f32::NAN, |variance| variance.sqrt());
         say!("  parameter {:>2}  {value:>14.8} ± {std:.1e}", k + 1);
     }
-    let Some((theta, covariance)) = fit.here() else { return Ok(true) };
-    let bits = |figures: &[f32]| figures.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-    let equal = bits(&theta) == bits(&report.theta) && bits(&covariance) == bits(&report.covariance);
-    say!("  the same fit here: {}", if equal { "equal bit for bit" } else { "DIFFERENT" });
-    Ok(equal)
+    let equal = fit.is_here(report);
+    match equal {
+        Some(equal) => say!("  the same fit here: {}", if equal { "equal bit for bit" } else { "DIFFERENT" }),
+        None => say!("  searched by the device's own generator: not made again here"),
+    }
+    Ok(equal.unwrap_or(true))
 }
