@@ -8,7 +8,9 @@
 //! | `replay` | reads the record, corrects the samples, prints the bits; on a host it prints the host's |
 //! | `gate` | calls everything a device may want of the core |
 //! | `correct` | reads the record and corrects a sample: the least a device does |
-//! | `fit` | fits all sensors, judges the fits and writes a record, prints the bits as `replay` does |
+//! | `fit` | fits every model to simulated sets, judges the fits and writes records, prints the bits as `replay` does |
+//! | `fits` | reads a record, corrects, fits every model and packs a record, without text: what that takes of flash |
+//! | `cost` | prints what parts of the core take: instructions and stack |
 //! | `coprocessor` | keeps a record, corrects, fits and stores, at the end of a UART |
 //! | `empty` | start-up code and the record's bytes, to compare the size of `correct` with |
 #![no_std]
@@ -18,6 +20,9 @@ pub mod board;
 pub mod console;
 pub mod coprocessor;
 pub mod correct;
+#[cfg(target_os = "none")]
+pub mod cost;
+pub mod drill;
 pub mod fit;
 pub mod fitting;
 #[cfg(target_os = "none")]

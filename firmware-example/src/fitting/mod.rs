@@ -34,7 +34,7 @@ use report::{errors, finished, inverse_errors};
 use crate::judgement::{Judgement, Question, Seen};
 
 /// Blocks of a swarm's cost in one slice.
-pub const SLICE: usize = 256;
+pub const SLICE: usize = 384;
 /// Poses at least: the affine part has twelve parameters, and each pose tells three.
 const LEAST_POSES: usize = 6;
 /// Turns at least.

@@ -10,12 +10,14 @@
 mod microbit;
 #[cfg(mps2)]
 mod mps2;
+mod stopwatch;
 mod ticks;
 
 #[cfg(microbit)]
 pub use microbit::{Flash, Uart, idle};
 #[cfg(mps2)]
 pub use mps2::{Flash, Uart, idle};
+pub use stopwatch::Stopwatch;
 pub use ticks::Ticks;
 
 use crate::{

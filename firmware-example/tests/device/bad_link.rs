@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use firmware_example::RECORD;
+use firmware_example::{RECORD, drill};
 use imucal_core::{
     link::{BATCH, Fault, FitModel, MAX_FRAME, Observation, RecordState, Reply, Request, Values, encode},
     record::{self, Date, Sensor},
@@ -13,7 +13,6 @@ use rand_chacha::ChaCha8Rng;
 use crate::{
     bench::{Bench, BenchMemory, Counting, SERIAL},
     nor::Nor,
-    session,
 };
 
 /// Records that differ in their date.
@@ -39,7 +38,7 @@ fn request<'a>(rng: &mut ChaCha8Rng, records: &'a [Vec<u8>]) -> Request<'a> {
             let raw = (0..rng.random_range(0..48)).map(|_| [rng.random(), rng.random(), f32::NAN]).collect();
             Request::Correct { sensor: Sensor::Accelerometer, temperature: 20.0, raw }
         }
-        6 => Request::StartFit(session::task(FitModel::ALL[rng.random_range(0..4)])),
+        6 => Request::StartFit(drill::task(FitModel::ALL[rng.random_range(0..4)])),
         7 | 8 => {
             let any = |rng: &mut ChaCha8Rng| [(); 3].map(|()| rng.random_range(-10.0..10.0));
             let observations = (0..rng.random_range(0..=BATCH))

@@ -1,12 +1,12 @@
 //! What a host may do with a co-processor, in peace.
 
-use firmware_example::{RECORD, scene};
+use firmware_example::{RECORD, drill, scene::Noise};
 use imucal_core::{
     corrector::Corrector,
-    link::{BATCH, Fault, FitModel, FitTask, Observation, RecordState, Reply, Request, Values},
+    link::{BATCH, Fault, FitModel, Observation, RecordState, Reply, Request, Values},
     model::{norm::NormModel, parameterisation::UPPER_TRIANGULAR},
     observation::ShellPoint,
-    record::{self, Date, RawUnit, Sensor},
+    record::{self, Date, Sensor},
     solver::LevenbergMarquardt,
     triad::Triad,
 };
@@ -137,22 +137,12 @@ fn a_request_that_comes_again_or_late_is_told_the_last_id_and_who_asks_the_next(
 }
 
 fn rests(count: usize) -> Vec<ShellPoint<f32>> {
-    let mut points = vec![ShellPoint::new(Vector3::zeros()); count];
-    scene::accelerometer().rests(&mut points, 9.80665, &mut scene::Noise(1));
+    let mut points = Vec::new();
+    drill::observe(FitModel::T9, count, &mut Noise(1), |observation| match observation {
+        Observation::Point(value, _) => points.push(ShellPoint::new(Vector3::from(value))),
+        other => panic!("{other:?}"),
+    });
     points
-}
-
-pub fn task(model: FitModel) -> FitTask {
-    FitTask {
-        model,
-        norm: 9.80665,
-        axes: [2, 1, 0],
-        bias: [0.0; 3],
-        unit_in: RawUnit::MetrePerSecondSquared,
-        offset: 0.0,
-        per_unit: 1.0,
-        search: None,
-    }
 }
 
 fn feed(bench: &mut Bench<'_>, points: &[ShellPoint<f32>]) {
@@ -178,7 +168,7 @@ fn a_fit_on_board_is_the_core_s_and_samples_are_corrected_meanwhile() {
 
     let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
     assert_eq!(bench.ask(&put(RECORD), fault), None);
-    assert_eq!(bench.ask(&Request::StartFit(task(FitModel::T9)), fault), None);
+    assert_eq!(bench.ask(&Request::StartFit(drill::task(FitModel::T9)), fault), None);
     feed(&mut bench, &points);
     assert_eq!(bench.ask(&Request::FinishFit { date: Date::from_days(1) }, fault), Some(Fault::NotReady));
     let step = bench.send(&Request::StepFit { slices: u16::MAX });
@@ -217,7 +207,7 @@ fn too_few_rests_are_refused_on_board_and_the_calibration_stays() {
     let mut memory = BenchMemory::new();
     let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
     assert_eq!(bench.ask(&put(RECORD), fault), None);
-    assert_eq!(bench.ask(&Request::StartFit(task(FitModel::T9)), fault), None);
+    assert_eq!(bench.ask(&Request::StartFit(drill::task(FitModel::T9)), fault), None);
     feed(&mut bench, &rests(9));
     assert_eq!(bench.ask(&Request::StepFit { slices: u16::MAX }, fault), None);
     let reason = bench.ask(&Request::FinishFit { date: Date::from_days(1) }, |reply| match reply {

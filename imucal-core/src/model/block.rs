@@ -25,7 +25,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use super::parameterisation::ENTRIES;
 use crate::{
     observation::Block,
-    rotation::{cross_matrix, product},
+    rotation::{cross_matrix, image, product},
     scalar::Scalar,
     triad::Triad,
 };
@@ -59,8 +59,16 @@ impl<T: Scalar> BlockRotation<T> {
     /// φ of the module's first equation, less what stands still: v.
     #[inline]
     pub(super) fn vector(&self, block: &Block<T>, duration: T, still: &Vector3<T>) -> Vector3<T> {
-        let swing = self.cofactor * block.c - (self.gain * block.s1).cross(still);
-        self.gain * block.s0 - still * duration + swing * T::of(0.5)
+        // By components, for the same reason as `image`.
+        let (s, v) = (block, still);
+        let (angle, moment, coning) =
+            (image(&self.gain, &s.s0), image(&self.gain, &s.s1), image(&self.cofactor, &s.c));
+        let half = T::of(0.5);
+        Vector3::new(
+            angle.x - v.x * duration + (coning.x - (moment.y * v.z - moment.z * v.y)) * half,
+            angle.y - v.y * duration + (coning.y - (moment.z * v.x - moment.x * v.z)) * half,
+            angle.z - v.z * duration + (coning.z - (moment.x * v.y - moment.y * v.x)) * half,
+        )
     }
 
     /// Derivative of φ by the bias: −T A − ½ cof(A) \[s1\]×.

@@ -26,7 +26,7 @@ use super::{
 };
 use crate::{
     observation::Turn,
-    rotation::{cross_matrix, exp, exp_with_jacobian, product},
+    rotation::{self, cross_matrix, exp_with_jacobian, product},
     scalar::Scalar,
     triad::Triad,
 };
@@ -43,10 +43,10 @@ pub struct TurnModel<'a, T: Scalar, const P: usize> {
 /// `C_after_before`: the attitude after the turn, as the product of its blocks.
 pub fn attitude<T: Scalar>(triad: &Triad<T>, turn: &Turn<'_, T>) -> Matrix3<T> {
     let mut c = Matrix3::identity();
-    let rotation = BlockRotation::new(triad);
+    let blocks = BlockRotation::new(triad);
     let still = triad.gain * triad.bias;
     for (index, block) in turn.blocks.iter().enumerate() {
-        c *= exp(&rotation.vector(block, turn.durations.get(index), &still));
+        rotation::turn(&mut c, &blocks.vector(block, turn.durations.get(index), &still));
     }
     c
 }
@@ -125,7 +125,8 @@ impl<T: Scalar, const P: usize> Cost<T, P> for TurnModel<'_, T, P> {
         while let Some(turn) = self.turns.get(pass.turn) {
             let until = turn.blocks.len().min(pass.block.saturating_add(*budget));
             for (index, block) in turn.blocks.iter().enumerate().take(until).skip(pass.block) {
-                pass.attitude *= exp(&pass.rotation.vector(block, turn.durations.get(index), &pass.still));
+                let angle = pass.rotation.vector(block, turn.durations.get(index), &pass.still);
+                rotation::turn(&mut pass.attitude, &angle);
             }
             *budget = budget.saturating_sub(until.saturating_sub(pass.block));
             pass.block = until;
@@ -147,6 +148,7 @@ mod tests {
     use crate::{
         model::parameterisation::{FULL, FULL_GAIN},
         observation::{Block, BlockBuilder, Durations},
+        rotation::exp,
         solver::jacobian_check::largest_jacobian_error,
     };
     use proptest::prelude::*;
