@@ -9,7 +9,7 @@ use imucal_core::{
     solver::{LevenbergMarquardt, SolveReport},
     triad::Triad,
 };
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 /// What the fit has seen.
 #[derive(Clone, Copy, Debug)]
@@ -68,55 +68,57 @@ pub struct Question<'a> {
     pub bend: bool,
 }
 
-/// The answer.
+/// The answer, but for what has the parameters' size: one body makes records and reports of all models.
 #[derive(Clone, Copy, Debug)]
-pub struct Judgement<const P: usize> {
+pub struct Judgement {
     /// The solver's report.
     pub report: SolveReport<f32>,
-    /// Covariance of the parameters; `None` where it is singular.
-    pub covariance: Option<SMatrix<f32, P, P>>,
     /// Rms residual with the degrees of freedom left; NaN without any.
     pub rms: f32,
     /// What was covered.
     pub coverage: Coverage<f32>,
     /// Departure from a parabola.
     pub nonlinearity: f32,
-    /// Accepted, or why not.
-    pub verdict: Result<(), Refusal>,
+    /// Parameters fitted.
+    pub parameters: usize,
 }
 
-impl<const P: usize> Judgement<P> {
+impl Judgement {
     /// Judges a fit that found `triad`.
-    pub fn of(
+    pub fn of<const P: usize>(
         solver: &LevenbergMarquardt<f32, P>,
         model: &impl Model<f32, P>,
         triad: &Triad<f32>,
         question: &Question<'_>,
     ) -> Self {
-        let mut judgement = Self {
+        Self {
             report: solver.report(),
-            covariance: solver.covariance(),
             rms: solver.variance().map_or(f32::NAN, libm::sqrtf),
             coverage: question.seen.coverage(triad),
             nonlinearity: if question.bend { accept::nonlinearity(solver, model, 1.0) } else { 0.0 },
-            verdict: Ok(()),
-        };
-        judgement.verdict = judgement.verdict(triad, question);
-        judgement
+            parameters: P,
+        }
     }
 
-    fn verdict(&self, triad: &Triad<f32>, question: &Question<'_>) -> Result<(), Refusal> {
+    /// Accepted, or why not.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`].
+    #[inline(never)]
+    pub fn verdict(&self, triad: &Triad<f32>, question: &Question<'_>) -> Result<(), Refusal> {
         let limits = &question.limits;
-        accept::check_observations(&self.coverage, P, limits)?;
+        accept::check_observations(&self.coverage, self.parameters, limits)?;
         accept::check_report(&self.report, limits)?;
         accept::check_nonlinearity(self.nonlinearity, limits)?;
         accept::check_plausibility(triad, true, self.rms / question.radius, limits)
     }
 
     /// The calibration, as the record has it; the figures of quality are this fit's.
+    #[inline(never)]
     pub fn record(&self, triad: &Triad<f32>, std: &Triad<f32>, model: &str, unit: &Unit) -> TriadRecord {
-        let (triad, std) =
-            (triad.in_unit(unit.offset, unit.per_unit), std.in_unit(0.0, libm::fabsf(unit.per_unit)));
+        let triad = triad.in_unit(unit.offset, unit.per_unit);
+        let std = std.in_unit(0.0, libm::fabsf(unit.per_unit));
         TriadRecord {
             gain: rows(&triad.gain),
             bias: triad.bias.into(),
@@ -130,7 +132,7 @@ impl<const P: usize> Judgement<P> {
                 rms: self.rms,
                 held_out_rms: None,
                 observations: u32::try_from(self.coverage.observations).unwrap_or(u32::MAX),
-                parameters: u8::try_from(P).unwrap_or(u8::MAX),
+                parameters: u8::try_from(self.parameters).unwrap_or(u8::MAX),
                 condition: self.report.condition,
                 coverage: self.coverage.share,
                 field_norm: None,

@@ -18,7 +18,7 @@ use imucal_core::{
     solver::{LevenbergMarquardt, Swarm, swarm},
     triad::Triad,
 };
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
 
@@ -29,7 +29,7 @@ mod report;
 use models::{LEVELLED, level, norm_model, rig_axes, rig_model};
 use observations::Observations;
 pub use report::Finished;
-use report::{errors, finished, inverse_errors};
+use report::{Figures, errors, finished, inverse_errors};
 
 use crate::judgement::{Judgement, Question, Seen};
 
@@ -304,8 +304,9 @@ impl<
         let radius = task.norm * libm::sqrtf(3.0 / triad.gain.norm_squared());
         let question = Question { seen: Seen::Points(&self.memory.seen.points), limits, radius, bend: true };
         let judgement = Judgement::of(solver, &norm_model(task, &self.memory.seen, form), &triad, &question);
-        let std = form.triad(&errors(&judgement.covariance));
-        finished(task, solver.theta(), &judgement, &triad, &std)
+        let covariance = solver.covariance();
+        let std = form.triad(&errors(&covariance));
+        finished(task, figures(solver.theta(), &covariance), &judgement, &question, &triad, &std)
     }
 
     #[inline(never)]
@@ -322,8 +323,9 @@ impl<
             self.memory.seen.with_turns(form, |model| Judgement::of(solver, model, &triad, &question));
         // The blocks were made less the bias of the task.
         let whole = Triad { bias: triad.bias + Vector3::from(task.bias), ..triad };
-        let std = form.triad(&errors(&judgement.covariance));
-        finished(task, solver.theta(), &judgement, &whole, &std)
+        let covariance = solver.covariance();
+        let std = form.triad(&errors(&covariance));
+        finished(task, figures(solver.theta(), &covariance), &judgement, &question, &whole, &std)
     }
 
     #[inline(never)]
@@ -339,8 +341,9 @@ impl<
         let seen = Seen::Poses(&self.memory.seen.poses);
         let question = Question { seen, limits, radius: task.norm, bend: false };
         let judgement = Judgement::of(solver, &rig_model(task, &self.memory.seen), &triad, &question);
-        let std = inverse_errors(&gain, &judgement.covariance);
-        finished(task, solver.theta(), &judgement, &triad, &std)
+        let covariance = solver.covariance();
+        let std = inverse_errors(&gain, &covariance);
+        finished(task, figures(solver.theta(), &covariance), &judgement, &question, &triad, &std)
     }
 }
 
@@ -353,4 +356,11 @@ fn search<const PARTICLES: usize>(seed: u64) -> Option<Search<PARTICLES>> {
     };
     let bounds = swarm::Bounds::around(&FULL.theta(&Triad::identity()), &FULL.theta(&reach))?;
     Some((Swarm::new(bounds, Default::default()), Pcg32::seed_from_u64(seed)))
+}
+
+fn figures<'a, const P: usize>(
+    theta: &'a SVector<f32, P>,
+    covariance: &'a Option<SMatrix<f32, P, P>>,
+) -> Figures<'a> {
+    Figures { theta: theta.as_slice(), covariance: covariance.as_ref().map(|matrix| matrix.as_slice()) }
 }

@@ -2,13 +2,13 @@
 
 use heapless::Vec;
 use imucal_core::{
-    link::{FitModel, FitReport, FitTask, MOST_COVARIANCE},
+    link::{FitReport, FitTask, MOST_COVARIANCE},
     record::{RawUnit, Sensor, TriadRecord},
     triad::Triad,
 };
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use crate::judgement::{Judgement, Unit};
+use crate::judgement::{Judgement, Question, Unit};
 
 /// A fit that was judged.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,32 +65,22 @@ fn upper(matrix: &[f32], size: usize) -> Vec<f32, MOST_COVARIANCE> {
     list(columns.flat_map(|(k, column)| column.iter().take(k + 1)))
 }
 
-fn report<const P: usize>(model: FitModel, theta: &SVector<f32, P>, judgement: &Judgement<P>) -> FitReport {
-    let covariance =
-        judgement.covariance.as_ref().map_or_else(Vec::new, |matrix| upper(matrix.as_slice(), P));
-    let report = &judgement.report;
-    FitReport {
-        model,
-        termination: report.termination,
-        iterations: report.iterations,
-        evaluations: report.evaluations,
-        independent_rows: u32::try_from(report.independent_rows).unwrap_or(u32::MAX),
-        cost: report.cost,
-        gradient: report.gradient,
-        condition: report.condition,
-        nonlinearity: judgement.nonlinearity,
-        coverage: judgement.coverage.share,
-        refusal: judgement.verdict.err(),
-        theta: list(theta.as_slice().iter()),
-        covariance,
-    }
+/// Parameters and their covariance, of a size that only their fit knows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Figures<'a> {
+    /// The parameters.
+    pub(super) theta: &'a [f32],
+    /// Their covariance by columns; `None` where it is singular.
+    pub(super) covariance: Option<&'a [f32]>,
 }
 
 /// What a judgement comes to.
-pub(super) fn finished<const P: usize>(
+#[inline(never)]
+pub(super) fn finished(
     task: &FitTask,
-    theta: &SVector<f32, P>,
-    judgement: &Judgement<P>,
+    figures: Figures<'_>,
+    judgement: &Judgement,
+    question: &Question<'_>,
     triad: &Triad<f32>,
     std: &Triad<f32>,
 ) -> Finished {
@@ -100,8 +90,25 @@ pub(super) fn finished<const P: usize>(
         Sensor::Gyroscope => RawUnit::RadianPerSecond,
         Sensor::Magnetometer => RawUnit::MicroTesla,
     };
+    let verdict = judgement.verdict(triad, question);
     let unit = Unit { raw: task.unit_in, calibrated, offset: task.offset, per_unit: task.per_unit };
     let record = || (sensor, judgement.record(triad, std, task.model.name(), &unit));
-    let accepted = judgement.verdict.is_ok().then(record);
-    Finished { report: report(task.model, theta, judgement), accepted }
+    let solved = &judgement.report;
+    let covariance = figures.covariance.map_or_else(Vec::new, |matrix| upper(matrix, figures.theta.len()));
+    let report = FitReport {
+        model: task.model,
+        termination: solved.termination,
+        iterations: solved.iterations,
+        evaluations: solved.evaluations,
+        independent_rows: u32::try_from(solved.independent_rows).unwrap_or(u32::MAX),
+        cost: solved.cost,
+        gradient: solved.gradient,
+        condition: solved.condition,
+        nonlinearity: judgement.nonlinearity,
+        coverage: judgement.coverage.share,
+        refusal: verdict.err(),
+        theta: list(figures.theta.iter()),
+        covariance,
+    };
+    Finished { report, accepted: verdict.is_ok().then(record) }
 }
