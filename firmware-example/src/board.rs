@@ -53,4 +53,6 @@ pub struct Board<L: ByteLink, F: NorFlash, C: Clock, S: SampleSource> {
     pub clock: C,
     /// The sensors.
     pub sensors: S,
+    /// Stack used at most so far, bytes, where the board looks.
+    pub stack: fn() -> Option<u32>,
 }

@@ -80,12 +80,14 @@ fn measured<R>(
     Ok(result)
 }
 
+#[inline(never)]
 fn decode(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
     measured(out, watch, ("nothing", 1), || ())?;
     measured(out, watch, ("decode", 1), || record::decode(black_box(crate::RECORD)).is_ok()).map(drop)
 }
 
 /// Samples in a loop, with temperature terms, and the same without a corrector: what is between is the correction.
+#[inline(never)]
 fn apply(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
     let terms = TemperatureTerms {
         reference: 25.0,
@@ -124,6 +126,7 @@ fn apply(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
 }
 
 /// Each model to the end: a slice, the whole fit, and its judgement.
+#[inline(never)]
 fn fits(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
     static mut MEMORY: CostMemory = CostMemory::new();
     #[expect(unsafe_code, reason = "memory of the fits, as on the co-processor")]
@@ -165,6 +168,7 @@ fn fits(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
 }
 
 /// One iteration of a swarm in twelve parameters over the blocks of a motion.
+#[inline(never)]
 fn particle(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
     static mut PARTICLE_BLOCKS: [Block<f32>; BLOCKS] = [Block {
         s0: Vector3::new(0.0, 0.0, 0.0),

@@ -92,6 +92,7 @@ struct Device<
 > {
     clock: C,
     sensors: S,
+    stack: fn() -> Option<u32>,
     /// `None` where the flash cannot be used.
     slots: Option<Slots<F>>,
     outgoing: Outgoing,
@@ -126,12 +127,13 @@ impl<
         unit: SensorIdentity,
         memory: &'a mut Memory<POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
     ) -> Self {
-        let Board { link, flash, clock, sensors } = board;
+        let Board { link, flash, clock, sensors, stack } = board;
         let mut slots = Slots::open(flash).ok();
         let calibration = boot(unit, slots.as_mut());
         let device = Device {
             clock,
             sensors,
+            stack,
             slots,
             outgoing: Outgoing::new(),
             calibration,

@@ -88,6 +88,7 @@ impl<
             unsaved: self.calibration.unsaved,
             corrected: self.corrected,
             refused: self.refused,
+            stack: (self.stack)(),
             fit: self.fitting.progress(),
         };
         self.outgoing.send(id, &Reply::Status(status));

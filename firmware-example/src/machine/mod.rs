@@ -42,7 +42,13 @@ pub fn run(name: &str, serial: &str) -> ! {
         name: name.parse().unwrap_or_default(),
         serial: serial.parse().unwrap_or_default(),
     };
-    let board = Board { link: Uart::start(), flash: Flash::new(), clock: Ticks::start(), sensors: NoSensor };
+    let board = Board {
+        link: Uart::start(),
+        flash: Flash::new(),
+        clock: Ticks::start(),
+        sensors: NoSensor,
+        stack: || u32::try_from(crate::stack::deepest().0).ok(),
+    };
     let mut coprocessor = Coprocessor::new(board, unit, memory);
     loop {
         if !coprocessor.poll() {

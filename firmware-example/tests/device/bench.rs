@@ -80,7 +80,8 @@ pub struct Bench<'a> {
 impl<'a> Bench<'a> {
     pub fn new(nor: Nor, serial: &str, sensors: Counting, memory: &'a mut BenchMemory) -> Self {
         let wire = Wire::default();
-        let board = Board { link: wire.clone(), flash: nor, clock: Ticks::default(), sensors };
+        let board =
+            Board { link: wire.clone(), flash: nor, clock: Ticks::default(), sensors, stack: || None };
         let device = Coprocessor::new(board, unit(serial), memory);
         Self { device, wire, receiver: Receiver::default(), next: 1 }
     }

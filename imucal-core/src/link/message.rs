@@ -174,6 +174,8 @@ pub struct Status {
     pub corrected: u32,
     /// Frames refused since the start.
     pub refused: u32,
+    /// Stack used at most since the start, bytes; `None` where the device does not look.
+    pub stack: Option<u32>,
     /// The fit under way.
     pub fit: Option<FitProgress>,
 }

@@ -155,6 +155,9 @@ fn identify(place: &Place) -> anyhow::Result<Ending> {
         status.record,
         if status.unsaved { ", unsaved changes" } else { "" }
     );
+    if let Some(stack) = status.stack {
+        say!("stack used so far: {stack} B");
+    }
     Ok(Ending::Done)
 }
 
