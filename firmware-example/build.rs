@@ -6,9 +6,9 @@
 use std::{env, fs, path::PathBuf};
 
 /// The machines that stand for boards: cfg, start of the target's name, flash and RAM, KiB. True of the machines, and no
-/// more than the nRF52840 and the micro:bit have.
+/// more than the nRF52840 and the micro:bit have beside the record's pages.
 const MACHINES: [(&str, &str, u32, u32); 2] =
-    [("mps2", "thumbv7em", 1024, 256), ("microbit", "thumbv6m", 252, 16)];
+    [("mps2", "thumbv7em", 1008, 256), ("microbit", "thumbv6m", 252, 16)];
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

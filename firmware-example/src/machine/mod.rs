@@ -33,6 +33,13 @@ pub type MachineMemory = Memory<256, 64, 64, 2048, 40>;
 #[cfg(microbit)]
 pub type MachineMemory = Memory<64, 16, 8, 48, 6>;
 
+/// The core's clock, kHz.
+#[cfg(mps2)]
+const PER_MILLISECOND: u32 = 25_000;
+/// See above.
+#[cfg(microbit)]
+const PER_MILLISECOND: u32 = 64_000;
+
 /// Runs the co-processor on this machine, for ever.
 pub fn run(name: &str, serial: &str) -> ! {
     static mut MEMORY: MachineMemory = MachineMemory::new();
@@ -45,7 +52,7 @@ pub fn run(name: &str, serial: &str) -> ! {
     let board = Board {
         link: Uart::start(),
         flash: Flash::new(),
-        clock: Ticks::start(),
+        clock: Ticks::start(PER_MILLISECOND),
         sensors: NoSensor,
         stack: || u32::try_from(crate::stack::deepest().0).ok(),
     };
