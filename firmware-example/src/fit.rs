@@ -65,14 +65,30 @@ fn one(
 ) -> fmt::Result {
     let model = task.model;
     let begun = fitting.begin(task);
-    let mut taken = begun.is_ok();
-    observe(model, count(model), &mut Noise(seed), |observation| taken &= fitting.take(&observation).is_ok());
-    if !taken {
+    if begun.is_err() || !feed(fitting, model, seed) {
         return writeln!(out, "{} {seed} not taken", model.name());
     }
     while !fitting.step() {}
+    finish(out, fitting, seed, record)
+}
+
+#[inline(never)]
+fn feed(fitting: &mut SmallFitting<'_>, model: FitModel, seed: u32) -> bool {
+    let mut taken = true;
+    observe(model, count(model), &mut Noise(seed), |observation| taken &= fitting.take(&observation).is_ok());
+    taken
+}
+
+/// Apart from what went before, so that its memory is free again.
+#[inline(never)]
+fn finish(
+    out: &mut impl Write,
+    fitting: &SmallFitting<'_>,
+    seed: u32,
+    record: &mut CalibrationRecord,
+) -> fmt::Result {
     let searched = fitting.progress().map_or(0, |progress| progress.searched);
-    let Ok(finished) = fitting.finish() else { return writeln!(out, "{} {seed} not finished", model.name()) };
+    let Ok(finished) = fitting.finish() else { return writeln!(out, "{seed} not finished") };
     write_report(out, seed, searched, &finished.report)?;
     if let Some((sensor, triad)) = finished.accepted {
         let slot = match sensor {

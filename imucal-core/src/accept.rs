@@ -23,6 +23,7 @@ use crate::{
 
 /// What is asked of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Limits {
     /// Observations at least.
     pub observations: usize,

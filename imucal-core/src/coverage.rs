@@ -24,6 +24,7 @@ pub const MOST_DISTINCT: usize = 24;
 
 /// How well the sphere of directions is covered.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Coverage<T> {
     /// Observations looked at.
     pub observations: usize,

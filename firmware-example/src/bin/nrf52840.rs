@@ -18,6 +18,8 @@
 
 #[cfg(target_os = "none")]
 mod board {
+    use core::num::NonZeroU32;
+
     use bmi160::{
         AccelerometerPowerMode, Bmi160, GyroscopePowerMode, SensorSelector, SlaveAddr,
         interface::I2cInterface,
@@ -45,7 +47,7 @@ mod board {
     };
 
     /// The core's clock, ticks of a millisecond.
-    const PER_MILLISECOND: u32 = 64_000;
+    const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(64_000).unwrap();
     /// Between samples, µs.
     const INTERVAL: u32 = 10_000;
     /// The record's region: it lies beyond what memory.x gives to code.

@@ -6,6 +6,8 @@
 //! | `microbit` | Cortex-M0, soft float | nRF51 | the nRF51's own, by its NVMC; lost when QEMU ends |
 #![allow(unsafe_code)] // Registers, and memory that no variable owns.
 
+use core::num::NonZeroU32;
+
 #[cfg(microbit)]
 mod microbit;
 #[cfg(mps2)]
@@ -31,14 +33,14 @@ use crate::{
 pub type MachineMemory = Memory<256, 64, 64, 2048, 40>;
 /// The fits that there is memory for.
 #[cfg(microbit)]
-pub type MachineMemory = Memory<64, 16, 8, 48, 6>;
+pub type MachineMemory = Memory<64, 16, 8, 96, 6>;
 
 /// The core's clock, kHz.
 #[cfg(mps2)]
-const PER_MILLISECOND: u32 = 25_000;
+const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(25_000).unwrap();
 /// See above.
 #[cfg(microbit)]
-const PER_MILLISECOND: u32 = 64_000;
+const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(64_000).unwrap();
 
 /// Runs the co-processor on this machine, for ever.
 pub fn run(name: &str, serial: &str) -> ! {

@@ -1,5 +1,7 @@
 //! Milliseconds by the core's own timer.
 
+use core::num::NonZeroU32;
+
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 
 use super::Register;
@@ -14,7 +16,7 @@ const VALUE: Register = Register(0xE000_E018);
 #[derive(Debug)]
 pub struct Ticks {
     /// Ticks of a millisecond.
-    per_millisecond: u32,
+    per_millisecond: NonZeroU32,
     last: u32,
     rest: u32,
     milliseconds: u32,
@@ -22,7 +24,7 @@ pub struct Ticks {
 
 impl Ticks {
     /// Starts the timer; `per_millisecond` is the core's frequency, kHz.
-    pub fn start(per_millisecond: u32) -> Self {
+    pub fn start(per_millisecond: NonZeroU32) -> Self {
         // SAFETY: called once, before anything else looks at the timer.
         let mut timer: SYST = unsafe { cortex_m::Peripherals::steal() }.SYST;
         timer.set_clock_source(SystClkSource::Core);

@@ -56,6 +56,7 @@ impl FitModel {
 
 /// What to fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FitTask {
     /// The model.
     pub model: FitModel,
@@ -77,6 +78,7 @@ pub struct FitTask {
 
 /// One thing that a fit is made to, nominal SI.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Observation {
     /// Mean of a rest, or a sample of a field: value, and the distance outside the shell that is expected of it.
@@ -112,6 +114,7 @@ pub struct FitProgress {
 
 /// How a fit ended. Figures as of [`SolveReport`](crate::solver::SolveReport).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FitReport {
     /// What was fitted.
     pub model: FitModel,

@@ -38,6 +38,7 @@ pub enum FrameError {
 
 /// What stands before the message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
     /// Version of the message.
     pub version: u8,

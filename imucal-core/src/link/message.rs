@@ -14,6 +14,7 @@ pub type Values = Vec<[f32; 3], { 4 * BATCH }>;
 
 /// From host to device. The order of the variants is the format: append only.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Request<'a> {
     /// Who is there? Answered by [`Reply::Identity`].
@@ -76,6 +77,7 @@ pub enum Request<'a> {
 
 /// From device to host. The order of the variants is the format: append only.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Reply<'a> {
     /// To [`Request::Identify`].
@@ -111,6 +113,7 @@ pub enum Reply<'a> {
 
 /// Who a device is.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Identity {
     /// The unit; its serial is what records are compared with.
     pub unit: SensorIdentity,

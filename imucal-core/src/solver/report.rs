@@ -48,6 +48,7 @@ impl Termination {
 
 /// What a solver did and where it stopped.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SolveReport<T: Scalar> {
     /// Why it stopped.
     pub termination: Termination,

@@ -109,6 +109,7 @@ impl<T: Scalar> Default for Settings<T> {
 
 /// What a swarm did so far.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SwarmReport<T: Scalar> {
     /// Why it stopped: [`Spread`](Termination::Spread), [`Iterations`](Termination::Iterations), or
     /// [`NotFinite`](Termination::NotFinite) where no particle of the first iteration had a finite cost. `None`

@@ -74,6 +74,7 @@ impl<T: Scalar, const P: usize> Triangular<T, P> {
     }
 
     /// `variance · (JᵀJ)⁻¹`, from R alone; `None` where it is singular.
+    #[inline(never)]
     pub fn covariance(&self, variance: T) -> Option<SMatrix<T, P, P>> {
         let inverse = self.inverse()?;
         let mut covariance = SMatrix::<T, P, P>::zeros();

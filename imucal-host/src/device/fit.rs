@@ -80,8 +80,7 @@ impl BoardFit {
         }
     }
 
-    /// The same fit by the core on this machine: bit for bit what the device finds. `None` for a search, for poses,
-    /// and where there is no covariance.
+    /// The same fit by the core on this machine: bit for bit what the device finds. `None` for a search and for poses.
     pub fn here(&self) -> Option<Found> {
         match self.task.model {
             FitModel::T9 | FitModel::E9 => self.norm_here(),
@@ -128,7 +127,7 @@ impl BoardFit {
             }
             solver = fit(&points, *solver.theta());
         }
-        Some(found(solver.theta(), &solver.covariance()?))
+        Some(found(solver.theta(), solver.covariance().as_ref()))
     }
 
     fn turns_here(&self) -> Option<Found> {
@@ -160,7 +159,7 @@ impl BoardFit {
             .collect();
         let mut solver = LevenbergMarquardt::new(FULL.theta(&Triad::identity()), Default::default());
         solver.run(&TurnModel { turns: &turns, form: FULL });
-        Some(found(solver.theta(), &solver.covariance()?))
+        Some(found(solver.theta(), solver.covariance().as_ref()))
     }
 }
 
@@ -196,11 +195,10 @@ impl KnownTurn {
     }
 }
 
-fn found<const P: usize>(theta: &SVector<f32, P>, covariance: &SMatrix<f32, P, P>) -> Found {
-    let upper = covariance
-        .column_iter()
-        .enumerate()
-        .flat_map(|(k, column)| column.iter().take(k + 1).copied().collect::<Vec<_>>());
+/// Without a covariance where that is singular.
+fn found<const P: usize>(theta: &SVector<f32, P>, covariance: Option<&SMatrix<f32, P, P>>) -> Found {
+    let columns = covariance.into_iter().flat_map(|matrix| matrix.column_iter().enumerate());
+    let upper = columns.flat_map(|(k, column)| column.iter().take(k + 1).copied().collect::<Vec<_>>());
     (theta.iter().copied().collect(), upper.collect())
 }
 
