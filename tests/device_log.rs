@@ -19,7 +19,11 @@ fn the_log_of_a_fit_is_decoded_on_the_host() {
         let mut lines = Vec::new();
         loop {
             match decoder.decode() {
-                Ok(frame) => lines.push(format!("{} {}", frame.level().expect("a level").as_str(), frame.display_message())),
+                Ok(frame) => lines.push(format!(
+                    "{} {}",
+                    frame.level().expect("a level").as_str(),
+                    frame.display_message()
+                )),
                 Err(DecodeError::UnexpectedEof) => break,
                 Err(DecodeError::Malformed) => panic!("malformed after {lines:#?}"),
             }

@@ -10,6 +10,7 @@ use imucal_core::{
     link::FitModel,
     model::parameterisation::{FULL, UPPER_TRIANGULAR},
 };
+use imucal_tests::call_stack::CallGraph;
 use imucal_tests::firmware::{BOARDS, Board, announce, build, ready, run, run_with};
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, elf};
 
@@ -192,6 +193,28 @@ fn record_corrector_and_fits_stay_within_their_flash() {
             whole.flash - empty.flash
         ));
         assert!(flash <= FIT_BUDGET, "{core}: {flash} B exceed {FIT_BUDGET} B");
+    }
+}
+
+#[test]
+fn the_worst_stack_by_analysis_stays_within_its_budget() {
+    if !ready() {
+        return;
+    }
+    for board in BOARDS {
+        let graph = CallGraph::of(&elf_of(board, "coprocessor"));
+        let depth = graph.depth("main");
+        announce(&format!("stack: {}: the co-processor by analysis: {} B", board.core, depth.bytes));
+        assert!(depth.bytes <= STACK_BUDGET, "{}: {depth:#?}", board.core);
+        // Only the gauge of the stack itself is called through a pointer.
+        assert!(graph.indirect().len() <= 1, "{:?}", graph.indirect());
+    }
+}
+
+#[test]
+fn the_image_of_the_real_board_links() {
+    if ready() {
+        build(BOARDS[0], "nrf52840", &["nrf52840"]).unwrap_or_else(|refusal| panic!("{refusal}"));
     }
 }
 

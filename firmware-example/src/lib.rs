@@ -1,7 +1,8 @@
 //! What the images share: the record they carry, the samples they correct, and the panic gate.
 //!
-//! Every image of this crate, built with profile `firmware`, is a proof: there is no global allocator, and the panic
-//! handler calls a function that does not exist, so that an image with a panic path left in it does not link.
+//! Every image of this crate but `log` and `nrf52840`, built with profile `firmware`, is a proof: there is no global
+//! allocator, and the panic handler calls a function that does not exist, so that an image with a panic path left in it
+//! does not link.
 //!
 //! | image | does |
 //! | --- | --- |
@@ -12,6 +13,8 @@
 //! | `fits` | reads a record, corrects, fits every model and packs a record, without text: what that takes of flash |
 //! | `cost` | prints what parts of the core take: instructions and stack |
 //! | `coprocessor` | keeps a record, corrects, fits and stores, at the end of a UART |
+//! | `log` | says by defmt what it does, over semihosting; with `--features log` |
+//! | `nrf52840` | the co-processor on a real board; with `--features nrf52840` |
 //! | `empty` | start-up code and the record's bytes, to compare the size of `correct` with |
 #![no_std]
 
