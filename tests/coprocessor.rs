@@ -47,7 +47,7 @@ fn both_boards_fit_store_and_correct_as_this_machine_does() {
     for board in BOARDS {
         let mut session = session(board, None);
         let capacity = session.identity().capacity;
-        for (model, count) in [(FitModel::T9, 40), (FitModel::E9, 60), (FitModel::K12, 8)] {
+        for (model, count) in [(FitModel::T9, 40), (FitModel::E9, 40), (FitModel::K12, 4)] {
             let fit = drilled(model, count, 5);
             let report = session.fit(&fit, Date::from_days(20_000)).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(fit.is_here(&report), Some(true), "{model:?} on {}: {report:?}", board.core);

@@ -52,7 +52,7 @@ mod board {
     const INTERVAL: u32 = 10_000;
     /// The record's region: it lies beyond what memory.x gives to code.
     const REGION: (usize, usize) = (0x000F_C000, 0x4000);
-    type BoardMemory = Memory<256, 64, 64, 2048, 40>;
+    type BoardMemory = Memory<256, 64, 48, 2048, 40>;
 
     struct Serial {
         tx: UarteTx<UARTE0>,

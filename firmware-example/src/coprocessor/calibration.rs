@@ -20,8 +20,8 @@ pub(super) struct Calibration {
 }
 
 impl Calibration {
-    /// Of a unit, with what its flash holds; empty where it holds nothing.
-    pub(super) fn stored(unit: SensorIdentity, bytes: &[u8]) -> Self {
+    /// Of a unit, before its flash was looked at.
+    pub(super) fn new(unit: SensorIdentity) -> Self {
         let record = CalibrationRecord {
             sensor: unit.clone(),
             date: Date::from_days(0),
@@ -29,40 +29,43 @@ impl Calibration {
             gyr: None,
             mag: None,
         };
-        let mut calibration =
-            Self { unit, record, correctors: [None; 3], state: RecordState::Empty, unsaved: false };
-        if !bytes.is_empty() {
-            calibration.state = calibration.load(bytes);
-        }
-        calibration
+        Self { unit, record, correctors: [None; 3], state: RecordState::Empty, unsaved: false }
     }
 
     /// Uses a record, if it is this unit's; says what it is.
+    #[inline(never)]
     pub(super) fn load(&mut self, bytes: &[u8]) -> RecordState {
-        match self.check(bytes) {
-            Ok((record, confirmed)) => {
-                self.correctors = Sensor::ALL.map(|sensor| record.triad(sensor).map(Corrector::from));
-                self.record = record;
-                match confirmed {
-                    Match::Confirmed => RecordState::InUse,
-                    Match::Unknown => RecordState::Unconfirmed,
-                }
-            }
-            Err(Fault::OtherSensor) => RecordState::OtherSensor,
-            Err(Fault::NewerFormat) => RecordState::NewerFormat,
-            Err(_) => RecordState::Unusable,
-        }
+        let record = match record::decode(bytes) {
+            Ok(record) => record,
+            Err(DecodeError::UnsupportedVersion { .. }) => return RecordState::NewerFormat,
+            Err(_) => return RecordState::Unusable,
+        };
+        let state = match record.made_for(&self.unit.serial) {
+            Ok(Match::Confirmed) => RecordState::InUse,
+            Ok(Match::Unknown) => RecordState::Unconfirmed,
+            Err(_) => return RecordState::OtherSensor,
+        };
+        self.put_in_use(&record);
+        state
     }
 
-    /// Reads a record, and asks whether it is this unit's.
+    /// By reference, and out of line: a record takes 0.7 KiB of stack wherever it is passed by value.
     #[inline(never)]
-    pub(super) fn check(&self, bytes: &[u8]) -> Result<(CalibrationRecord, Match), Fault> {
-        let record = record::decode(bytes).map_err(|error| match error {
-            DecodeError::UnsupportedVersion { .. } => Fault::NewerFormat,
-            _ => Fault::BadRecord,
-        })?;
-        let confirmed = record.made_for(&self.unit.serial).map_err(|_| Fault::OtherSensor)?;
-        Ok((record, confirmed))
+    fn put_in_use(&mut self, record: &CalibrationRecord) {
+        for (corrector, sensor) in self.correctors.iter_mut().zip(Sensor::ALL) {
+            *corrector = record.triad(sensor).map(Corrector::from);
+        }
+        self.record.clone_from(record);
+    }
+
+    /// Why a record is not this unit's to use, if it is not.
+    #[inline(never)]
+    pub(super) fn refusal(&self, bytes: &[u8]) -> Option<Fault> {
+        match record::decode(bytes) {
+            Ok(record) => record.made_for(&self.unit.serial).is_err().then_some(Fault::OtherSensor),
+            Err(DecodeError::UnsupportedVersion { .. }) => Some(Fault::NewerFormat),
+            Err(_) => Some(Fault::BadRecord),
+        }
     }
 
     /// What is in flash must not be overwritten unasked.
@@ -71,14 +74,15 @@ impl Calibration {
     }
 
     /// Takes a triad that was fitted here.
-    pub(super) fn adopt(&mut self, sensor: Sensor, triad: TriadRecord, date: Date) {
-        let corrector = Some(Corrector::from(&triad));
+    #[inline(never)]
+    pub(super) fn adopt(&mut self, sensor: Sensor, triad: &TriadRecord, date: Date) {
+        let corrector = Some(Corrector::from(triad));
         let (slot, place) = match sensor {
             Sensor::Accelerometer => (&mut self.record.acc, 0),
             Sensor::Gyroscope => (&mut self.record.gyr, 1),
             Sensor::Magnetometer => (&mut self.record.mag, 2),
         };
-        *slot = Some(triad);
+        *slot = Some(triad.clone());
         if let Some(place) = self.correctors.get_mut(place) {
             *place = corrector;
         }

@@ -15,12 +15,12 @@ mod requests;
 use embedded_storage::nor_flash::NorFlash;
 use imucal_core::{
     link::{Fault, FrameError, Receiver, RecordState, Reply, Request, VERSION, split},
-    record::{Sensor, SensorIdentity},
+    record::{Date, Sensor, SensorIdentity},
 };
 
 use crate::{
     board::{Board, ByteLink, Clock, SampleSource},
-    fitting::{Fitting, Memory},
+    fitting::{Finished, Fitting, Memory},
     storage::{SLOT, Slots, Writing},
 };
 use calibration::Calibration;
@@ -33,11 +33,15 @@ const BYTES_A_TURN: usize = 64;
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one, and no heap")]
 enum Job {
+    /// Before the first turn.
+    Booting,
     None,
     /// A record on its way into flash.
     Storing(u32, Writing),
     /// Slices of the fit that are left; `None`: to its end.
     Stepping(u32, Option<u16>),
+    /// A fit that has stopped, and the day.
+    Judging(u32, Date),
 }
 
 /// An answer that waits until the link is free.
@@ -45,6 +49,7 @@ enum Job {
 enum Due {
     Stored(u32),
     Progress,
+    Report,
     Fault(Fault),
 }
 
@@ -100,6 +105,8 @@ struct Device<
     fitting: Fitting<'a, POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
     job: Job,
     due: Option<(u32, Due)>,
+    /// The last fit that was judged.
+    finished: Option<Finished>,
     stream: Option<Stream>,
     /// The last id taken.
     last: u32,
@@ -121,15 +128,15 @@ impl<
     const PARTICLES: usize,
 > Coprocessor<'a, L, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES>
 {
-    /// Starts with what the flash holds.
+    /// Looks for the record in the flash; the first turn reads it.
     pub fn new(
         board: Board<L, F, C, S>,
         unit: SensorIdentity,
         memory: &'a mut Memory<POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
     ) -> Self {
         let Board { link, flash, clock, sensors, stack } = board;
-        let mut slots = Slots::open(flash).ok();
-        let calibration = boot(unit, slots.as_mut());
+        let slots = Slots::open(flash).ok();
+        let calibration = Calibration::new(unit);
         let device = Device {
             clock,
             sensors,
@@ -138,8 +145,9 @@ impl<
             outgoing: Outgoing::new(),
             calibration,
             fitting: Fitting::new(memory),
-            job: Job::None,
+            job: Job::Booting,
             due: None,
+            finished: None,
             stream: None,
             last: 0,
             refused: 0,
@@ -151,6 +159,9 @@ impl<
 
     /// One turn; to be called over and over. True where there was something to do.
     pub fn poll(&mut self) -> bool {
+        if matches!(self.device.job, Job::Booting) {
+            self.device.boot();
+        }
         self.device.outgoing.flush(&mut self.link);
         let mut busy = !self.device.outgoing.is_free();
         busy |= self.device.answer_due();
@@ -190,7 +201,19 @@ impl<
     const PARTICLES: usize,
 > Device<'_, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES>
 {
+    /// Uses what the flash holds.
+    #[inline(never)]
+    fn boot(&mut self) {
+        let mut buffer = [0; SLOT];
+        let bytes = self.slots.as_mut().and_then(|slots| slots.read(&mut buffer).ok()).unwrap_or_default();
+        if !bytes.is_empty() {
+            self.calibration.state = self.calibration.load(bytes);
+        }
+        self.job = Job::None;
+    }
+
     /// Sends an answer that has waited for the link.
+    #[inline(never)]
     fn answer_due(&mut self) -> bool {
         if !self.outgoing.is_free() {
             return false;
@@ -200,11 +223,31 @@ impl<
             Due::Stored(sequence) => Reply::Stored { sequence },
             Due::Progress => self.progress(),
             Due::Fault(fault) => Reply::Fault(fault),
+            Due::Report => return self.answer_report(id),
         };
         self.outgoing.send(id, &reply);
         true
     }
 
+    #[inline(never)]
+    fn answer_report(&mut self, id: u32) -> bool {
+        let report = self.finished.take().map(|finished| Reply::Report(finished.report));
+        self.outgoing.send(id, &report.unwrap_or(Reply::Fault(Fault::NotReady)));
+        true
+    }
+
+    #[inline(never)]
+    fn judge(&mut self, id: u32, date: Date) {
+        self.finished = self.fitting.finish().ok();
+        if let Some((sensor, triad)) = self.finished.as_ref().and_then(|finished| finished.accepted.as_ref())
+        {
+            self.calibration.adopt(*sensor, triad, date);
+        }
+        self.end(id, Due::Report);
+    }
+
+    /// Apart from who waits for bytes: a request takes its memory only while it is worked at.
+    #[inline(never)]
     fn receive(&mut self, frame: Result<&[u8], FrameError>) {
         match frame.and_then(split) {
             Ok((header, message)) => match header.read::<Request<'_>>(message) {
@@ -235,6 +278,7 @@ impl<
     }
 
     /// Corrects a sample of the board's own sensors.
+    #[inline(never)]
     fn take_sample(&mut self) -> bool {
         let Some(sample) = self.sensors.sample() else { return false };
         self.number = self.number.wrapping_add(1);
@@ -258,9 +302,10 @@ impl<
     }
 
     /// One slice of what takes many.
+    #[inline(never)]
     fn work(&mut self) -> bool {
         match &mut self.job {
-            Job::None => return false,
+            Job::Booting | Job::None => return false,
             Job::Storing(id, writing) => {
                 let id = *id;
                 let done = match &mut self.slots {
@@ -283,6 +328,10 @@ impl<
                     self.end(id, Due::Progress);
                 }
             }
+            Job::Judging(id, date) => {
+                let (id, date) = (*id, *date);
+                self.judge(id, date);
+            }
         }
         true
     }
@@ -301,14 +350,6 @@ impl<
         self.calibration.unsaved = false;
         self.end(id, Due::Stored(sequence));
     }
-}
-
-/// The calibration that the flash holds.
-#[inline(never)]
-fn boot<F: NorFlash>(unit: SensorIdentity, slots: Option<&mut Slots<F>>) -> Calibration {
-    let mut buffer = [0; SLOT];
-    let bytes = slots.and_then(|slots| slots.read(&mut buffer).ok()).unwrap_or_default();
-    Calibration::stored(unit, bytes)
 }
 
 fn of_frame(error: FrameError) -> Fault {

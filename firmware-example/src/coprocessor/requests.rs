@@ -121,8 +121,10 @@ impl<
 
     #[inline(never)]
     fn put_record(&mut self, id: u32, bytes: &[u8], replace: bool) -> Result<(), Fault> {
-        let _confirmed = self.calibration.check(bytes)?;
-        self.write(id, bytes, replace)
+        match self.calibration.refusal(bytes) {
+            Some(fault) => Err(fault),
+            None => self.write(id, bytes, replace),
+        }
     }
 
     #[inline(never)]
@@ -168,13 +170,12 @@ impl<
         Ok(())
     }
 
-    #[inline(never)]
+    /// Judges in the next turn, from the bottom of the stack.
     fn finish_fit(&mut self, id: u32, date: Date) -> Result<(), Fault> {
-        let finished = self.fitting.finish()?;
-        if let Some((sensor, triad)) = finished.accepted {
-            self.calibration.adopt(sensor, triad, date);
+        if !self.fitting.progress().is_some_and(|progress| progress.stopped) {
+            return Err(Fault::NotReady);
         }
-        self.outgoing.send(id, &Reply::Report(finished.report));
+        self.job = Job::Judging(id, date);
         Ok(())
     }
 

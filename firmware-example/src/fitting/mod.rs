@@ -249,9 +249,8 @@ impl<
 
     #[inline(never)]
     fn start(&mut self, task: &FitTask) {
-        if let Some(found) = task.search.and_then(search) {
-            let _room = self.memory.search.push(found);
-            return;
+        if let Some((seed, bounds)) = task.search.zip(bounds()) {
+            return self.search(seed, bounds);
         }
         let bias = Vector3::from(task.bias);
         let nominal = Triad { gain: Matrix3::identity(), bias };
@@ -269,6 +268,13 @@ impl<
             }
             _ => nine(UPPER_TRIANGULAR, nominal),
         });
+    }
+
+    /// Lets a swarm loose. Alone, since it passes through the stack.
+    #[inline(never)]
+    fn search(&mut self, seed: u64, bounds: swarm::Bounds<f32, 12>) {
+        let _room =
+            self.memory.search.push((Swarm::new(bounds, Default::default()), Pcg32::seed_from_u64(seed)));
     }
 
     /// Judges the fit.
@@ -347,15 +353,15 @@ impl<
     }
 }
 
+/// Where a swarm searches.
 #[inline(never)]
-fn search<const PARTICLES: usize>(seed: u64) -> Option<Search<PARTICLES>> {
+fn bounds() -> Option<swarm::Bounds<f32, 12>> {
     let (scale, skew, rate) = REACH;
     let reach = Triad {
         gain: Matrix3::repeat(skew) + Matrix3::from_diagonal_element(scale - skew),
         bias: Vector3::repeat(rate),
     };
-    let bounds = swarm::Bounds::around(&FULL.theta(&Triad::identity()), &FULL.theta(&reach))?;
-    Some((Swarm::new(bounds, Default::default()), Pcg32::seed_from_u64(seed)))
+    swarm::Bounds::around(&FULL.theta(&Triad::identity()), &FULL.theta(&reach))
 }
 
 fn figures<'a, const P: usize>(

@@ -6,7 +6,7 @@
 //! | `microbit` | Cortex-M0, soft float | nRF51 | the nRF51's own, by its NVMC; lost when QEMU ends |
 #![allow(unsafe_code)] // Registers, and memory that no variable owns.
 
-use core::num::NonZeroU32;
+use core::{mem::MaybeUninit, num::NonZeroU32};
 
 #[cfg(microbit)]
 mod microbit;
@@ -30,10 +30,10 @@ use crate::{
 
 /// The fits that there is memory for.
 #[cfg(mps2)]
-pub type MachineMemory = Memory<256, 64, 64, 2048, 40>;
+pub type MachineMemory = Memory<256, 64, 48, 2048, 40>;
 /// The fits that there is memory for.
 #[cfg(microbit)]
-pub type MachineMemory = Memory<64, 16, 8, 96, 6>;
+pub type MachineMemory = Memory<40, 16, 8, 48, 4>;
 
 /// The core's clock, kHz.
 #[cfg(mps2)]
@@ -42,11 +42,30 @@ const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(25_000).unwrap();
 #[cfg(microbit)]
 const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(64_000).unwrap();
 
+/// The co-processor on this machine.
+#[cfg(mps2)]
+type Whole = Coprocessor<'static, Uart, Flash, Ticks, NoSensor, 256, 64, 48, 2048, 40>;
+/// See above.
+#[cfg(microbit)]
+type Whole = Coprocessor<'static, Uart, Flash, Ticks, NoSensor, 40, 16, 8, 48, 4>;
+
 /// Runs the co-processor on this machine, for ever.
 pub fn run(name: &str, serial: &str) -> ! {
+    let coprocessor = start(name, serial);
+    loop {
+        if !coprocessor.poll() {
+            idle();
+        }
+    }
+}
+
+/// Puts the co-processor where it stays: on the stack it would lie below all that follows.
+#[inline(never)]
+fn start(name: &str, serial: &str) -> &'static mut Whole {
     static mut MEMORY: MachineMemory = MachineMemory::new();
-    // SAFETY: the entry point calls this once, and nothing else knows the variable.
-    let memory = unsafe { &mut *(&raw mut MEMORY) };
+    static mut WHOLE: MaybeUninit<Whole> = MaybeUninit::uninit();
+    // SAFETY: `run` is called once, and nothing else knows the variables.
+    let (memory, whole) = unsafe { (&mut *(&raw mut MEMORY), &mut *(&raw mut WHOLE)) };
     let unit = imucal_core::record::SensorIdentity {
         name: name.parse().unwrap_or_default(),
         serial: serial.parse().unwrap_or_default(),
@@ -58,12 +77,7 @@ pub fn run(name: &str, serial: &str) -> ! {
         sensors: NoSensor,
         stack: || u32::try_from(crate::stack::deepest().0).ok(),
     };
-    let mut coprocessor = Coprocessor::new(board, unit, memory);
-    loop {
-        if !coprocessor.poll() {
-            idle();
-        }
-    }
+    whole.write(Coprocessor::new(board, unit, memory))
 }
 
 /// A register.
