@@ -62,7 +62,7 @@ pub fn gyroscope(
             }
         }
     } else {
-        lagging(recording, sensor, usable, &motion::of_reference(recording.reference.as_deref()?))
+        lagging(recording, sensor, usable, &motion::along_reference(recording, &mut calibration.warnings)?)
     };
     if recording.manifest.site.latitude_deg.is_none() {
         calibration.warnings.push(

@@ -23,10 +23,13 @@ pub mod gyr_path;
 pub mod gyr_rig;
 pub mod gyr_rig_fit;
 pub mod ladder;
+pub mod lag;
 pub mod mag;
+pub mod mag_reference;
 pub mod norm_fit;
 pub mod outcome;
 pub mod outlier;
+pub mod reference_fit;
 pub mod rig;
 pub mod rig_fit;
 pub mod rows;
@@ -50,7 +53,7 @@ pub struct Options {
     pub rig_acc: Option<&'static str>,
     /// The gyroscope's model of [`gyr_rig::MODELS`] where the recording has attitudes; `None` for the field form.
     pub rig_gyr: Option<&'static str>,
-    /// The magnetometer's rung of [`ladder::MAGNETOMETER`]; `None` for the field form.
+    /// The magnetometer's rung of [`ladder::MAGNETOMETER`] where the recording has attitudes; `None` for the field form.
     pub rig_mag: Option<&'static str>,
     /// Climb the ladders and say which rung to use.
     pub compare: bool,
@@ -89,7 +92,8 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         progress("fitting the magnetometer");
         let field = recording.manifest.site.field_ned_ut.map(|f| Vector3::from(f).norm());
         let usable = usable(&integrity, SensorKind::Mag, recording.rows());
-        let on_rig = rig::magnetometer(recording, mag, &usable, options, &mut calibration);
+        let on_rig = rig::magnetometer(recording, mag, &usable, options, &mut calibration)
+            .or_else(|| mag_reference::magnetometer(recording, mag, &usable, options, &mut calibration));
         let outcome = on_rig.unwrap_or_else(|| {
             let mut outcome = mag::calibrate(mag, &usable, field);
             if outcome.verdict.is_ok()

@@ -144,13 +144,18 @@ fn too_few(kind: SensorKind, name: &'static str, poses: &Poses) -> SensorOutcome
     refused(kind, name, Refusal::TooFewObservations { have: poses.poses.len(), need: LEAST_POSES }, None)
 }
 
+/// What the affine part of a rung is judged by.
+pub(super) fn limits() -> Limits {
+    Limits { observations: LEAST_POSES, directions: LEAST_POSES, ..Limits::for_norm(12, LEAST_POSES) }
+}
+
 /// The outcome of one rung.
 fn outcome(kind: SensorKind, rung: &Rung, poses: &Poses, sensor: &Triple, norm: f64) -> SensorOutcome {
     let summary = rung.fit.triad().map(|(triad, covariance)| {
         let directions = poses.poses.iter().map(|pose| triad.correct(&pose.value).normalize());
         let coverage = Coverage::of(directions);
         let unit_out = Unit::of(kind)[0];
-        (summarise(rung, sensor, unit_out, triad, covariance, coverage.share), coverage)
+        (summarise(&rung.fit, sensor, unit_out, triad, covariance, coverage.share), coverage)
     });
     let Some((summary, coverage)) = summary else {
         return refused(kind, rung.name, Refusal::NotFinite, None);
@@ -192,8 +197,7 @@ fn refused(
 }
 
 fn judge(fit: &RigFit, summary: &FitSummary, coverage: &Coverage<f64>, norm: f64) -> Result<(), Refusal> {
-    let limits =
-        Limits { observations: LEAST_POSES, directions: LEAST_POSES, ..Limits::for_norm(12, LEAST_POSES) };
+    let limits = limits();
     accept::check_observations(coverage, fit.free(), &limits)?;
     if fit.residuals <= fit.free() {
         let need = fit.free() / 3 + 1;
@@ -203,15 +207,15 @@ fn judge(fit: &RigFit, summary: &FitSummary, coverage: &Coverage<f64>, norm: f64
     accept::check_plausibility(&summary.triad, true, fit.rms / norm, &limits)
 }
 
-fn summarise(
-    rung: &Rung,
+/// The figures of a fit; `triad` and `covariance` are [`RigFit::triad`]'s.
+pub(super) fn summarise(
+    fit: &RigFit,
     sensor: &Triple,
     unit_out: Unit,
     triad: imucal_core::triad::Triad<f64>,
     covariance: DMatrix<f64>,
     coverage: f64,
 ) -> FitSummary {
-    let fit = &rung.fit;
     let std = |k: usize| covariance[(k, k)].sqrt();
     FitSummary {
         triad,

@@ -6,13 +6,14 @@
 use std::ops::Range;
 
 use imucal_core::{
-    model::rig::{GimbalPose, RigAxes},
+    model::rig::{GimbalPose, Pose, RigAxes},
     observation::{Block, BlockBuilder, Compared, Durations, Motion},
     rotation::{exp, log, matrix, quaternion, quaternion_log},
 };
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
 use super::turn::TurnGap;
+use crate::recording::Recording;
 
 /// A block lasts about this long, s: five samples at 100 Hz.
 const BLOCK: f64 = 0.05;
@@ -33,6 +34,25 @@ pub fn of_encoders(gimbal: &[[f64; 3]], axes: &RigAxes) -> Attitudes {
 pub fn of_angles(angles: &Vector3<f64>, axes: &RigAxes) -> Option<Matrix3<f64>> {
     let pose = GimbalPose::new(Vector3::zeros(), angles);
     angles.iter().all(|angle| angle.is_finite()).then(|| pose.rotations(axes).c_p_t.transpose())
+}
+
+/// Attitudes along a recording's reference, where no rig's encoders are there to prefer; what is wrong with a reference
+/// that gives none is said once.
+pub fn along_reference(recording: &Recording, warnings: &mut Vec<String>) -> Option<Attitudes> {
+    let reference = recording.reference.as_deref().filter(|_| recording.gimbal.is_none())?;
+    let attitudes = of_reference(reference);
+    if attitudes.iter().any(Option::is_some) {
+        return Some(attitudes);
+    }
+    let warning = format!(
+        "the reference attitude is not used: none of {} rows holds a unit quaternion in ref_qw, ref_qx, ref_qy, \
+         ref_qz; export it again, or leave these columns out",
+        reference.len()
+    );
+    if !warnings.contains(&warning) {
+        warnings.push(warning);
+    }
+    None
 }
 
 /// Attitudes of reference quaternions, w first; a row that holds no rotation is left out.

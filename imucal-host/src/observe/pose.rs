@@ -1,13 +1,15 @@
-//! Poses on a rig: rests during which the encoders stood still.
+//! Poses: on a rig, rests during which the encoders stood still; along a reference, samples whose attitude it gives.
 
 use std::ops::Range;
 
 use imucal_core::{
-    model::rig::{Axis, GimbalPose, RigAxes},
+    model::rig::{Axis, GimbalPose, Pose, ReferencePose, RigAxes},
     observation::Moments,
+    rotation::quaternion,
 };
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
+use super::cloud::cloud;
 use crate::recording::{
     Recording, Triple,
     manifest::{Axis as FileAxis, Rig},
@@ -48,13 +50,28 @@ pub enum NoPoses {
     RepeatedAxis,
 }
 
-/// Poses of one sensor and the rests they come from.
+/// Poses of one sensor.
 #[derive(Clone, Debug)]
-pub struct Poses {
-    /// Mean output and encoder angles.
-    pub poses: Vec<GimbalPose<f64>>,
-    /// The rig's axes.
-    pub axes: RigAxes,
+pub struct Poses<G: Pose<f64> = GimbalPose<f64>> {
+    /// Output, and encoder angles or attitude.
+    pub poses: Vec<G>,
+    /// The rig's axes; nothing along a reference.
+    pub axes: G::Axes,
+}
+
+/// The distinct usable samples of a sensor at which the table's attitude `C_t_p` is known, and their rows.
+pub fn along_reference(
+    values: &[Vector3<f64>],
+    usable: &[bool],
+    attitudes: &[Option<Matrix3<f64>>],
+) -> (Poses<ReferencePose<f64>>, Vec<usize>) {
+    let cloud = cloud(values, usable);
+    let known = cloud.points.iter().zip(&cloud.rows).filter_map(|(point, row)| {
+        let attitude = quaternion(attitudes.get(*row)?.as_ref()?);
+        Some((ReferencePose { value: point.value, attitude }, *row))
+    });
+    let (poses, rows) = known.unzip();
+    (Poses { poses, axes: () }, rows)
 }
 
 /// The rig's axes, of three gimbals.

@@ -149,6 +149,7 @@ fn rig(kind: SensorKind, found: Option<&RigFindings>) -> Value {
                 "middle_hard_iron_std": sources.map(|[_, middle]| vector(&middle.1)),
                 "field_n": found.and_then(|rig| rig.field_n).as_ref().map(vector),
                 "not_told": not_told,
+                "notes": found.map(|rig| &rig.notes),
             })
         }
     }
