@@ -15,13 +15,17 @@ pub const RESTS: usize = 14;
 
 /// Tumbled through so many attitudes, at 50 Hz.
 pub fn tumbled(rests: usize, seed: u64) -> Recording {
-    let unit = SimulatedUnit { interval: 0.02, ..SimulatedUnit::mtx() };
-    record("small.csv", &Tumble::new(rests, seed), &unit, seed + 1)
+    record("small.csv", &Tumble::new(rests, seed), &unit(), seed + 1)
 }
 
 /// The small recording.
 pub fn small() -> Recording {
     tumbled(RESTS, 5)
+}
+
+/// The unit of the small recording, and of motions of one's own.
+pub fn unit() -> SimulatedUnit {
+    SimulatedUnit { interval: 0.02, ..SimulatedUnit::mtx() }
 }
 
 /// Writes the small recording as `small.csv` and `small.toml` into a folder.
@@ -42,7 +46,7 @@ pub fn write_small(folder: &Path) -> PathBuf {
 ///
 /// Where the manifest lacks a conversion.
 pub fn recorded(duration: f64, truth: impl Fn(f64) -> [Vector3<f64>; 3]) -> Recording {
-    let (unit, manifest) = (SimulatedUnit::mtx(), small().manifest);
+    let (unit, manifest) = (unit(), small().manifest);
     let mut rng = ChaCha8Rng::seed_from_u64(17);
     let time: Vec<f64> = (0..(duration * 50.0) as usize).map(|row| row as f64 * 0.02).collect();
     let rows: Vec<[Vector3<f64>; 3]> = time.iter().map(|t| truth(*t)).collect();

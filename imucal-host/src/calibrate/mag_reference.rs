@@ -11,10 +11,7 @@
 use imucal_core::{
     accept::{self, Refusal},
     coverage::Coverage,
-    model::{
-        rig::ReferencePose,
-        unified::{Terms, UnifiedParameters},
-    },
+    model::{rig::ReferencePose, unified::UnifiedParameters},
 };
 use nalgebra::{Matrix3, Vector3};
 
@@ -25,23 +22,26 @@ use super::{
     lag::Lag,
     mag,
     outcome::{Calibration, FitSummary, Refused, SensorOutcome},
-    reference_fit::{self, ReferenceFit},
+    reference_fit::{self, ReferenceFit, Tracked},
     rig,
 };
 use crate::{
     observe::{
+        cloud::cloud,
         motion::{self, Attitudes},
         pose,
     },
     recording::{Recording, SensorKind, Triple, Unit},
 };
 
+/// To either side of the lag, s, where attitudes are looked at for how they turn with it.
+const ASIDE: f64 = 0.004;
 /// Samples that the search for a lag looks at: it is told by a thousand as well as by all.
 const FOR_LAG: usize = 1500;
 
 /// What a magnetometer is calibrated from.
 struct Samples {
-    poses: Vec<ReferencePose<f64>>,
+    tracked: Tracked,
     /// Distinct usable samples, with or without a reference.
     all: usize,
     notes: Vec<String>,
@@ -63,14 +63,19 @@ pub fn magnetometer(
     let known = field.filter(|_| matches!(asked, "M12" | "X18"));
     let name = if known.is_some() { "M12" } else { "M15" };
     let need = rig::limits().observations;
-    let Some(base) = reference_fit::start(&samples.poses) else {
-        return Some(refused(name, Refusal::TooFewObservations { have: samples.poses.len(), need }, None));
+    let Some(base) = reference_fit::start(&samples.tracked.poses) else {
+        return Some(refused(
+            name,
+            Refusal::TooFewObservations { have: samples.tracked.poses.len(), need },
+            None,
+        ));
     };
     let base = field.map_or(base, |field| of_length(&base, field.norm()));
     let basic = field.filter(|_| known.is_some() || options.compare);
-    let basic =
-        basic.map(|field| reference_fit::fit::<12>(&samples.poses, &UnifiedParameters::nominal(field), T12));
-    let turned = (known.is_none() || options.compare).then(|| reference_fit::fit(&samples.poses, &base, M15));
+    let basic = basic
+        .map(|field| reference_fit::fit::<12>(&samples.tracked, &UnifiedParameters::nominal(field), T12));
+    let turned =
+        (known.is_none() || options.compare).then(|| reference_fit::fit(&samples.tracked, &base, M15));
     if options.compare {
         let fits = [&basic, &turned].into_iter().zip(MAGNETOMETER);
         let steps = fits.filter_map(|(found, rung)| Some(step(rung, found.as_ref()?)));
@@ -100,18 +105,30 @@ fn of_length(parameters: &UnifiedParameters<f64>, length: f64) -> UnifiedParamet
 
 /// Samples with the attitude they were taken at: the sensor may be behind the reference.
 fn samples(recording: &Recording, sensor: &Triple, usable: &[bool], attitudes: &Attitudes) -> Samples {
-    let at = |attitudes: &Attitudes| pose::along_reference(&sensor.values, usable, attitudes).0.poses;
     let later = |lag: f64| motion::later(&recording.time, attitudes, lag);
-    let plain = at(attitudes);
-    let all = pose::along_reference(&sensor.values, usable, &vec![Some(Matrix3::identity()); usable.len()]);
-    let step = (plain.len() / FOR_LAG).max(1);
-    let lag = Lag::of(|lag| {
-        let some: Vec<_> = at(&later(lag)).into_iter().step_by(step).collect();
-        let terms: Terms<15> = M15;
-        reference_fit::start(&some).map_or(f64::NAN, |base| reference_fit::rms(&some, &base, terms))
-    });
-    let poses = if let Lag::Found(lag) = lag { at(&later(lag)) } else { plain };
-    Samples { poses, all: all.0.poses.len(), notes: vec![lag.note()] }
+    let at = |lag: f64| pose::along_reference(&sensor.values, usable, &later(lag)).0.poses;
+    let (plain, rows) = pose::along_reference(&sensor.values, usable, attitudes);
+    let all = cloud(&sensor.values, usable).rows.len();
+    let rms = |poses: &[ReferencePose<f64>]| {
+        reference_fit::start(poses).map_or(f64::NAN, |base| reference_fit::rms(poses, &base, M15))
+    };
+    let step = (rows.len() / FOR_LAG).max(1);
+    let some = |lag: f64| at(lag).into_iter().step_by(step).collect::<Vec<_>>();
+    let lag = Lag::of(|lag| rms(&some(lag)), |lag| rms(&at(lag)));
+    let tracked = match lag {
+        Lag::Found(lag) => {
+            let [before, now, after] = [-ASIDE, 0.0, ASIDE].map(|aside| later(lag + aside));
+            let (found, rows) = pose::along_reference(&sensor.values, usable, &now);
+            let c_p_t = |attitudes: &Attitudes, row: usize| attitudes[row].map(|c| c.transpose());
+            let slope = |row: &usize| {
+                let moved = c_p_t(&after, *row).zip(c_p_t(&before, *row));
+                moved.map_or_else(Matrix3::zeros, |(after, before)| (after - before) / (2.0 * ASIDE))
+            };
+            Tracked { poses: found.poses, by_lag: rows.iter().map(slope).collect() }
+        }
+        Lag::OutOfReach => Tracked { poses: plain.poses, by_lag: Vec::new() },
+    };
+    Samples { tracked, all, notes: vec![lag.note()] }
 }
 
 fn outcome(
@@ -153,7 +170,7 @@ fn note(summary: &mut FitSummary, samples: &Samples, found: &ReferenceFit, known
     let Some(rig) = &mut summary.rig else { return };
     rig.notes.push(format!(
         "against the reference attitude at {} of {} samples; the others have none",
-        samples.poses.len(),
+        samples.tracked.poses.len(),
         samples.all
     ));
     rig.notes.extend(samples.notes.iter().cloned());

@@ -10,6 +10,10 @@
 //! linear in W and b. W, nine rows of three, has rank one; its leading singular vectors are K and the direction of e.
 //! What is told then: K with the mounting in it, b and the direction of e, but of K's size and the length of e their
 //! product alone. K's determinant is taken as positive: a left-handed sensor would show the field reversed.
+//!
+//! How far the sensor is behind the reference ([`super::lag`]) is one more parameter that K is hardly told apart from,
+//! since a hand turns about one axis more than about others. Standard errors allow for it: what a lag does to each output
+//! is taken out of the Jacobian's columns, which leaves the covariance of the others whatever the lag is.
 
 use imucal_core::{
     accept,
@@ -17,6 +21,7 @@ use imucal_core::{
         rig::{Pose, ReferencePose},
         unified::{Terms, UnifiedModel, UnifiedParameters},
     },
+    solver::triangular::Triangular,
 };
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
@@ -81,15 +86,24 @@ pub fn start(poses: &[ReferencePose<f64>]) -> Option<UnifiedParameters<f64>> {
     finite.then_some(parameters)
 }
 
+/// Samples with their attitudes, and how these turn with the lag.
+#[derive(Clone, Debug)]
+pub struct Tracked {
+    /// The samples.
+    pub poses: Vec<ReferencePose<f64>>,
+    /// Change of `C_p_t` with the lag, 1/s; empty where no lag was found.
+    pub by_lag: Vec<Matrix3<f64>>,
+}
+
 /// Fits `terms` from `base`, leaving out gross outliers; where that would be more than [`MOST`], none is.
 pub fn fit<const P: usize>(
-    poses: &[ReferencePose<f64>],
+    tracked: &Tracked,
     base: &UnifiedParameters<f64>,
     terms: Terms<P>,
 ) -> ReferenceFit {
-    let found = fit_leaving_out(poses, base, terms, ROUNDS);
-    let too_many = found.left_out.len() as f64 > MOST * poses.len() as f64;
-    if too_many { fit_leaving_out(poses, base, terms, 0) } else { found }
+    let found = fit_leaving_out(tracked, base, terms, ROUNDS);
+    let too_many = found.left_out.len() as f64 > MOST * tracked.poses.len() as f64;
+    if too_many { fit_leaving_out(tracked, base, terms, 0) } else { found }
 }
 
 /// Rms residual of an axis at the plain fit.
@@ -102,20 +116,21 @@ pub fn rms<const P: usize>(
 }
 
 fn fit_leaving_out<const P: usize>(
-    poses: &[ReferencePose<f64>],
+    tracked: &Tracked,
     base: &UnifiedParameters<f64>,
     terms: Terms<P>,
     rounds: usize,
 ) -> ReferenceFit {
-    let mut used: Vec<usize> = (0..poses.len()).collect();
-    let mut kept = poses.to_vec();
+    let mut used: Vec<usize> = (0..tracked.poses.len()).collect();
+    let mut kept = tracked.poses.clone();
     let mut left_out = Vec::new();
     let mut round = 0;
     let (fit, inflation, nonlinearity) = loop {
         let solved = solve(&kept, (), base, terms, None);
         let found = outliers(&distances(&solved.model, solved.solver.theta()));
         if found.is_empty() || round == rounds {
-            break summarise(&solved);
+            let by_lag: Vec<_> = used.iter().filter_map(|k| tracked.by_lag.get(*k).copied()).collect();
+            break summarise(&solved, &by_lag);
         }
         for (index, size) in found.into_iter().rev() {
             left_out.push((used.remove(index), size));
@@ -138,17 +153,43 @@ fn distances<const P: usize>(
 }
 
 /// The fit, its inflation and its departure from a parabola.
-fn summarise<const P: usize>(solved: &Solved<'_, P, ReferencePose<f64>>) -> (RigFit, f64, f64) {
+fn summarise<const P: usize>(
+    solved: &Solved<'_, P, ReferencePose<f64>>,
+    by_lag: &[Matrix3<f64>],
+) -> (RigFit, f64, f64) {
     let Solved { model, solver, .. } = solved;
-    let inflation = match solver.factor().covariance(1.0) {
-        Some(unscaled) => serial::inflation(&Rows::of(model, solver.theta()), &unscaled, 3),
-        None => SVector::repeat(1.0),
+    let mut rows = Rows::of(model, solver.theta());
+    let now = model.terms.parameters(&model.base, solver.theta());
+    let lagging = by_lag.iter().flat_map(|by| {
+        let moved = now.sensitivity * (by * now.vector_n);
+        [moved.x, moved.y, moved.z]
+    });
+    take_out(&mut rows, &lagging.collect::<Vec<_>>());
+    let mut factor = Triangular::default();
+    rows.residuals.iter().zip(&rows.jacobian).for_each(|(r, j)| factor.push(*r, j));
+    let told = factor.covariance(1.0).zip(solver.variance());
+    let (inflation, covariance) = match told {
+        Some((unscaled, variance)) => {
+            let inflation = serial::inflation(&rows, &unscaled, 3);
+            let scale = SMatrix::from_diagonal(&inflation);
+            (inflation, scale * unscaled * scale * variance)
+        }
+        None => (SVector::repeat(1.0), SMatrix::repeat(f64::INFINITY)),
     };
-    let scale = SMatrix::from_diagonal(&inflation);
-    let covariance =
-        solver.covariance().map_or_else(|| SMatrix::repeat(f64::INFINITY), |white| scale * white * scale);
     let bend = accept::nonlinearity(solver, model, inflation.max());
     (solved.fit(covariance, held_out(solved)), inflation.max(), bend)
+}
+
+/// Takes out of each column of the Jacobian what is like `direction`; rows beyond its end have none of it.
+fn take_out<const P: usize>(rows: &mut Rows<P>, direction: &[f64]) {
+    let length: f64 = direction.iter().map(|x| x * x).sum();
+    if length <= 0.0 {
+        return;
+    }
+    let like: SVector<f64, P> = rows.jacobian.iter().zip(direction).map(|(row, x)| row * *x).sum();
+    for (row, x) in rows.jacobian.iter_mut().zip(direction) {
+        *row -= like * (x / length);
+    }
 }
 
 /// Rms residual of an axis in contiguous parts left out in turn, each time fitted anew; `None` where one does not
