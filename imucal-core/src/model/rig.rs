@@ -56,6 +56,17 @@ pub struct ReferencePose<T: Scalar> {
     pub attitude: Quaternion<T>,
 }
 
+impl<T: Scalar> ReferencePose<T> {
+    /// The same pose in another precision.
+    pub fn cast<U: Scalar>(&self) -> ReferencePose<U> {
+        let cast = |x: T| U::of(x.wide());
+        ReferencePose {
+            value: self.value.map(cast),
+            attitude: Quaternion::from(self.attitude.coords.map(cast)),
+        }
+    }
+}
+
 impl<T: Scalar> Pose<T> for ReferencePose<T> {
     type Axes = ();
 
@@ -96,6 +107,11 @@ impl<T: Scalar> GimbalPose<T> {
     /// A pose at encoder angles (outer, middle, inner), rad.
     pub fn new(value: Vector3<T>, angles: &Vector3<T>) -> Self {
         Self { value, sin: angles.map(|a| a.sin()), cos: angles.map(|a| a.cos()) }
+    }
+
+    /// The encoders' angles (outer, middle, inner), rad, in (−π, π].
+    pub fn angles(&self) -> Vector3<T> {
+        self.sin.zip_map(&self.cos, |sin, cos| sin.atan2(cos))
     }
 
     /// The same pose in another precision.

@@ -218,6 +218,7 @@ fn summary<const P: usize>(
         bias_wander: None,
         rig: None,
         alignment: None,
+        search: None,
     }
 }
 

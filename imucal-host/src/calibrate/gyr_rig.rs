@@ -19,8 +19,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::{
     Options, compare,
     gyr_motions::{Observations, lagging, on_encoders},
-    gyr_rig_fit::{self, LARGEST_RMS, MotionFit, REACH, Search},
-    outcome::{Calibration, FitSummary, Refused, RigFindings, SensorOutcome},
+    gyr_rig_fit::{self, LARGEST_RMS, MotionFit},
+    outcome::{Calibration, Evidence, FitSummary, Refused, RigFindings, SensorOutcome},
 };
 use crate::{
     observe::{motion, pose},
@@ -124,7 +124,10 @@ fn outcome(name: &'static str, sensor: &Triple, observations: &Observations) -> 
             model: name,
             verdict: Ok(()),
             fit: Some(summary),
-            evidence: None,
+            evidence: Some(Evidence::Motions {
+                data: fit.kept.iter().map(|k| observations.data[*k].clone()).collect(),
+                fit: Box::new(fit),
+            }),
         },
         Err(refusal) => refused(name, refusal, Some(summary)),
     }
@@ -168,15 +171,7 @@ fn summarise(fit: &MotionFit, sensor: &Triple, observations: &Observations) -> F
         let from = observations.data[*k].rows.start;
         format!("motion from row {from}: {size:.1} robust standard deviations")
     }));
-    let mut notes = observations.notes.clone();
-    notes.push(match fit.search {
-        Search::Direct => "found by Levenberg–Marquardt from the static bias".into(),
-        Search::Swarm => format!(
-            "found by a particle swarm (gain within ±{}, bias within ±{:.0} °/s), polished by Levenberg–Marquardt",
-            REACH.0,
-            REACH.1.to_degrees()
-        ),
-    });
+    let notes = observations.notes.clone();
     let sensitivity = (fit.entries.len() == 21).then(|| {
         let at = |of: &dyn Fn(usize) -> f64| Matrix3::from_fn(|i, j| of(12 + 3 * i + j));
         (at(&|k| fit.parameters[k]), at(&std))
@@ -211,6 +206,7 @@ fn summarise(fit: &MotionFit, sensor: &Triple, observations: &Observations) -> F
         bias_wander: observations.wander,
         rig: Some(RigFindings { notes, g_sensitivity: sensitivity, ..RigFindings::default() }),
         alignment: None,
+        search: Some(fit.search),
     }
 }
 

@@ -127,6 +127,7 @@ fn summarise(
         bias_wander: None,
         rig: None,
         alignment: None,
+        search: None,
     }
 }
 

@@ -21,7 +21,7 @@ use super::{
     ladder::{M15, MAGNETOMETER, T12},
     lag::Lag,
     mag,
-    outcome::{Calibration, FitSummary, Refused, SensorOutcome},
+    outcome::{Calibration, Evidence, FitSummary, Refused, SensorOutcome},
     reference_fit::{self, ReferenceFit, Tracked},
     rig,
 };
@@ -29,7 +29,7 @@ use crate::{
     observe::{
         cloud::cloud,
         motion::{self, Attitudes},
-        pose,
+        pose::{self, Poses},
     },
     recording::{Recording, SensorKind, Triple, Unit},
 };
@@ -158,7 +158,10 @@ fn outcome(
             model: name,
             verdict: Ok(()),
             fit: Some(summary),
-            evidence: None,
+            evidence: Some(Evidence::Reference(
+                Poses { poses: found.kept.clone(), axes: () },
+                Box::new(found.fit.clone()),
+            )),
         },
         Err(refusal) => refused(name, refusal, Some(summary)),
     }

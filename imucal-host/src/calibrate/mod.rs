@@ -33,6 +33,7 @@ pub mod reference_fit;
 pub mod rig;
 pub mod rig_fit;
 pub mod rows;
+pub mod search;
 pub mod segmentation;
 pub mod serial;
 

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 use super::{
     Options, compare,
     ladder::{self, Rung},
-    outcome::{Calibration, FitSummary, Refused, RigFindings, SensorOutcome, entry_name},
+    outcome::{Calibration, Evidence, FitSummary, Refused, RigFindings, SensorOutcome, entry_name},
     rig_fit::RigFit,
 };
 use crate::{
@@ -161,9 +161,13 @@ fn outcome(kind: SensorKind, rung: &Rung, poses: &Poses, sensor: &Triple, norm: 
         return refused(kind, rung.name, Refusal::NotFinite, None);
     };
     match judge(&rung.fit, &summary, &coverage, norm) {
-        Ok(()) => {
-            SensorOutcome { kind, model: rung.name, verdict: Ok(()), fit: Some(summary), evidence: None }
-        }
+        Ok(()) => SensorOutcome {
+            kind,
+            model: rung.name,
+            verdict: Ok(()),
+            fit: Some(summary),
+            evidence: Some(Evidence::Gimbals(poses.clone(), Box::new(rung.fit.clone()))),
+        },
         Err(refusal) => refused(kind, rung.name, refusal, Some(summary)),
     }
 }
@@ -242,6 +246,7 @@ pub(super) fn summarise(
         bias_wander: None,
         rig: Some(findings(fit)),
         alignment: None,
+        search: None,
     }
 }
 

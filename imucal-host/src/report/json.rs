@@ -9,6 +9,7 @@ use crate::{
         alignment::Alignment,
         compare::Comparison,
         outcome::{RigFindings, entry_name},
+        search::Search,
     },
     recording::SensorKind,
     store::FORMAT,
@@ -101,6 +102,7 @@ fn fit_value(kind: SensorKind, fit: &FitSummary) -> Value {
         "gain_spread_over_thresholds": fit.gain_spread,
         "bias_interpolated": fit.bias_wander.map(|w| w.interpolated),
         "alignment": fit.alignment.as_ref().map(alignment),
+        "search": fit.search.as_ref().map(search),
         "rig": rig,
     })
 }
@@ -116,6 +118,27 @@ fn alignment(found: &Alignment) -> Value {
         "dip_held_out_rms": found.held_out_rms,
         "rests": found.rests,
         "unit": "rad",
+    })
+}
+
+/// How a gyroscope's fit was reached.
+fn search(found: &Search) -> Value {
+    let swarm = found.swarm.map(|swarm| {
+        json!({
+            "termination": swarm.termination.name(),
+            "converged": swarm.termination.was_successful(),
+            "iterations": swarm.iterations,
+            "evaluations": swarm.evaluations,
+            "spread": swarm.spread,
+            "parameters_at_bound": swarm.at_bound,
+            "rms": swarm.rms,
+            "kept": swarm.kept,
+        })
+    });
+    json!({
+        "direct": {"termination": found.direct.0.name(), "rms": found.direct.1},
+        "swarm": swarm,
+        "note": found.note(),
     })
 }
 

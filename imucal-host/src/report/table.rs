@@ -187,6 +187,9 @@ fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {
     if let Some(rig) = &fit.rig {
         write_rig(text, rig)?;
     }
+    if let Some(search) = &fit.search {
+        writeln!(text, "  {}", search.note())?;
+    }
     for left in &fit.left_out {
         writeln!(text, "  left out: {left}")?;
     }

@@ -156,6 +156,6 @@ fn a_start_far_off_is_left_to_the_swarm_which_ends_where_the_static_bias_does() 
     let found = on_encoders(&recording, sensor, &usable, gimbal, &attitudes, &axes);
     let near = gyr_rig_fit::fit(&found.data, FULL, found.bias);
     let far = gyr_rig_fit::search(&found.data, FULL, found.bias + Vector3::new(0.12, -0.1, 0.15)).unwrap();
-    assert_eq!((near.search, far.search), (Search::Direct, Search::Swarm));
+    assert!(near.search.swarm.is_none() && far.search.swarm.is_some_and(|swarm| swarm.kept));
     assert!((near.triad.gain - far.triad.gain).norm() < 1e-5, "{} {}", near.triad.gain, far.triad.gain);
 }
