@@ -101,6 +101,7 @@ fn step<const P: usize>(
         squared_sum: 2.0 * fit.report.cost,
         rms: fit.rms(),
         held_out_rms: problem.leave_one_out_rms(&fit),
+        second_half_rms: None,
     }
 }
 

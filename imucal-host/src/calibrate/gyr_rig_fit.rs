@@ -142,6 +142,7 @@ impl MotionFit {
             squared_sum: self.squared_sum,
             rms: self.rms,
             held_out_rms: self.held_out_rms,
+            second_half_rms: None,
         }
     }
 }
@@ -280,45 +281,28 @@ fn held_out<const P: usize, A: Model<f64, P>>(
     Some(rms(held?.into_iter()))
 }
 
-/// Steps of a comparison below the fits: nothing estimated, and the bias alone, over the motions that `kept` names.
-pub fn lower_steps(data: &[MotionData], kept: &[usize], bias: Vector3<f64>) -> [Step; 2] {
-    let used: Vec<&MotionData> = kept.iter().map(|k| &data[*k]).collect();
+/// Sum of weighted squares and rms attitude error, rad, of motions under parameters that are given.
+pub fn score<const P: usize>(
+    data: &[MotionData],
+    form: Parameterisation<P>,
+    theta: &SVector<f64, P>,
+) -> (f64, f64) {
+    let used: Vec<&MotionData> = data.iter().collect();
+    let motions: Vec<_> = used.iter().map(|d| d.motion()).collect();
+    let weights = weights(&used);
+    let errors = errors(&Weighted { motions: &motions, weights: &weights, form }, theta);
+    (errors.iter().map(|e| e * e).sum(), unweighted(&errors, &weights))
+}
+
+/// The bias alone, gain nominal, rad/s, and the held-out rms attitude error, rad.
+pub fn bias_alone(data: &[MotionData], bias: Vector3<f64>) -> (Vector3<f64>, Option<f64>) {
+    let used: Vec<&MotionData> = data.iter().collect();
     let motions: Vec<_> = used.iter().map(|d| d.motion()).collect();
     let weights = weights(&used);
     let model = Weighted { motions: &motions, weights: &weights, form: FULL };
-    let nominal = errors(&model, &FULL.theta(&Triad::identity()));
-    let rms_nominal = unweighted(&nominal, &weights);
     let only = BiasOnly(model);
     let mut solver = LevenbergMarquardt::new(bias, Settings::default());
     solver.run(&only);
-    let errors = lengths(&Residuals::of(&only, solver.theta()));
-    let step = |name, adds, entries: Vec<u8>, squared_sum, rms, held_out_rms| Step {
-        name,
-        adds,
-        free: entries.len(),
-        entries,
-        residuals: 3 * used.len(),
-        squared_sum,
-        rms,
-        held_out_rms,
-    };
-    let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
-    [
-        step(
-            "-",
-            "nothing: as the sheet says",
-            Vec::new(),
-            squares(&nominal),
-            rms_nominal,
-            Some(rms_nominal),
-        ),
-        step(
-            "B3",
-            "bias",
-            vec![9, 10, 11],
-            squares(&errors),
-            unweighted(&errors, &weights),
-            held_out(&only, solver.theta(), used.len(), |k| BiasOnly(model.only(k))),
-        ),
-    ]
+    let held = held_out(&only, solver.theta(), used.len(), |k| BiasOnly(model.only(k)));
+    (Vector3::from(*solver.theta()), held)
 }

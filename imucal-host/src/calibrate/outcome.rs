@@ -166,8 +166,19 @@ pub struct RigFindings {
     pub not_told: Vec<String>,
     /// How a fit against attitudes was made, in words.
     pub notes: Vec<String>,
+    /// Terms beyond gain and bias, where they were estimated.
+    pub higher_order: Option<HigherOrder>,
     /// The gyroscope's g-sensitivity, table axes in, raw rad/s per m/s², with standard errors, where it was estimated.
     pub g_sensitivity: Option<(Matrix3<f64>, Matrix3<f64>)>,
+}
+
+/// Terms that a record has no room for.
+#[derive(Clone, Debug)]
+pub struct HigherOrder {
+    /// Name, value on each axis and standard errors; 1/SI, cubic ones 1/SI².
+    pub terms: Vec<(&'static str, Vector3<f64>, Vector3<f64>)>,
+    /// Most that gain and bias alone leave of them at a pose, calibrated unit.
+    pub uncorrected: f64,
 }
 
 /// How a bias moved from rest to rest.

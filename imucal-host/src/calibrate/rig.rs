@@ -3,14 +3,16 @@
 use imucal_core::{
     accept::{self, Limits, Refusal},
     coverage::Coverage,
-    model::unified::UnifiedParameters,
+    model::{rig::Pose, unified::UnifiedParameters},
 };
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{
     Options, compare,
     ladder::{self, Rung},
-    outcome::{Calibration, Evidence, FitSummary, Refused, RigFindings, SensorOutcome, entry_name},
+    outcome::{
+        Calibration, Evidence, FitSummary, HigherOrder, Refused, RigFindings, SensorOutcome, entry_name,
+    },
     rig_fit::RigFit,
 };
 use crate::{
@@ -155,7 +157,11 @@ fn outcome(kind: SensorKind, rung: &Rung, poses: &Poses, sensor: &Triple, norm: 
         let directions = poses.poses.iter().map(|pose| triad.correct(&pose.value).normalize());
         let coverage = Coverage::of(directions);
         let unit_out = Unit::of(kind)[0];
-        (summarise(&rung.fit, sensor, unit_out, triad, covariance, coverage.share), coverage)
+        let mut summary = summarise(&rung.fit, sensor, unit_out, triad, covariance, coverage.share);
+        if let Some(rig) = &mut summary.rig {
+            rig.higher_order = higher_order(&rung.fit, poses);
+        }
+        (summary, coverage)
     });
     let Some((summary, coverage)) = summary else {
         return refused(kind, rung.name, Refusal::NotFinite, None);
@@ -270,6 +276,24 @@ fn findings(fit: &RigFit) -> RigFindings {
             .collect(),
         ..RigFindings::default()
     }
+}
+
+/// Quadratic, cubic and cross terms, and what a device leaves of them; `None` where none is estimated.
+fn higher_order(fit: &RigFit, poses: &Poses) -> Option<HigherOrder> {
+    let now = &fit.parameters;
+    let all =
+        [("quadratic", 23, now.quadratic), ("cubic", 26, now.cubic), ("cross-axis", 29, now.cross_product)];
+    let std = |from: u8| Vector3::from_fn(|k, _| fit.std(from + k as u8).unwrap_or(0.0));
+    let estimated = all.into_iter().filter(|(_, from, _)| fit.entries.contains(from));
+    let terms: Vec<_> = estimated.map(|(name, from, value)| (name, value, std(from))).collect();
+    let gain = now.sensitivity.try_inverse().filter(|_| !terms.is_empty())?;
+    let none = Vector3::zeros();
+    let affine = UnifiedParameters { quadratic: none, cubic: none, cross_product: none, ..*now };
+    let left = poses.poses.iter().map(|pose| {
+        let at = pose.rotations(&poses.axes);
+        (gain * (now.predict(&at) - affine.predict(&at))).norm()
+    });
+    Some(HigherOrder { terms, uncorrected: left.fold(0.0, f64::max) })
 }
 
 /// Name of an entry of the unified model.

@@ -192,6 +192,7 @@ impl RigFit {
             squared_sum: self.squared_sum,
             rms: self.rms,
             held_out_rms: self.held_out_rms,
+            second_half_rms: None,
         }
     }
 

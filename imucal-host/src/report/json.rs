@@ -8,7 +8,7 @@ use crate::{
         Calibration, FitSummary, SegmentationReport, SensorOutcome,
         alignment::Alignment,
         compare::Comparison,
-        outcome::{RigFindings, entry_name},
+        outcome::{HigherOrder, RigFindings, entry_name},
         search::Search,
     },
     recording::SensorKind,
@@ -153,6 +153,7 @@ fn rig(kind: SensorKind, found: Option<&RigFindings>) -> Value {
                 "tilt_y": tilt.map(|(tilt, _)| tilt[1]),
                 "tilt_std": tilt.map(|(_, std)| std),
                 "not_told": not_told,
+                "higher_order": found.and_then(|rig| rig.higher_order.as_ref()).map(higher_order),
             })
         }
         SensorKind::Gyr => found.map_or(Value::Null, |rig| {
@@ -178,6 +179,16 @@ fn rig(kind: SensorKind, found: Option<&RigFindings>) -> Value {
     }
 }
 
+/// Terms that are estimated and not stored.
+fn higher_order(found: &HigherOrder) -> Value {
+    let terms: serde_json::Map<String, Value> = found
+        .terms
+        .iter()
+        .map(|(name, value, std)| ((*name).to_owned(), json!({"value": vector(value), "std": vector(std)})))
+        .collect();
+    json!({"terms": terms, "stored": false, "uncorrected": found.uncorrected})
+}
+
 fn comparison(comparison: &Comparison) -> Value {
     let rungs: Vec<Value> = comparison
         .rungs
@@ -189,6 +200,7 @@ fn comparison(comparison: &Comparison) -> Value {
                 "parameters": step.free,
                 "rms": step.rms,
                 "held_out_rms": step.held_out_rms,
+                "second_half_rms": step.second_half_rms,
                 "p_value": p_value,
             })
         })

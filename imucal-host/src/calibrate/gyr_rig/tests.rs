@@ -139,11 +139,18 @@ fn a_reference_whose_clock_is_early_is_found_so_and_costs_nothing() {
 #[test]
 fn a_comparison_finds_that_the_gain_matters_and_climbs_no_further_without_cause() {
     let (recording, ..) = simulated(Programme::Full, 6);
-    let calibration = calibrated(&recording, &Options { compare: true, ..Options::default() });
+    let options = Options { compare: true, multipliers: vec![4.0], ..Options::default() };
+    let calibration = calibrate(&recording, &options, &|_| ());
     let found = calibration.comparisons.iter().find(|c| c.kind == SensorKind::Gyr).unwrap();
     let names: Vec<_> = found.rungs.iter().map(|(step, _)| step.name).collect();
-    assert_eq!(names, ["-", "B3", G12, G21]);
+    assert_eq!(names, ["-", "B3", "K9", G12, G21]);
     assert_eq!(found.chosen, G12, "{}", found.why);
+    let second: Vec<f64> = found.rungs.iter().filter_map(|(step, _)| step.second_half_rms).collect();
+    println!("{second:?}");
+    let [nominal, bias, field, full, with_force] = second[..] else { panic!("{second:?}") };
+    // Attitudes tell more than gravity's direction does; what is not there to be found does not help.
+    assert!(nominal > bias && bias > 2.0 * field && field > full, "{second:?}");
+    assert!(with_force > 0.95 * full, "{second:?}");
 }
 
 #[test]
