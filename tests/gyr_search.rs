@@ -1,5 +1,9 @@
 //! A gyroscope without a rig whose nominal conversion is wrong: where Levenberg–Marquardt alone still arrives, where it
 //! does not, and that a swarm and its polish do.
+//!
+//! On the way measured, the recording of a raw MTi, from the bias of the rests: Levenberg–Marquardt arrives for
+//! `per_unit` of 0.6 to 2.5 times the true one and any offset, and fails at 0.5 and 0.4. With the bias unknown it
+//! arrives for offsets of up to 20 °/s with `per_unit` off by up to 20 %, and fails at 40 °/s on each axis.
 
 use imucal_core::{
     model::{parameterisation::FULL, turn::TurnModel},
@@ -11,112 +15,114 @@ use imucal_core::{
     triad::Triad,
 };
 use imucal_host::{
-    calibrate::{Calibration, Options, calibrate, outcome::Evidence},
+    calibrate::{Calibration, FitSummary, Options, calibrate, outcome::Evidence, search::Search},
     recording::{Nominal, Recording, SensorKind},
+    report::table::table,
 };
-use imucal_tests::data;
+use imucal_tests::{data, golden::assert_close};
 use nalgebra::{Matrix3, SVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
-/// What peers find of this recording, LSB/(rad/s).
+/// What peers find of this recording, LSB/(rad/s); another threshold of the rest test moves it by 7.
 const PEERS: [f64; 3] = [4777.99, 4764.37, 4773.13];
+const NEAR: f64 = 10.0;
 
-fn recording() -> Option<Recording> {
-    Some(Recording::read(&data::real("xsens-mti.csv.gz")?).expect("a good recording"))
-}
-
-/// The recording as a manifest would have it whose nominal conversion of the gyroscope is this.
-fn with_nominal(recording: &Recording, offset: f64, per_unit: f64) -> Recording {
+/// The recording as it would be with another nominal conversion of its gyroscope: an offset from mid-scale, °/s, and a
+/// factor on `per_unit`.
+fn with_nominal(recording: &Recording, offset: f64, factor: f64) -> Recording {
     let mut changed = recording.clone();
     let gyr = changed.gyr.as_mut().expect("recorded");
     let was = gyr.nominal;
-    gyr.nominal = Nominal { offset, per_unit };
-    let now = gyr.nominal;
-    gyr.values
-        .iter_mut()
-        .for_each(|value| *value = value.map(|v| (was.to_raw(v) - now.offset) / now.per_unit));
+    let offset = was.offset + offset * was.per_unit.to_radians();
+    gyr.nominal = Nominal { offset, per_unit: factor * was.per_unit };
+    let per_unit = gyr.nominal.per_unit;
+    gyr.values.iter_mut().for_each(|value| *value = value.map(|v| (was.to_raw(v) - offset) / per_unit));
     changed
 }
 
-fn calibrated(recording: &Recording) -> Calibration {
+fn calibrated(offset: f64, factor: f64) -> Option<Calibration> {
+    let recording = Recording::read(&data::real("xsens-mti.csv.gz")?).expect("a good recording");
     let options = Options { multipliers: vec![4.0], ..Options::default() };
-    calibrate(recording, &options, &|_| {})
+    Some(calibrate(&with_nominal(&recording, offset, factor), &options, &|_| {}))
+}
+
+fn found(calibration: &Calibration) -> (&FitSummary, Search) {
+    let fit = calibration.sensor(SensorKind::Gyr).and_then(|s| s.fit.as_ref()).expect("recorded");
+    (fit, fit.search.expect("a gyroscope's"))
+}
+
+fn per_unit(fit: &FitSummary) -> [f64; 3] {
+    fit.raw_triad().gain.diagonal().map(f64::recip).into()
 }
 
 #[test]
-fn explore() {
-    let Some(recording) = recording() else { return };
-    let nominal = recording.gyr.as_ref().expect("recorded").nominal;
-    for factor in [0.4, 0.5, 0.6, 0.7, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.5] {
-        let per_degree = nominal.per_unit.to_radians();
-        let changed = with_nominal(&recording, nominal.offset + 8.0 * per_degree, factor * nominal.per_unit);
-        let calibration = calibrated(&changed);
-        let outcome = calibration.sensor(SensorKind::Gyr).expect("recorded");
-        let Some(fit) = outcome.fit.as_ref() else {
-            println!("{factor}: {:?}", outcome.verdict);
-            continue;
-        };
-        println!(
-            "{factor}: {:?} {:?} {}",
-            outcome.verdict.as_ref().err(),
-            fit.raw_triad().gain.diagonal().map(f64::recip).as_slice(),
-            fit.search.expect("gyr").note()
-        );
+fn offsets_at_mid_scale_and_beyond_and_a_fifth_of_the_scale_need_no_swarm() {
+    for (offset, factor) in [(0.0, 1.0), (8.0, 1.2), (-8.0, 0.8)] {
+        let Some(calibration) = calibrated(offset, factor) else { return };
+        let (fit, search) = found(&calibration);
+        assert!(search.direct.0.was_successful() && search.swarm.is_none(), "{search:?}");
+        assert_close("scale", &per_unit(fit), &PEERS, NEAR);
     }
-    let calibration = calibrated(&recording);
+}
+
+#[test]
+fn where_the_scale_is_off_by_half_a_swarm_finds_what_levenberg_marquardt_alone_does_not() {
+    let Some(calibration) = calibrated(8.0, 0.51) else { return };
+    let (fit, search) = found(&calibration);
+    let swarm = search.swarm.unwrap_or_else(|| panic!("{search:?}"));
+    assert!(search.direct.1 > 0.5 && swarm.kept, "{search:?}");
+    assert_close("scale", &per_unit(fit), &PEERS, NEAR);
+    assert!(calibration.sensor(SensorKind::Gyr).is_some_and(|s| s.verdict.is_ok()));
+    // The report says which way it went.
+    let table = table(&calibration);
+    for part in ["a particle swarm", "evaluations", "Levenberg–Marquardt from its best is kept"] {
+        assert!(table.contains(part), "{table}");
+    }
+}
+
+#[test]
+fn a_truth_beyond_the_swarm_s_bounds_is_said_to_be_so_and_refused_with_its_figures() {
+    let Some(calibration) = calibrated(0.0, 0.4) else { return };
+    let (fit, search) = found(&calibration);
+    let swarm = search.swarm.unwrap_or_else(|| panic!("{search:?}"));
+    assert!(
+        swarm.at_bound > 0 && search.note().contains("bounds, which may exclude the truth"),
+        "{search:?}"
+    );
+    let outcome = calibration.sensor(SensorKind::Gyr).expect("recorded");
+    let refused = outcome.verdict.as_ref().expect_err("0.4 of its nominal gain");
+    assert_eq!(refused.refusal.reason(), "implausible");
+    // For information, and right: it is [counts] that is wrong.
+    assert_close("scale", &per_unit(fit), &PEERS, NEAR);
+}
+
+#[test]
+fn without_the_bias_of_the_rests_a_swarm_finds_an_offset_that_levenberg_marquardt_does_not() {
+    let Some(calibration) = calibrated(0.0, 1.0) else { return };
     let evidence = calibration.sensor(SensorKind::Gyr).and_then(|s| s.evidence.as_ref());
     let Some(Evidence::Turns(known)) = evidence else { panic!("accepted") };
-    let turns: Vec<Turn<'_, f64>> = known.iter().map(|t| t.data.between(t.before, t.after)).collect();
-    let model = TurnModel { turns: &turns, form: FULL };
+    let all: Vec<Turn<'_, f64>> = known.iter().map(|t| t.data.between(t.before, t.after)).collect();
+    let mut shortest = all.clone();
+    shortest.sort_by_key(|turn| turn.blocks.len());
+    shortest.truncate(20);
+    let cost = TurnModel { turns: &shortest, form: FULL };
     let polish = |from: SVector<f64, 12>| {
         let mut solver = LevenbergMarquardt::new(from, Default::default());
-        let report = solver.run(&model);
-        (report.termination, report.cost, *solver.theta())
+        let cost = solver.run(&TurnModel { turns: &all, form: FULL }).cost;
+        (cost, *solver.theta())
     };
-    let optimum = polish(FULL.theta(&Triad::identity()));
-    println!("optimum {:?} {}", optimum.0, optimum.1);
-    for (scale, degrees) in [
-        (0.0, 2.0),
-        (0.0, 5.0),
-        (0.0, 10.0),
-        (0.0, 20.0),
-        (0.2, 0.0),
-        (-0.2, 0.0),
-        (0.2, 5.0),
-        (-0.2, 5.0),
-        (0.2, 10.0),
-        (-0.2, 10.0),
-        (0.0, 40.0),
-    ] {
-        let trials: Vec<(bool, bool, u32)> = (0..8u64)
-            .into_par_iter()
-            .map(|seed| {
-                let sign = |bit: u64| if seed >> bit & 1 == 1 { 1.0 } else { -1.0 };
-                let off = Vector3::new(sign(0), sign(1), sign(2)) * f64::to_radians(degrees);
-                let start = FULL.theta(&Triad { gain: Matrix3::identity() * (1.0 + scale), bias: off });
-                let reach = FULL.theta(&Triad {
-                    gain: Matrix3::repeat(0.3),
-                    bias: Vector3::repeat(f64::to_radians(degrees.max(2.0) * 1.3)),
-                });
-                let alone = polish(start);
-                let mut swarm = Swarm::<f64, 40, 12, _>::new(
-                    Bounds::around(&start, &reach).unwrap(),
-                    Settings::default(),
-                );
-                let report = swarm.run(&model, &mut ChaCha8Rng::seed_from_u64(seed));
-                let polished = polish(*swarm.best());
-                let near = |cost: f64| cost < 1.001 * optimum.1;
-                (near(alone.1), near(polished.1), report.evaluations)
-            })
-            .collect();
-        println!(
-            "{scale} {degrees}: LM {} of 8, swarm {} of 8, {:?}",
-            trials.iter().filter(|t| t.0).count(),
-            trials.iter().filter(|t| t.1).count(),
-            trials[0].2
-        );
-    }
-    let _ = PEERS;
+    let (least, optimum) = polish(FULL.theta(&Triad::identity()));
+    let off = f64::to_radians(40.0);
+    let start = FULL.theta(&Triad { bias: Vector3::new(off, -off, off), ..Triad::identity() });
+    let (alone, _) = polish(start);
+    assert!(alone > 100.0 * least, "{alone:e} {least:e}");
+    let reach = FULL.theta(&Triad { gain: Matrix3::repeat(0.3), bias: Vector3::repeat(1.3 * off) });
+    let bounds = Bounds::around(&start, &reach).expect("finite");
+    let reached = (1..=3).filter(|seed| {
+        let mut swarm = Swarm::<f64, 40, 12, _>::new(bounds, Settings::default());
+        swarm.run(&cost, &mut ChaCha8Rng::seed_from_u64(*seed));
+        (polish(*swarm.best()).1 - optimum).amax() < 1e-6
+    });
+    assert!(reached.count() >= 2, "of three seeds");
 }

@@ -130,16 +130,21 @@ fn poses(
     calibration: &mut Calibration,
 ) -> Option<Poses> {
     recording.gimbal.as_ref()?;
-    match pose::poses(recording, sensor, usable) {
-        Ok(poses) => Some(poses),
-        Err(why) => {
-            let warning = format!("the rig is not used: {why}");
-            if !calibration.warnings.contains(&warning) {
-                calibration.warnings.push(warning);
-            }
-            None
+    let found = pose::poses(recording, sensor, usable);
+    let warning = match &found {
+        Err(why) => Some(format!("the rig is not used: {why}")),
+        Ok(poses) => {
+            let (locked, all) = (poses.in_gimbal_lock(), poses.poses.len());
+            (2 * locked > all).then(|| {
+                format!(
+                    "{locked} of {all} poses are in gimbal lock: outer and inner gimbal turn about one axis there, and \
+                     two angles tell what one does; turn the middle gimbal away from it"
+                )
+            })
         }
-    }
+    };
+    calibration.warnings.extend(warning.filter(|warning| !calibration.warnings.contains(warning)));
+    found.ok()
 }
 
 fn too_few(kind: SensorKind, name: &'static str, poses: &Poses) -> SensorOutcome {

@@ -136,3 +136,67 @@ impl<M: Model<f64, P>, C: Cost<f64, P>, const P: usize> Searched<'_, M, C, P> {
         (solver, rms)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use imucal_core::model::RowSink;
+
+    /// A sine with a slope: Levenberg–Marquardt from zero stops in the dip beside it, below is another.
+    struct Dips;
+
+    impl Model<f64, 1> for Dips {
+        fn rows<S: RowSink<f64, 1>>(&self, theta: &SVector<f64, 1>, sink: &mut S) {
+            let x = theta.x;
+            let residual = 1.5 - libm::sin(5.0 * x) + 0.1 * (x - 3.0) * (x - 3.0);
+            sink.row(residual, &SVector::from([-5.0 * libm::cos(5.0 * x) + 0.2 * (x - 3.0)]));
+        }
+
+        fn independent_rows(&self) -> usize {
+            2
+        }
+    }
+
+    /// What cannot draw together: the cost does not tell where.
+    struct Flat;
+
+    impl Cost<f64, 1> for Flat {
+        type State = ();
+
+        fn begin(&self, _: &SVector<f64, 1>) {}
+
+        fn advance(&self, theta: &SVector<f64, 1>, (): &mut (), _: &mut usize) -> Option<f64> {
+            Some(if theta.x > 2.4 { 1.0 - 1e-3 * libm::sin(1e6 * theta.x) } else { 2.0 })
+        }
+    }
+
+    #[test]
+    fn a_swarm_that_has_not_drawn_together_is_said_and_the_better_end_is_kept() {
+        let residual = |theta: &SVector<f64, 1>| {
+            let mut sum = imucal_core::model::SquaredSum(0.0);
+            Dips.rows(theta, &mut sum);
+            sum.0.sqrt()
+        };
+        let searched = Searched {
+            model: &Dips,
+            cost: &Flat,
+            start: SVector::from([0.3]),
+            reach: SVector::from([4.0]),
+            rms: &residual,
+            limit: 0.55,
+        };
+        let (solver, search) = searched.solve();
+        let swarm = search.swarm.unwrap();
+        println!("{}", search.note());
+        // Whatever became of the swarm, the lower end is kept.
+        assert_eq!(residual(solver.theta()), swarm.rms.min(search.direct.1));
+        assert_eq!(swarm.kept, swarm.rms < search.direct.1);
+        let unsettled = Swarmed { termination: Termination::Iterations, spread: 0.25, at_bound: 2, ..swarm };
+        let note = Search { swarm: Some(unsettled), ..search }.note();
+        for part in
+            ["had not drawn together", "25.0 % of the range", "2 parameters", "evaluations", "is kept"]
+        {
+            assert!(note.contains(part), "{note}");
+        }
+    }
+}
