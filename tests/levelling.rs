@@ -7,10 +7,7 @@ use imucal_host::{
         ladder::{Rung, rung},
     },
     observe::pose::Poses,
-    recording::{
-        SensorKind,
-        manifest::{Axis, Rig, RigKind},
-    },
+    recording::SensorKind,
 };
 use imucal_tests::{
     rig::{Draw, ZYX, angles, cube, moments, poses, rms},

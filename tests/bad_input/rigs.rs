@@ -64,7 +64,7 @@ fn encoders_in_degrees_are_said_to_be_so_and_the_field_forms_are_used() {
     assert_eq!(models(&bad), ["T9", "K9", "E9"]);
     // Said so in the manifest, they are what they were.
     let clean = calibrated(&on_rig());
-    bad.manifest("[units]", "[units]\ngimbal = \"deg\"");
+    bad.manifest("gimbal = \"rad\"", "gimbal = \"deg\"");
     for (found, clean) in calibrated(&bad).iter().zip(&clean) {
         assert!((found - clean).abs() < 1e-9 * (1.0 + clean.abs()), "{found} {clean}");
     }

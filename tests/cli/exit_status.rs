@@ -20,7 +20,7 @@ fn an_accepted_calibration_ends_with_0() {
     ended.printing(&[
         "accelerometer (T9): accepted",
         "gyroscope (K9): accepted",
-        "magnetometer (M15): accepted",
+        "magnetometer (E9): accepted",
     ]);
     imucal(&["calibrate", folder.path("small.csv").to_str().unwrap(), "--model", "acc=T9,gyr=K9,mag=E9"])
         .with(0);
