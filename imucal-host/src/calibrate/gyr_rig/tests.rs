@@ -148,8 +148,9 @@ fn a_comparison_finds_that_the_gain_matters_and_climbs_no_further_without_cause(
     let second: Vec<f64> = found.rungs.iter().filter_map(|(step, _)| step.second_half_rms).collect();
     println!("{second:?}");
     let [nominal, bias, field, full, with_force] = second[..] else { panic!("{second:?}") };
-    // Attitudes tell more than gravity's direction does; what is not there to be found does not help.
-    assert!(nominal > bias && bias > 2.0 * field && field > full, "{second:?}");
+    // Of a sound sensor gravity's direction tells as much as attitudes do, to within the second half's own noise; what
+    // is not there to be found does not help.
+    assert!(nominal > bias && bias > 5.0 * field && (field / full - 1.0).abs() < 0.15, "{second:?}");
     assert!(with_force > 0.95 * full, "{second:?}");
 }
 
