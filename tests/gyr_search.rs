@@ -1,9 +1,9 @@
 //! A gyroscope without a rig whose nominal conversion is wrong: where Levenberg–Marquardt alone still arrives, where it
 //! does not, and that a swarm and its polish do.
 //!
-//! On the way measured, the recording of a raw MTi, from the bias of the rests: Levenberg–Marquardt arrives for
-//! `per_unit` of 0.6 to 2.5 times the true one and any offset, and fails at 0.5 and 0.4. With the bias unknown it
-//! arrives for offsets of up to 20 °/s with `per_unit` off by up to 20 %, and fails at 40 °/s on each axis.
+//! Measured on a raw MTi, from the bias of the rests: Levenberg–Marquardt arrives for `per_unit` of 0.6 to 2.5 times the
+//! true one and any offset, and fails at 0.5 and 0.4. With the bias unknown it arrives for offsets of up to 20 °/s on
+//! each axis, or of 10 °/s with gains off by 20 %, and fails at 40 °/s.
 
 use imucal_core::{
     model::{parameterisation::FULL, turn::TurnModel},

@@ -222,7 +222,8 @@ fn write_rig(text: &mut String, rig: &RigFindings) -> fmt::Result {
         }
         writeln!(
             text,
-            "  NOT stored, since TOML and record hold gain and bias alone: a device leaves up to {} of these terms",
+            "  NOT stored, since TOML and record hold gain and bias alone: a device leaves up to {} of these terms; for a \
+             device acc=I14, whose gain and bias take up what they can of them",
             plain(higher.uncorrected)
         )?;
     }
