@@ -8,9 +8,12 @@ use imucal_core::{
 };
 use nalgebra::Vector3;
 
-use crate::recording::{
-    Recording, Triple,
-    manifest::{Axis as FileAxis, Rig},
+use crate::{
+    noise::{Span, white},
+    recording::{
+        Recording, Triple,
+        manifest::{Axis as FileAxis, Rig},
+    },
 };
 
 /// Encoders that move more than this during a rest belong to no pose, rad (0.1°).
@@ -55,6 +58,10 @@ pub struct Poses {
     pub poses: Vec<GimbalPose<f64>>,
     /// The rig's axes.
     pub axes: RigAxes,
+    /// When each was held.
+    pub spans: Vec<Span>,
+    /// White noise within them, nominal unit²·s, where they are long enough to tell.
+    pub density: Option<Vector3<f64>>,
 }
 
 /// The rig's axes, of three gimbals.
@@ -119,16 +126,20 @@ fn turned(to: &[f64; 3], from: &[f64; 3]) -> Vector3<f64> {
 /// [`NoPoses`] where there are no encoders or the manifest does not name the rig's axes.
 pub fn poses(recording: &Recording, sensor: &Triple, usable: &[bool]) -> Result<Poses, NoPoses> {
     let (axes, gimbal) = axes_and_encoders(recording)?;
-    let mut poses = Vec::new();
-    for rows in still_stretches(&recording.time, gimbal) {
+    let stretches = still_stretches(&recording.time, gimbal);
+    let density = white::density(&recording.time, &sensor.values, usable, &stretches);
+    let (mut poses, mut spans) = (Vec::new(), Vec::new());
+    for rows in stretches {
         let Some(angles) = mean_angles(&gimbal[rows.clone()]) else { continue };
         let mut moments = Moments::default();
+        let span = recording.time[rows.start]..recording.time[rows.end - 1];
         rows.filter(|k| usable[*k]).for_each(|k| moments.push(&sensor.values[k]));
         if moments.count() > 0 {
             poses.push(GimbalPose::new(moments.mean(), &angles));
+            spans.push(span);
         }
     }
-    Ok(Poses { poses, axes })
+    Ok(Poses { poses, axes, spans, density })
 }
 
 /// Mean encoder angles of a stretch, through the wrap at ±π; `None` where none is measured.
