@@ -2,22 +2,29 @@
 //!
 //! ```text
 //! V = s² S (1/T + ρ F),   w = E(s²),   d = E(s² ρ)      over their posterior
-//! p(y | s, ρ) ∝ |V|^−½ |JᵀV⁻¹J|^−½ exp(−½ rᵀPr),       p(ρ) flat over a grid of decades, p(s²) ∝ 1/s², s² ≥ 1
+//! p(y | s, ρ) ∝ |V|^−½ |JᵀV⁻¹J|^−½ exp(−½ rᵀPr)
+//! p(s²) = ½ δ(s² − 1) + ½ / (s² ln 10⁶) for s² ≥ 1;      p(ρ) ∝ 1/ρ
 //! ```
 //!
 //! The restricted likelihood (Patterson & Thompson 1971), in which the fit's parameters have been integrated out: a
 //! bias takes the slow part of a drift with it, and its residuals alone would show too little of it. A posterior mean,
-//! since a single recording tells a drift badly, and the error that the maximum leaves out is the one that matters. s²
-//! cannot be less than one: means are no quieter than the noise within them. Where that noise is not known, s² is free.
+//! since a single recording tells a drift badly, and the likeliest one is too small as often as too large, where only
+//! too small is false precision. Scatter is none, or of any size: means are no quieter than the noise within them.
+//! Where that noise is not known, p(s²) ∝ 1/s².
+//!
+//! ρ goes from a drift no larger than what the white noise of all observations averages to, to 4000 times its
+//! variance. That there is none at all, a recording cannot tell: without any, the error of a bias is said to be up to
+//! twice as large as it is (`tests/recovery_rig`).
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use statrs::function::gamma::{gamma_lr, ln_gamma};
 
 use super::{Span, flicker, whitening::Whitening};
 
-/// Variances of the drift over the density of the white noise that are weighed, 1/s: each about three times the one
-/// before, after none at all. White noise averages down to such drifts over 0.1 s to 100 s.
-const RATIOS: [f64; 8] = [0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
+/// Ratios ρ that are weighed, each twice the one before.
+const RATIOS: u32 = 13;
+/// ln of the range that s² has one half of its prior in.
+const SCATTER: f64 = 13.8;
 /// More observations than this are rests of a long recording, whose drift would take long to weigh.
 const MOST: usize = 500;
 
@@ -47,7 +54,7 @@ impl Noise {
     /// Of residuals; `None` where there are too few, too many, or the derivatives are dependent.
     pub fn of(given: &Residuals<'_>) -> Option<Self> {
         let (rows, free) = given.jacobian.shape();
-        if given.spans.len() > MOST || rows != 3 * given.spans.len() || rows <= free + 2 {
+        if given.spans.len() > MOST || rows != 3 * given.spans.len() || rows < free + 3 {
             return None;
         }
         let density = given.density.unwrap_or_else(|| Vector3::repeat(1.0));
@@ -58,12 +65,14 @@ impl Noise {
         let jacobian =
             DMatrix::from_fn(rows, free, |row, k| given.jacobian[(row, k)] / (length[k] * by_axis(row)));
         let flicker = flicker::covariance(given.spans);
-        let weigh = |ratio: &f64| {
-            let whitening = Whitening::new(unit_covariance(given.spans, &flicker, 1.0, *ratio))?;
+        let weigh = |ratio: f64| {
+            let whitening = Whitening::new(unit_covariance(given.spans, &flicker, 1.0, ratio))?;
             weigh(&whitening, &residuals, &jacobian, given.density.is_some())
         };
+        let observed = given.spans.iter().map(|span| span.end - span.start).sum::<f64>();
+        let ratios = (0..RATIOS).map(|k| f64::from(1u32 << k) / observed);
         let weighed: Vec<(f64, Weighed)> =
-            RATIOS.iter().filter_map(|ratio| Some((*ratio, weigh(ratio)?))).collect();
+            ratios.filter_map(|ratio| Some((ratio, weigh(ratio)?))).collect();
         let most = weighed.iter().map(|(_, w)| w.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
         let (mut sum, mut white, mut drift) = (0.0, 0.0, 0.0);
         for (ratio, each) in &weighed {
@@ -113,7 +122,7 @@ fn weigh(
     whitening: &Whitening,
     residuals: &DMatrix<f64>,
     jacobian: &DMatrix<f64>,
-    at_least_one: bool,
+    known: bool,
 ) -> Option<Weighed> {
     let (rows, free) = jacobian.shape();
     let data = whitening.whiten(residuals)?;
@@ -121,18 +130,23 @@ fn weigh(
     let log_det_fit = 2.0 * qr.r().diagonal().iter().map(|d| d.abs().ln()).sum::<f64>();
     let explained = qr.q().tr_mul(&data).norm_squared();
     let left = (data.norm_squared() - explained).max(f64::MIN_POSITIVE);
-    let half = 0.5 * (rows - free) as f64;
-    // Of s² integrated from one on, and of s² times that; from zero on the shares are one.
-    let share = |half: f64| if at_least_one { ln_gamma_share(half, 0.5 * left) } else { 0.0 };
-    let log_likelihood =
-        -0.5 * (3.0 * whitening.log_determinant() + log_det_fit) - half * (0.5 * left).ln() + share(half);
-    let scale = 0.5 * left / (half - 1.0) * (share(half - 1.0) - share(half)).exp();
-    Some(Weighed { log_likelihood, scale })
+    let moment = |power: f64| log_moment(0.5 * (rows - free) as f64 - power, 0.5 * left, known);
+    Some(Weighed {
+        log_likelihood: -0.5 * (3.0 * whitening.log_determinant() + log_det_fit) + moment(0.0),
+        scale: (moment(1.0) - moment(0.0)).exp(),
+    })
 }
 
-/// Logarithm of the regularised lower incomplete gamma function.
-fn ln_gamma_share(a: f64, x: f64) -> f64 {
-    let share = if a > 0.0 { gamma_lr(a, x) } else { 1.0 };
+/// ln ∫ s^−2a exp(−x/s²) p(s²) ds².
+fn log_moment(a: f64, x: f64, known: bool) -> f64 {
+    let all = ln_gamma(a) - a * x.ln();
+    if !known {
+        return all;
+    }
+    let share = gamma_lr(a, x);
     // Below the least number its series' first term is left.
-    if share > 0.0 { share.ln() } else { a * x.ln() - x - ln_gamma(a + 1.0) }
+    let share = if share > 0.0 { share.ln() } else { a * x.ln() - x - ln_gamma(a + 1.0) };
+    let (none, some) = (-x, all + share - SCATTER.ln());
+    let larger = none.max(some);
+    larger + 0.5f64.ln() + ((none - larger).exp() + (some - larger).exp()).ln()
 }
