@@ -7,7 +7,7 @@ use imucal_core::{
 };
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
 
-use super::rows::{Residuals, Rows};
+use super::rows::{Residuals, Rows, influence};
 use crate::{
     noise::{self, Noise},
     observe::pose::Poses,
@@ -150,7 +150,7 @@ fn covariance<const P: usize>(poses: &Poses, rows: &Rows<P>, held: &[usize]) -> 
     let count = 3 * poses.poses.len();
     let free: Vec<usize> = (0..P).filter(|k| !held.contains(k)).collect();
     let residuals = DVector::from_fn(count, |row, _| rows.residuals[row]);
-    let jacobian = DMatrix::from_fn(count, free.len(), |row, k| rows.jacobian[row][free[k]]);
+    let jacobian = rows.derivatives(count, &free);
     let noise = Noise::of(&noise::Residuals {
         spans: &poses.spans,
         density: poses.density,
@@ -166,17 +166,6 @@ fn covariance<const P: usize>(poses: &Poses, rows: &Rows<P>, held: &[usize]) -> 
         }
     }
     covariance.iter().all(|x| x.is_finite()).then_some(covariance)
-}
-
-/// J (JᵀJ)⁻¹: by how much each residual moves each parameter. `None` where J is not of full rank.
-fn influence(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let mut unit = jacobian.clone();
-    // Columns at unit length: parameters of different units would spoil the inverse.
-    let length: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
-    unit.column_iter_mut().zip(&length).for_each(|(mut column, length)| column /= *length);
-    let mut influence = &unit * (unit.tr_mul(&unit)).try_inverse()?;
-    influence.column_iter_mut().zip(&length).for_each(|(mut column, length)| column /= *length);
-    Some(influence)
 }
 
 /// Each pose left out in turn, one Gauss–Newton step from the optimum of all.
