@@ -118,7 +118,11 @@ fn still(input: &MotionInput<'_>, rows: &Range<usize>, attitude: &Matrix3<f64>) 
 }
 
 /// What the mean rates of the still stretches show of noise, beside one constant bias.
-fn noise(input: &MotionInput<'_>, stretches: &[(Range<usize>, Matrix3<f64>)], stills: &[Still]) -> Option<Noise> {
+fn noise(
+    input: &MotionInput<'_>,
+    stretches: &[(Range<usize>, Matrix3<f64>)],
+    stills: &[Still],
+) -> Option<Noise> {
     let rows: Vec<Range<usize>> = stretches.iter().map(|(rows, _)| rows.clone()).collect();
     let spans: Vec<Span> = stills.iter().map(|still| still.span.clone()).collect();
     let means = stills.iter().flat_map(|still| still.mean.iter().copied());

@@ -23,7 +23,7 @@ use super::{
     outcome::{Calibration, FitSummary, Refused, RigFindings, SensorOutcome},
 };
 use crate::{
-    noise::{Noise, Span},
+    noise::Span,
     observe::{motion, pose},
     recording::{Recording, SensorKind, Triple, Unit},
 };
@@ -163,7 +163,7 @@ fn refused(model: &'static str, refusal: Refusal, fit: Option<FitSummary>) -> Se
 /// part of those errors, and a bias is not told better than the mean of its drift is.
 fn covariance(fit: &MotionFit, observations: &Observations) -> DMatrix<f64> {
     let Some(noise) = &observations.noise else { return fit.covariance.clone() };
-    let drift = Noise { white: Vector3::zeros(), ..noise.clone() };
+    let drift = noise.without_white();
     let spans: Vec<Span> = fit.kept.iter().map(|k| observations.data[*k].span.clone()).collect();
     &fit.covariance + drift.propagated(&spans, &fit.bias_influence)
 }

@@ -288,7 +288,8 @@ fn summarise<const P: usize>(
         triad: model.form.triad(theta),
         entries: model.form.entries().to_vec(),
         covariance: dynamic(&covariance),
-        bias_influence: bias_influence(model, theta).unwrap_or_else(|| DMatrix::zeros(3 * model.motions.len(), P)),
+        bias_influence: bias_influence(model, theta)
+            .unwrap_or_else(|| DMatrix::zeros(3 * model.motions.len(), P)),
         parameters: theta.iter().copied().collect(),
         report: solver.report(),
         search,

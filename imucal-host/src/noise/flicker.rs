@@ -31,7 +31,8 @@ pub fn times(spans: &[Span]) -> Vec<f64> {
 pub fn covariance(spans: &[Span]) -> DMatrix<f64> {
     let times = times(spans);
     DMatrix::from_fn(spans.len(), spans.len(), |i, j| {
-        let both = |time: &f64| if i == j { within(&spans[i], *time) } else { between(&spans[i], &spans[j], *time) };
+        let both =
+            |time: &f64| if i == j { within(&spans[i], *time) } else { between(&spans[i], &spans[j], *time) };
         times.iter().map(both).sum::<f64>() / times.len() as f64
     })
 }
@@ -65,8 +66,10 @@ mod tests {
         for i in 0..3 {
             for j in 0..3 {
                 let (one, other) = (&spans[i], &spans[j]);
-                let at = |span: &Span, k: i32| span.start + (span.end - span.start) * (f64::from(k) + 0.5) / 200.0;
-                let kernel = |s: f64, t: f64| times.iter().map(|time| (-(s - t).abs() / time).exp()).sum::<f64>();
+                let at =
+                    |span: &Span, k: i32| span.start + (span.end - span.start) * (f64::from(k) + 0.5) / 200.0;
+                let kernel =
+                    |s: f64, t: f64| times.iter().map(|time| (-(s - t).abs() / time).exp()).sum::<f64>();
                 let sum: f64 = (0..200)
                     .flat_map(|k| (0..200).map(move |l| (k, l)))
                     .map(|(k, l)| kernel(at(one, k), at(other, l)))

@@ -63,7 +63,8 @@ pub fn simulation(seed: u64, base: Base) -> Result<Simulation, SimulationError> 
             ("rig.heading", vec![-drawn.heading]),
             ("rig.level_tilt", drawn.tilt.iter().map(|tilt| -tilt).collect()),
         ];
-        let doses = undo.into_iter().filter_map(|(id, values)| Some(Dose { effect: effect::find(id)?, values }));
+        let doses =
+            undo.into_iter().filter_map(|(id, values)| Some(Dose { effect: effect::find(id)?, values }));
         simulation.doses.extend(doses);
     }
     Ok(simulation)
@@ -157,7 +158,11 @@ pub fn report(first: u64, count: u64) -> Result<String, SimulationError> {
         "Errors over the standard errors reported, {count} recordings of two units from seed {first} on.\n"
     );
     for (noise, base, what) in [
-        (Noise::All, Base::Drawn, "white noise, drift and scatter of the stops; field's direction estimated (X21)"),
+        (
+            Noise::All,
+            Base::Drawn,
+            "white noise, drift and scatter of the stops; field's direction estimated (X21)",
+        ),
         (Noise::All, Base::Exact, "the same on a base that is level and points north, field known (X18)"),
         (Noise::White, Base::Drawn, "white noise alone; field's direction estimated (X21)"),
     ] {
