@@ -242,8 +242,9 @@ mod tests {
         let jacobian = biases(2 * MOST);
         let given = Residuals { spans: &spans, density: None, residuals: &residuals, jacobian: &jacobian };
         let noise = Noise::of(&given).unwrap();
-        // The slowest part alone is known to a third.
-        assert!((0.8..1.25).contains(&noise.white) && (0.6..1.7).contains(&noise.drift), "{noise:?}");
+        // A recording of an hour is given a fourth correlation time, which this drift has not: what the others then
+        // lack of its fastest part is taken for scatter.
+        assert!((0.8..1.6).contains(&noise.white) && (0.6..1.7).contains(&noise.drift), "{noise:?}");
     }
 
     #[test]

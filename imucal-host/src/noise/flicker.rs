@@ -44,14 +44,14 @@ fn within(span: &Span, time: f64) -> f64 {
     if x < 1e-3 { 1.0 - x / 3.0 } else { 2.0 * (x - 1.0 + (-x).exp()) / (x * x) }
 }
 
-/// Covariance of two means.
+/// Covariance of two means: e^(−gap/τ) (1 − e^−a)(1 − e^−b) / ab, a and b their lengths over τ.
 fn between(one: &Span, other: &Span, time: f64) -> f64 {
-    let middle = |span: &Span| 0.5 * (span.start + span.end);
-    let spread = |span: &Span| {
-        let half = 0.5 * (span.end - span.start) / time;
-        if half < 1e-4 { 1.0 } else { half.sinh() / half }
+    let gap = (other.start - one.end).max(one.start - other.end).max(0.0);
+    let share = |span: &Span| {
+        let x = (span.end - span.start) / time;
+        if x > 0.0 { -(-x).exp_m1() / x } else { 1.0 }
     };
-    (-(middle(one) - middle(other)).abs() / time).exp() * spread(one) * spread(other)
+    (-gap / time).exp() * share(one) * share(other)
 }
 
 #[cfg(test)]
