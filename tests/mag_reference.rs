@@ -21,7 +21,7 @@ use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 fn poses(recording: &Recording, usable: &[bool], lag: f64) -> Vec<ReferencePose<f64>> {
     let attitudes = motion::of_reference(recording.reference.as_deref().expect("recorded"));
     let later = motion::later(&recording.time, &attitudes, lag);
-    pose::along_reference(&recording.mag.as_ref().expect("recorded").values, usable, &later).0.poses
+    pose::along_reference(&recording.mag.as_ref().expect("recorded").values, usable, &later).0
 }
 
 fn empty(recording: &Recording) -> Calibration {

@@ -29,7 +29,7 @@ use crate::{
     observe::{
         cloud::cloud,
         motion::{self, Attitudes},
-        pose::{self, Poses},
+        pose,
     },
     recording::{Recording, SensorKind, Triple, Unit},
 };
@@ -106,7 +106,7 @@ fn of_length(parameters: &UnifiedParameters<f64>, length: f64) -> UnifiedParamet
 /// Samples with the attitude they were taken at: the sensor may be behind the reference.
 fn samples(recording: &Recording, sensor: &Triple, usable: &[bool], attitudes: &Attitudes) -> Samples {
     let later = |lag: f64| motion::later(&recording.time, attitudes, lag);
-    let at = |lag: f64| pose::along_reference(&sensor.values, usable, &later(lag)).0.poses;
+    let at = |lag: f64| pose::along_reference(&sensor.values, usable, &later(lag)).0;
     let (plain, rows) = pose::along_reference(&sensor.values, usable, attitudes);
     let all = cloud(&sensor.values, usable).rows.len();
     let rms = |poses: &[ReferencePose<f64>]| {
@@ -124,9 +124,9 @@ fn samples(recording: &Recording, sensor: &Triple, usable: &[bool], attitudes: &
                 let moved = c_p_t(&after, *row).zip(c_p_t(&before, *row));
                 moved.map_or_else(Matrix3::zeros, |(after, before)| (after - before) / (2.0 * ASIDE))
             };
-            Tracked { poses: found.poses, by_lag: rows.iter().map(slope).collect() }
+            Tracked { poses: found, by_lag: rows.iter().map(slope).collect() }
         }
-        Lag::OutOfReach => Tracked { poses: plain.poses, by_lag: Vec::new() },
+        Lag::OutOfReach => Tracked { poses: plain, by_lag: Vec::new() },
     };
     Samples { tracked, all, notes: vec![lag.note()] }
 }
@@ -158,10 +158,7 @@ fn outcome(
             model: name,
             verdict: Ok(()),
             fit: Some(summary),
-            evidence: Some(Evidence::Reference(
-                Poses { poses: found.kept.clone(), axes: () },
-                Box::new(found.fit.clone()),
-            )),
+            evidence: Some(Evidence::Reference(found.kept.clone(), Box::new(found.fit.clone()))),
         },
         Err(refusal) => refused(name, refusal, Some(summary)),
     }

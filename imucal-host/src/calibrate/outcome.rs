@@ -75,7 +75,7 @@ pub enum Evidence {
     /// Poses on a rig and their fit.
     Gimbals(Poses, Box<RigFit>),
     /// Samples along a reference and their fit.
-    Reference(Poses<ReferencePose<f64>>, Box<RigFit>),
+    Reference(Vec<ReferencePose<f64>>, Box<RigFit>),
 }
 
 /// A turn and the directions at its ends, calibrated axes.

@@ -23,10 +23,11 @@ use imucal_core::{
     },
     solver::triangular::Triangular,
 };
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, Matrix3, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
 use super::{
+    norm_fit::dynamic,
     outlier::{MOST, outliers},
     rig_fit::{RigFit, Solved, solve},
     rows::{Residuals, Rows},
@@ -172,9 +173,9 @@ fn summarise<const P: usize>(
         Some((unscaled, variance)) => {
             let inflation = serial::inflation(&rows, &unscaled, 3);
             let scale = SMatrix::from_diagonal(&inflation);
-            (inflation, scale * unscaled * scale * variance)
+            (inflation, dynamic(&(scale * unscaled * scale * variance)))
         }
-        None => (SVector::repeat(1.0), SMatrix::repeat(f64::INFINITY)),
+        None => (SVector::repeat(1.0), DMatrix::repeat(P, P, f64::INFINITY)),
     };
     let bend = accept::nonlinearity(solver, model, inflation.max());
     (solved.fit(covariance, held_out(solved)), inflation.max(), bend)

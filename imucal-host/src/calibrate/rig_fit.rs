@@ -12,10 +12,12 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
 
 use super::{
     compare::Step,
-    drift,
-    rows::{Residuals, Rows},
+    rows::{Residuals, Rows, influence},
 };
-use crate::observe::pose::Poses;
+use crate::{
+    noise::{self, Noise},
+    observe::pose::Poses,
+};
 
 /// A column that its predecessors leave less than this share of is told by them: far below what noise leaves of an
 /// observable one, far above rounding.
@@ -57,7 +59,7 @@ pub(super) struct Solved<'a, const P: usize, G: Pose<f64>> {
 /// Fits `terms` from `base`.
 pub fn fit<const P: usize>(poses: &Poses, base: &UnifiedParameters<f64>, terms: Terms<P>) -> RigFit {
     let outer = Vector3::ith(poses.axes.0[0] as usize, 1.0);
-    summarise(&solve(&poses.poses, poses.axes, base, terms, Some(outer)))
+    summarise(poses, &solve(&poses.poses, poses.axes, base, terms, Some(outer)))
 }
 
 /// Solves for `terms` from `base`, holds what the poses do not tell, and keeps a field that is known at its length.
@@ -136,7 +138,7 @@ fn headed(known: &Vector3<f64>, normal: &Vector3<f64>) -> Option<Vector3<f64>> {
 
 impl<const P: usize, G: Pose<f64>> Solved<'_, P, G> {
     /// The fit, with these standard errors (zero where held) and this residual of what was left out.
-    pub fn fit(&self, mut covariance: SMatrix<f64, P, P>, held_out_rms: Option<f64>) -> RigFit {
+    pub fn fit(&self, mut covariance: DMatrix<f64>, held_out_rms: Option<f64>) -> RigFit {
         let Self { model, solver, gauge } = self;
         let entries = model.terms.entries();
         let held: Vec<usize> = (0..P).filter(|k| gauge.is_held(*k)).collect();
@@ -150,7 +152,7 @@ impl<const P: usize, G: Pose<f64>> Solved<'_, P, G> {
             entries: entries.to_vec(),
             held: held.iter().map(like).collect(),
             report: solver.report(),
-            covariance: DMatrix::from_column_slice(P, P, covariance.as_slice()),
+            covariance,
             rms: solver.variance().map_or(f64::NAN, f64::sqrt),
             held_out_rms,
             squared_sum: 2.0 * solver.report().cost,
@@ -159,13 +161,39 @@ impl<const P: usize, G: Pose<f64>> Solved<'_, P, G> {
     }
 }
 
-fn summarise<const P: usize>(solved: &Solved<'_, P, GimbalPose<f64>>) -> RigFit {
+fn summarise<const P: usize>(poses: &Poses, solved: &Solved<'_, P, GimbalPose<f64>>) -> RigFit {
     let Solved { model, solver, gauge } = solved;
     let held: Vec<usize> = (0..P).filter(|k| gauge.is_held(*k)).collect();
     let rows = Rows::of(model, solver.theta());
-    let white = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
-    let covariance = drift::covariance(&rows, 3 * model.poses.len(), &held).unwrap_or(white);
+    let covariance = covariance(poses, &rows, &held).unwrap_or_else(|| {
+        let white = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
+        DMatrix::from_column_slice(P, P, white.as_slice())
+    });
     solved.fit(covariance, held_out(model, solver.theta()))
+}
+
+/// Covariance A V Aᵀ of least squares, A = (JᵀJ)⁻¹Jᵀ, for noise that drifts; zero where held. `None` where the rows do
+/// not determine the parameters, leave nothing, or are too many.
+fn covariance<const P: usize>(poses: &Poses, rows: &Rows<P>, held: &[usize]) -> Option<DMatrix<f64>> {
+    let count = 3 * poses.poses.len();
+    let free: Vec<usize> = (0..P).filter(|k| !held.contains(k)).collect();
+    let residuals = DVector::from_fn(count, |row, _| rows.residuals[row]);
+    let jacobian = rows.derivatives(count, &free);
+    let noise = Noise::of(&noise::Residuals {
+        spans: &poses.spans,
+        density: poses.density,
+        residuals: &residuals,
+        jacobian: &jacobian,
+    })?;
+    let influence = influence(&jacobian)?;
+    let told = noise.propagated(&poses.spans, &influence);
+    let mut covariance = DMatrix::zeros(P, P);
+    for (i, row) in free.iter().enumerate() {
+        for (j, column) in free.iter().enumerate() {
+            covariance[(*row, *column)] = told[(i, j)];
+        }
+    }
+    covariance.iter().all(|x| x.is_finite()).then_some(covariance)
 }
 
 /// Each pose left out in turn, one Gauss–Newton step from the optimum of all.

@@ -45,11 +45,11 @@ pub(super) fn on_gimbals(kind: SensorKind, poses: &Poses, fit: &RigFit) -> Optio
 /// Samples along a reference.
 pub(super) fn along_reference(
     kind: SensorKind,
-    poses: &Poses<ReferencePose<f64>>,
+    poses: &[ReferencePose<f64>],
     fit: &RigFit,
 ) -> Option<FitEquivalence> {
-    let step = poses.poses.len().div_ceil(MOST).max(1);
-    let some: Vec<_> = poses.poses.iter().step_by(step).collect();
+    let step = poses.len().div_ceil(MOST).max(1);
+    let some: Vec<_> = poses.iter().step_by(step).collect();
     let plain = |pose: &&ReferencePose<f64>| KnownPose {
         output: pose.value.into(),
         c_p_t: UnitQuaternion::from_quaternion(pose.attitude).inverse().to_rotation_matrix().into_inner(),

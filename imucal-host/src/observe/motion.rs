@@ -13,7 +13,7 @@ use imucal_core::{
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
 use super::turn::TurnGap;
-use crate::recording::Recording;
+use crate::{noise::Span, recording::Recording};
 
 /// A block lasts about this long, s: five samples at 100 Hz.
 const BLOCK: f64 = 0.05;
@@ -105,8 +105,8 @@ pub struct MotionInput<'a> {
 pub struct MotionData {
     /// Rows whose rates were integrated.
     pub rows: Range<usize>,
-    /// How long it lasts, s.
-    pub duration: f64,
+    /// When, s.
+    pub span: Span,
     /// Each sample's rate less the wander, rad/s, how long it is held, s, and the block it is in.
     pub samples: Vec<(Vector3<f64>, f64, usize)>,
     blocks: Vec<Block<f64>>,
@@ -119,6 +119,11 @@ pub struct MotionData {
 }
 
 impl MotionData {
+    /// How long it lasts, s.
+    pub fn duration(&self) -> f64 {
+        self.span.end - self.span.start
+    }
+
     /// The motion as the model takes it.
     pub fn motion(&self) -> Motion<'_, f64> {
         Motion {
@@ -214,7 +219,7 @@ impl MotionInput<'_> {
         let [start, end] = ends.map(quaternion);
         let size = (BLOCK / self.interval).round().clamp(1.0, 20.0) as u16;
         let mut data = MotionData {
-            duration: self.time[rows.end - 1] - self.time[rows.start],
+            span: self.time[rows.start]..self.time[rows.end - 1],
             rows: rows.clone(),
             samples: Vec::with_capacity(rows.len()),
             blocks: Vec::new(),
