@@ -4,7 +4,7 @@
 use imucal_core::{
     link::{FitModel, FitTask, Observation},
     model::{
-        rig::{Axis, GimbalPose, RigAxes},
+        rig::{Axis, GimbalPose, Pose, RigAxes},
         unified::UnifiedParameters,
     },
     observation::BlockBuilder,

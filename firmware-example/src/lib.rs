@@ -35,6 +35,7 @@ pub mod judgement;
 pub mod machine;
 pub mod replay;
 pub mod scene;
+pub mod search;
 #[cfg(target_os = "none")]
 pub mod stack;
 pub mod storage;

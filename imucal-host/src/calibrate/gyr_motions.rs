@@ -3,15 +3,16 @@
 use std::ops::Range;
 
 use imucal_core::{model::parameterisation::FULL, observation::Moments};
-use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::{
     gyr_path::{Still, Wander},
     gyr_rig_fit,
+    lag::Lag,
     outcome::BiasWander,
 };
 use crate::{
+    noise::{self, Noise, Span, white},
     observe::{
         motion::{self, Attitudes, MotionData, MotionInput},
         pose,
@@ -20,11 +21,6 @@ use crate::{
     simulator::truth::EARTH_RATE,
 };
 
-/// How far the clocks of sensor and optical reference are looked for apart, s, and the first step of that search.
-const LAG: f64 = 0.048;
-const LAG_STEP: f64 = 0.008;
-/// Halvings of the step: the last is an eighth of a millisecond.
-const LAG_HALVINGS: usize = 6;
 /// How far into a still stretch a motion reaches, s; to its middle where that is nearer.
 const MARGIN: f64 = 1.0;
 /// Fewer motions do not tell a lag beside the gain.
@@ -40,6 +36,8 @@ pub struct Observations {
     pub bias: Vector3<f64>,
     /// How the bias moved from one still stretch to another, where there are any.
     pub wander: Option<BiasWander>,
+    /// Noise of the rates, as the still stretches show it.
+    pub noise: Option<Noise>,
     /// Motions left out, in words.
     pub left_out: Vec<String>,
     /// How the motions were made, in words.
@@ -70,6 +68,7 @@ pub fn on_encoders(
         data: Vec::new(),
         bias,
         wander: Some(wander),
+        noise: noise(&input, &stretches, &stills),
         left_out: Vec::new(),
         notes: vec!["against the encoders' attitude, from one still stretch of the table to the next".into()],
     };
@@ -106,10 +105,27 @@ fn still(input: &MotionInput<'_>, rows: &Range<usize>, attitude: &Matrix3<f64>) 
     rows.clone().filter(|k| input.usable[*k]).for_each(|k| moments.push(&input.rates[k]));
     let count = f64::from(moments.count());
     (moments.count() > 10).then(|| Still {
-        time: 0.5 * (input.time[rows.start] + input.time[rows.end - 1]),
+        span: input.time[rows.start]..input.time[rows.end - 1],
         mean: moments.mean() - attitude.tr_mul(&input.earth_p),
         // Rounding to counts may leave no spread at all.
         variance: (moments.variance() / count).map(|v| v.max(1e-14)),
+    })
+}
+
+/// What the mean rates of the still stretches show of noise, beside one constant bias.
+fn noise(
+    input: &MotionInput<'_>,
+    stretches: &[(Range<usize>, Matrix3<f64>)],
+    stills: &[Still],
+) -> Option<Noise> {
+    let rows: Vec<Range<usize>> = stretches.iter().map(|(rows, _)| rows.clone()).collect();
+    let spans: Vec<Span> = stills.iter().map(|still| still.span.clone()).collect();
+    let means = stills.iter().flat_map(|still| still.mean.iter().copied());
+    Noise::of(&noise::Residuals {
+        spans: &spans,
+        density: white::density(input.time, input.rates, input.usable, &rows),
+        residuals: &DVector::from_iterator(3 * stills.len(), means),
+        jacobian: &DMatrix::from_fn(3 * stills.len(), 3, |row, k| f64::from(u8::from(row % 3 == k))),
     })
 }
 
@@ -127,6 +143,7 @@ pub fn on_reference(
         data: Vec::new(),
         bias: Vector3::zeros(),
         wander: None,
+        noise: None,
         left_out: Vec::new(),
         notes: vec![format!(
             "against the reference attitude, {OPTICAL} s a motion; {valid} of {} rows have one",
@@ -156,9 +173,6 @@ pub fn on_reference(
 }
 
 /// Motions along an optical reference whose clock is as far from the sensor's as fits best.
-///
-/// On the way, a lag of 4 ms at changes of rate of 1 rad/s is an error of 0.2°, more than an optical system's own. (At
-/// the rests of a rig it is none.)
 pub fn lagging(
     recording: &Recording,
     sensor: &Triple,
@@ -172,27 +186,9 @@ pub fn lagging(
         return plain;
     }
     let rms = |lag: f64| gyr_rig_fit::fit(&at(lag).data, FULL, plain.bias).rms;
-    let least = |lags: Vec<f64>| {
-        let all: Vec<(f64, f64)> = lags.into_par_iter().map(|lag| (rms(lag), lag)).collect();
-        all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
-    };
-    let steps = (LAG / LAG_STEP).round() as i32;
-    let Some(mut best) = least((-steps..=steps).map(|k| f64::from(k) * LAG_STEP).collect()) else {
-        return plain;
-    };
-    if best.1.abs() > LAG - 0.5 * LAG_STEP {
-        let note = format!("no lag within {LAG} s of the reference fits best; none is taken out");
-        return Observations { notes: [plain.notes, vec![note]].concat(), ..plain };
-    }
-    let mut step = LAG_STEP;
-    for _ in 0..LAG_HALVINGS {
-        step *= 0.5;
-        let beside = least(vec![best.1 - step, best.1 + step]).filter(|other| other.0 < best.0);
-        best = beside.unwrap_or(best);
-    }
-    let mut found = at(best.1);
-    let words = if best.1 < 0.0 { "ahead of" } else { "behind" };
-    found.notes.push(format!("the sensor is {:.1} ms {words} the reference; taken out", 1e3 * best.1.abs()));
+    let lag = Lag::of(rms, rms);
+    let mut found = if let Lag::Found(lag) = lag { at(lag) } else { plain };
+    found.notes.push(lag.note());
     found
 }
 

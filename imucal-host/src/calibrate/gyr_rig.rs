@@ -14,15 +14,16 @@ use imucal_core::{
     coverage::Coverage,
     model::parameterisation::{FULL, FULL_WITH_SENSITIVITY},
 };
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{
-    Options, compare,
+    Options,
     gyr_motions::{Observations, lagging, on_encoders},
-    gyr_rig_fit::{self, LARGEST_RMS, MotionFit, REACH, Search},
-    outcome::{Calibration, FitSummary, Refused, RigFindings, SensorOutcome},
+    gyr_rig_fit::{self, LARGEST_RMS, MotionFit},
+    outcome::{Calibration, Evidence, FitSummary, Refused, RigFindings, SensorOutcome},
 };
 use crate::{
+    noise::Span,
     observe::{motion, pose},
     recording::{Recording, SensorKind, Triple, Unit},
 };
@@ -39,14 +40,14 @@ const LEAST_MOTIONS: usize = 8;
 /// A motion tells something of the gain once it turns by this much, rad (5°).
 const LEAST_ANGLE: f64 = 0.087;
 
-/// Calibrates against attitudes; `None` where the recording has none, or the field form is asked for.
+/// Calibrates against attitudes, and gives what it is calibrated from; `None` where the recording has none, or the field form is asked for.
 pub fn gyroscope(
     recording: &Recording,
     sensor: &Triple,
     usable: &[bool],
     options: &Options,
     calibration: &mut Calibration,
-) -> Option<SensorOutcome> {
+) -> Option<(SensorOutcome, Option<Observations>)> {
     let name = options.rig_gyr?;
     let observations = if recording.gimbal.is_some() {
         match pose::axes_and_encoders(recording) {
@@ -62,7 +63,7 @@ pub fn gyroscope(
             }
         }
     } else {
-        lagging(recording, sensor, usable, &motion::of_reference(recording.reference.as_deref()?))
+        lagging(recording, sensor, usable, &motion::along_reference(recording, &mut calibration.warnings)?)
     };
     if recording.manifest.site.latitude_deg.is_none() {
         calibration.warnings.push(
@@ -71,16 +72,13 @@ pub fn gyroscope(
         );
     }
     if let Err(refusal) = check(&observations, name) {
-        return Some(refused(name, refusal, None));
+        return Some((refused(name, refusal, None), None));
     }
-    if options.compare {
-        calibration.comparisons.extend(comparison(&observations));
-    }
-    Some(outcome(name, sensor, &observations))
+    Some((outcome(name, sensor, &observations), Some(observations)))
 }
 
 /// Motions that turn, and enough of them.
-fn check(observations: &Observations, name: &str) -> Result<(), Refusal> {
+pub(super) fn check(observations: &Observations, name: &str) -> Result<(), Refusal> {
     let need = if name == G21 { 2 * LEAST_MOTIONS } else { LEAST_MOTIONS };
     let telling = observations.data.iter().filter(|d| d.turned().norm() > LEAST_ANGLE).count();
     match telling {
@@ -90,29 +88,13 @@ fn check(observations: &Observations, name: &str) -> Result<(), Refusal> {
     }
 }
 
-fn fit(name: &str, observations: &Observations) -> MotionFit {
+pub(super) fn fit(name: &str, observations: &Observations) -> MotionFit {
     let (data, bias) = (&observations.data, observations.bias);
     if name == G21 {
         gyr_rig_fit::fit(data, FULL_WITH_SENSITIVITY, bias)
     } else {
         gyr_rig_fit::fit(data, FULL, bias)
     }
-}
-
-/// Nominal, bias only, G12 and, where there are motions enough, G21; all over the motions that G12 keeps.
-fn comparison(observations: &Observations) -> Option<compare::Comparison> {
-    let full = fit(G12, observations);
-    let mut steps = Vec::from(gyr_rig_fit::lower_steps(&observations.data, &full.kept, observations.bias));
-    steps.push(full.step(G12, "gain"));
-    if check(observations, G21).is_ok() {
-        let kept = full.kept.iter().map(|k| observations.data[*k].clone()).collect();
-        let same = Observations { data: kept, ..observations.clone() };
-        let with = fit(G21, &same);
-        if with.gross.is_empty() {
-            steps.push(with.step(G21, "g-sensitivity"));
-        }
-    }
-    compare::climb(SensorKind::Gyr, steps)
 }
 
 fn outcome(name: &'static str, sensor: &Triple, observations: &Observations) -> SensorOutcome {
@@ -124,7 +106,10 @@ fn outcome(name: &'static str, sensor: &Triple, observations: &Observations) -> 
             model: name,
             verdict: Ok(()),
             fit: Some(summary),
-            evidence: None,
+            evidence: Some(Evidence::Motions {
+                data: fit.kept.iter().map(|k| observations.data[*k].clone()).collect(),
+                fit: Box::new(fit),
+            }),
         },
         Err(refusal) => refused(name, refusal, Some(summary)),
     }
@@ -158,8 +143,18 @@ fn refused(model: &'static str, refusal: Refusal, fit: Option<FitSummary>) -> Se
     SensorOutcome { kind: SensorKind::Gyr, model, verdict, fit, evidence: None }
 }
 
+/// Of a fit to motions whose errors are independent, and of the bias's drift: that from one motion to the next is a
+/// part of those errors, and a bias is not told better than the mean of its drift is.
+fn covariance(fit: &MotionFit, observations: &Observations) -> DMatrix<f64> {
+    let Some(noise) = &observations.noise else { return fit.covariance.clone() };
+    let drift = noise.without_white();
+    let spans: Vec<Span> = fit.kept.iter().map(|k| observations.data[*k].span.clone()).collect();
+    &fit.covariance + drift.propagated(&spans, &fit.bias_influence)
+}
+
 fn summarise(fit: &MotionFit, sensor: &Triple, observations: &Observations) -> FitSummary {
-    let std = |k: usize| fit.covariance[(k, k)].sqrt();
+    let covariance = covariance(fit, observations);
+    let std = |k: usize| covariance[(k, k)].sqrt();
     let used = || fit.kept.iter().map(|k| &observations.data[*k]);
     let axes = used().filter_map(|d| d.turned().try_normalize(1e-6)).flat_map(|a| [a, -a]);
     let axes: Vec<Vector3<f64>> = axes.collect();
@@ -168,29 +163,16 @@ fn summarise(fit: &MotionFit, sensor: &Triple, observations: &Observations) -> F
         let from = observations.data[*k].rows.start;
         format!("motion from row {from}: {size:.1} robust standard deviations")
     }));
-    let mut notes = observations.notes.clone();
-    notes.push(match fit.search {
-        Search::Direct => "found by Levenberg–Marquardt from the static bias".into(),
-        Search::Swarm => format!(
-            "found by a particle swarm (gain within ±{}, bias within ±{:.0} °/s), polished by Levenberg–Marquardt",
-            REACH.0,
-            REACH.1.to_degrees()
-        ),
-    });
+    let notes = observations.notes.clone();
     let sensitivity = (fit.entries.len() == 21).then(|| {
         let at = |of: &dyn Fn(usize) -> f64| Matrix3::from_fn(|i, j| of(12 + 3 * i + j));
         (at(&|k| fit.parameters[k]), at(&std))
     });
-    // A bias that wanders is not told better than its own mean is.
-    let wandering = observations.wander.filter(|w| w.interpolated).map_or_else(Vector3::zeros, |w| {
-        let count = (observations.data.len() + 1) as f64;
-        w.spread.zip_map(&w.expected, |s, e| (s * s - e * e).max(0.0) / count)
-    });
     FitSummary {
         triad: fit.triad,
         gain_std: Matrix3::from_fn(|i, j| std(3 * i + j)),
-        bias_std: Vector3::from_fn(|i, _| std(9 + i).hypot(wandering[i].sqrt())),
-        covariance: fit.covariance.view((0, 0), (12, 12)).into_owned(),
+        bias_std: Vector3::from_fn(|i, _| std(9 + i)),
+        covariance: covariance.view((0, 0), (12, 12)).into_owned(),
         covariance_of: fit.entries[..12].to_vec(),
         unit_in: sensor.unit,
         unit_out: Unit::RadianPerSecond,
@@ -211,6 +193,7 @@ fn summarise(fit: &MotionFit, sensor: &Triple, observations: &Observations) -> F
         bias_wander: observations.wander,
         rig: Some(RigFindings { notes, g_sensitivity: sensitivity, ..RigFindings::default() }),
         alignment: None,
+        search: Some(fit.search),
     }
 }
 

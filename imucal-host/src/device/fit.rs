@@ -67,7 +67,11 @@ impl BoardFit {
                     observations: all.iter().step_by(every).map(observation).collect(),
                 })
             }
-            Evidence::Shell { .. } => None,
+            // The device has the field forms.
+            Evidence::Shell { .. }
+            | Evidence::Motions { .. }
+            | Evidence::Gimbals(..)
+            | Evidence::Reference(..) => None,
             Evidence::Turns(turns) => {
                 let mut known: Vec<KnownTurn> = turns.iter().map(KnownTurn::of).collect();
                 while known.iter().map(|turn| turn.blocks.len()).sum::<usize>() > usize::from(room.blocks) {

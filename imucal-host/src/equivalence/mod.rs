@@ -6,6 +6,7 @@
 
 pub mod board;
 pub mod fits;
+mod known_attitudes;
 pub mod reference;
 pub mod samples;
 
