@@ -33,7 +33,7 @@ use crate::{
 pub type MachineMemory = Memory<256, 64, 48, 2048, 40>;
 /// The fits that there is memory for.
 #[cfg(microbit)]
-pub type MachineMemory = Memory<40, 16, 8, 48, 4>;
+pub type MachineMemory = Memory<40, 12, 8, 48, 3>;
 
 /// The core's clock, kHz.
 #[cfg(mps2)]
@@ -47,7 +47,7 @@ const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(64_000).unwrap();
 type Whole = Coprocessor<'static, Uart, Flash, Ticks, NoSensor, 256, 64, 48, 2048, 40>;
 /// See above.
 #[cfg(microbit)]
-type Whole = Coprocessor<'static, Uart, Flash, Ticks, NoSensor, 40, 16, 8, 48, 4>;
+type Whole = Coprocessor<'static, Uart, Flash, Ticks, NoSensor, 40, 12, 8, 48, 3>;
 
 /// Runs the co-processor on this machine, for ever.
 pub fn run(name: &str, serial: &str) -> ! {
