@@ -27,8 +27,8 @@ pub(super) struct Arguments {
     /// The calibration: TOML or record
     #[arg(long, value_name = "CAL")]
     calibration: PathBuf,
-    /// Replay through a device as well, and compare bits: serial:PATH[@BAUD], tcp:HOST:PORT, qemu[:IMAGE] or
-    /// microbit[:IMAGE]. It stores the calibration's record
+    /// Replay through a device as well, and compare bits: `serial:PATH[@BAUD]`, `tcp:HOST:PORT`, `qemu[:IMAGE]`
+    /// or `microbit[:IMAGE]`. It stores the calibration's record
     #[arg(long, value_name = "WHERE")]
     device: Option<Address>,
     /// File that keeps the flash of qemu from one start to the next
