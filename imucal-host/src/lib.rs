@@ -23,6 +23,8 @@ pub mod apply;
 
 pub mod equivalence;
 
+pub mod diagnosis;
+
 pub mod report;
 
 pub mod study;

@@ -9,6 +9,7 @@ use crate::store::{LoadError, StoredCalibration};
 mod apply;
 mod calibrate;
 mod demo;
+mod diagnose;
 mod import;
 mod inspect;
 mod output;
@@ -43,6 +44,8 @@ enum Command {
     Demo(demo::Arguments),
     /// Simulated comparisons of estimators and models, each printed as a table.
     Study(study::Arguments),
+    /// Name what the simulator lacks
+    Diagnose(diagnose::Arguments),
 }
 
 /// How a command ended, when nothing went wrong on the way.
@@ -65,6 +68,7 @@ pub fn run() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
+        Command::Diagnose(arguments) => diagnose::run(&arguments),
     };
     match result {
         Ok(Ending::Done) => ExitCode::SUCCESS,

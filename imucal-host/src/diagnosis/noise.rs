@@ -1,0 +1,238 @@
+//! The noise of each channel: white, drifting, and what a rest has in common.
+//!
+//! White noise comes from neighbouring tenths of a second, at rest and in motion apart. Drifts and the scatter of rests
+//! come from the restricted likelihood of the blocks' residuals (Patterson and Thompson 1971), so that what the model
+//! has taken up is not missed in the noise:
+//!
+//! ```text
+//! −2 ln L = ln|Σ| + ln|XᵀΣ⁻¹X + Λ| − ln|Λ| + rᵀΣ⁻¹r − zᵀ(XᵀΣ⁻¹X + Λ)⁻¹z      z = XᵀΣ⁻¹r
+//! ```
+//!
+//! Each sensor has its own; the axes of a sensor share drift and scatter. Not modelled: noise that axes have in common,
+//! white noise that changes in the course of the recording.
+
+use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
+
+use super::{
+    design::{Channel, Design, Normal},
+    scene::{Means, Scene},
+    whitening::{Process, Shared, Whitening},
+};
+use crate::recording::SensorKind;
+
+/// Correlation times of the two drifts, s.
+const TIMES: [f64; 2] = [8.0, 120.0];
+/// Pieces of which neighbours are compared, s.
+const PIECE: f64 = 0.1;
+
+/// Noise of one sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorNoise {
+    /// White noise of a sample at rest, by axis; unit of the sensor.
+    pub white: [f64; 3],
+    /// White noise of a sample in motion, by axis.
+    pub moving: [f64; 3],
+    /// Standard deviations of the fast and the slow drift.
+    pub drift: [f64; 2],
+    /// Angle by which a rest stands off its encoders, rad.
+    pub scatter: f64,
+}
+
+/// Noise of a recording, by [`SensorKind::ALL`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Noise {
+    /// Of each sensor.
+    pub sensors: [SensorNoise; 3],
+}
+
+/// What weighs the blocks: the scene, and what each sensor is given there.
+pub struct Weighing<'s> {
+    scene: &'s Scene<'s>,
+    times: Vec<f64>,
+    /// Mean output of each block, by sensor: scatter turns it.
+    given: [Vec<Vector3<f64>>; 3],
+}
+
+impl<'s> Weighing<'s> {
+    /// With the outputs of the simulator, block by block.
+    pub fn new(scene: &'s Scene<'s>, given: [Vec<Vector3<f64>>; 3]) -> Self {
+        Self { scene, times: scene.blocks.iter().map(|block| block.time).collect(), given }
+    }
+
+    /// Noise from what samples do within a tenth of a second, and drift yet to be told.
+    pub fn white(&self, residual: &Means) -> Noise {
+        let sensors = SensorKind::ALL.map(|kind| {
+            let white = self.resting(kind);
+            let moving = self.moving(kind, residual, &white);
+            let typical = white.iter().fold(0.0f64, |a, b| a.max(*b));
+            SensorNoise { white, moving, drift: [0.05 * typical, 0.1 * typical], scatter: 1e-5 }
+        });
+        Noise { sensors }
+    }
+
+    /// From the differences of neighbouring pieces of a rest; all pieces of a block have one length.
+    fn resting(&self, kind: SensorKind) -> [f64; 3] {
+        let Some(triple) = self.scene.recording.sensor(kind) else { return [1.0; 3] };
+        let interval = self.scene.recording.median_interval().unwrap_or(PIECE);
+        let length = ((PIECE / interval).round() as usize).max(1);
+        let mut squares: [Vec<f64>; 3] = Default::default();
+        for block in self.scene.blocks.iter().filter(|block| block.rest.is_some()) {
+            let pieces: Vec<Vector3<f64>> = triple.values[block.rows.clone()]
+                .chunks_exact(length)
+                .map(|rows| rows.iter().sum::<Vector3<f64>>() / length as f64)
+                .collect();
+            for pair in pieces.windows(2) {
+                let step = pair[1] - pair[0];
+                for (squares, step) in
+                    squares.iter_mut().zip(step.iter()).filter(|(_, step)| step.is_finite())
+                {
+                    squares.push(0.5 * step * step * length as f64);
+                }
+            }
+        }
+        squares.map(|squares| trimmed_mean(squares).sqrt().max(f64::MIN_POSITIVE))
+    }
+
+    /// From second differences of the residuals of neighbouring moving blocks, by their median; at least as at rest.
+    fn moving(&self, kind: SensorKind, residual: &Means, resting: &[f64; 3]) -> [f64; 3] {
+        let Some(values) = &residual[kind as usize] else { return [1.0; 3] };
+        let counts = &self.scene.counts[kind as usize];
+        let mut squares: [Vec<f64>; 3] = Default::default();
+        for at in 1..values.len().saturating_sub(1) {
+            let whole =
+                |k: usize| self.scene.blocks[k].rest.is_none() && counts[k] > 0 && counts[k] == counts[at];
+            if (at - 1..=at + 1).all(whole) {
+                let bend = values[at - 1] - 2.0 * values[at] + values[at + 1];
+                let n = counts[at] as f64;
+                squares.iter_mut().zip(bend.iter()).for_each(|(s, bend)| s.push(bend * bend * n / 6.0));
+            }
+        }
+        std::array::from_fn(|axis| {
+            // The median of a χ² of one degree is 0.455.
+            let median = crate::recording::median(squares[axis].clone()).unwrap_or(0.0) / 0.455;
+            median.sqrt().max(resting[axis])
+        })
+    }
+
+    /// Σ⁻¹ of each channel of a design.
+    pub fn whitenings(&self, design: &Design, noise: &Noise) -> Vec<Whitening> {
+        design.channels.par_iter().map(|channel| self.whitening(channel, noise)).collect()
+    }
+
+    fn whitening(&self, channel: &Channel, noise: &Noise) -> Whitening {
+        let sensor = &noise.sensors[channel.kind as usize];
+        let blocks = &self.scene.blocks;
+        let counts = &self.scene.counts[channel.kind as usize];
+        let weight = |(block, count): (&super::block::Block, &usize)| {
+            let sigma = if block.rest.is_some() { sensor.white } else { sensor.moving }[channel.axis];
+            *count as f64 / (sigma * sigma)
+        };
+        let weights: Vec<f64> = blocks.iter().zip(counts).map(weight).collect();
+        let mut rests: Vec<Shared> = Vec::new();
+        if channel.kind != SensorKind::Gyr {
+            let mut from = 0;
+            for at in 1..=blocks.len() {
+                if at == blocks.len() || blocks[at].rest != blocks[from].rest {
+                    if blocks[from].rest.is_some() {
+                        let given = self.given[channel.kind as usize][(from + at) / 2];
+                        let across = given.norm_squared() - given[channel.axis].powi(2);
+                        let variance = sensor.scatter * sensor.scatter * across;
+                        rests.push(Shared { blocks: from..at, variance });
+                    }
+                    from = at;
+                }
+            }
+        }
+        let drifts: Vec<Process> =
+            TIMES.iter().zip(sensor.drift).map(|(time, sigma)| Process { time: *time, sigma }).collect();
+        Whitening::new(&self.times, weights, &rests, &drifts)
+    }
+
+    /// The noise of a sensor under which its residual, less `columns`, is likeliest; the search begins at `start`.
+    pub fn fit(&self, design: &Design, kind: SensorKind, columns: &[usize], start: &Noise) -> SensorNoise {
+        let channels: Vec<&Channel> = design.channels.iter().filter(|channel| channel.kind == kind).collect();
+        let places: Vec<Vec<usize>> = channels
+            .iter()
+            .map(|channel| (0..channel.ids.len()).filter(|at| columns.contains(&channel.ids[*at])).collect())
+            .collect();
+        let likelihood = |sensor: &SensorNoise| {
+            let mut noise = start.clone();
+            noise.sensors[kind as usize] = *sensor;
+            let mut normal = Normal::zeros(columns.len());
+            let parts: Vec<Normal> = channels
+                .par_iter()
+                .zip(&places)
+                .map(|(channel, places)| channel.normal(&self.whitening(channel, &noise), places))
+                .collect();
+            for ((channel, places), part) in channels.iter().zip(&places).zip(&parts) {
+                let to: Vec<usize> = places
+                    .iter()
+                    .filter_map(|at| columns.iter().position(|column| *column == channel.ids[*at]))
+                    .collect();
+                normal.add(part, &to);
+            }
+            restricted(&normal)
+        };
+        let mut best = start.sensors[kind as usize];
+        let mut least = likelihood(&best);
+        for factor in [4.0, 1.7] {
+            let mut improved = true;
+            let mut rounds = 0;
+            while improved && rounds < 4 {
+                improved = false;
+                rounds += 1;
+                for coordinate in 0..if kind == SensorKind::Gyr { 2 } else { 3 } {
+                    for step in [factor, 1.0 / factor] {
+                        loop {
+                            let mut tried = best;
+                            let value = tried.coordinate(coordinate);
+                            *value *= step;
+                            let value = *value;
+                            let floor = 1e-3 * best.white[0].min(best.white[1]).min(best.white[2]);
+                            let smallest = if coordinate == 2 { 1e-7 } else { floor };
+                            if value < smallest || value > 1e4 * smallest {
+                                break;
+                            }
+                            let found = likelihood(&tried);
+                            if found >= least - 0.05 {
+                                break;
+                            }
+                            (best, least, improved) = (tried, found, true);
+                        }
+                    }
+                }
+            }
+        }
+        best
+    }
+}
+
+impl SensorNoise {
+    fn coordinate(&mut self, index: usize) -> &mut f64 {
+        match index {
+            0 | 1 => &mut self.drift[index],
+            _ => &mut self.scatter,
+        }
+    }
+}
+
+/// Prior information on a column: a usual size is one, and this many of them would be no surprise.
+const LOOSE: f64 = 30.0;
+
+/// −2 ln of the restricted likelihood, but for a constant.
+pub fn restricted(normal: &Normal) -> f64 {
+    let n = normal.score.len();
+    let prior = 1.0 / (LOOSE * LOOSE);
+    let loosened = &normal.information + DMatrix::identity(n, n) * prior;
+    let Some(factor) = loosened.cholesky() else { return f64::INFINITY };
+    let explained = normal.score.dot(&factor.solve(&normal.score));
+    normal.log_determinant + factor.ln_determinant() - n as f64 * prior.ln() + normal.energy - explained
+}
+
+/// The mean without the largest hundredth.
+fn trimmed_mean(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    let kept = values.len() - values.len() / 100;
+    values[..kept].iter().sum::<f64>() / kept.max(1) as f64
+}

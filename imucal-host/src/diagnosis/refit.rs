@@ -1,0 +1,108 @@
+//! Non-linear least squares through the simulator: baseline and chosen effects together.
+//!
+//! Gauss–Newton: the residual at full rate, its derivative from the nodes. Steps that make it worse are halved.
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use super::{
+    design::{Column, Design},
+    noise::{Noise, Weighing},
+    scene::{Means, Reference, Scene, amplitudes},
+};
+use crate::{effect::Effect, simulator::Dose};
+
+/// Steps at most.
+const STEPS: usize = 6;
+/// A step is small enough when no parameter moves by more than this share of its standard error.
+const SETTLED: f64 = 0.05;
+
+/// Effects with fitted amplitudes and what they leave.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// Baseline and chosen effects.
+    pub doses: Vec<Dose>,
+    /// Recorded less simulated.
+    pub residual: Means,
+}
+
+/// All amplitudes of some effects.
+pub fn columns(effects: &[&'static Effect]) -> Vec<Column> {
+    let of = |effect: &'static Effect| amplitudes(effect).map(move |parameter| Column { effect, parameter });
+    effects.iter().flat_map(|effect| of(effect)).collect()
+}
+
+/// Signatures of columns in a run; `neutral` gives an effect's parameters where the run does not hold it. `None` where
+/// a triad becomes singular.
+pub fn signatures(
+    reference: &Reference<'_>,
+    columns: &[Column],
+    neutral: &(dyn Fn(&'static Effect) -> Vec<f64> + Sync),
+) -> Option<Vec<Means>> {
+    columns
+        .par_iter()
+        .map(|column| reference.signature(column.effect, column.parameter, &neutral(column.effect)))
+        .collect()
+}
+
+/// Fits the amplitudes of all doses. `None` where the simulator fails.
+pub fn refit(scene: &Scene<'_>, doses: Vec<Dose>, noise: Option<&Noise>) -> Option<Fit> {
+    let effects: Vec<&'static Effect> = doses.iter().map(|dose| dose.effect).collect();
+    let columns = columns(&effects);
+    let residual = scene.residual(&doses)?;
+    let mut fit = Fit { doses, residual };
+    for _ in 0..STEPS {
+        let reference = scene.reference(fit.doses.clone(), &scene.fine)?;
+        let signatures = signatures(&reference, &columns, &|_| Vec::new())?;
+        let given = crate::recording::SensorKind::ALL.map(|kind| reference.output(kind));
+        let weighing = Weighing::new(scene, given);
+        let design = Design::new(scene, columns.clone(), &signatures, &fit.residual);
+        let noise = noise.cloned().unwrap_or_else(|| weighing.white(&fit.residual));
+        let whitenings = weighing.whitenings(&design, &noise);
+        let all: Vec<usize> = (0..columns.len()).collect();
+        let normal = design.normal(&whitenings, &all);
+        // Directions that the data do not show stay where they are.
+        let loosened = &normal.information + nalgebra::DMatrix::identity(columns.len(), columns.len()) * 1e-8;
+        let covariance = loosened.cholesky()?.inverse();
+        let step = &covariance * &normal.score;
+        let variances = covariance.diagonal();
+        let moved = step.iter().zip(variances.iter()).map(|(s, v)| s.abs() / v.sqrt());
+        let largest = moved.fold(0.0f64, f64::max);
+        let energy =
+            |residual: &Means| Design::new(scene, Vec::new(), &[], residual).normal(&whitenings, &[]).energy;
+        let mut factor = 1.0;
+        let better = loop {
+            let doses = moved_by(&fit.doses, &columns, &(&step * factor));
+            let residual = scene.residual(&doses)?;
+            if energy(&residual) <= normal.energy + 1e-9 {
+                break Some(Fit { doses, residual });
+            }
+            factor *= 0.5;
+            if factor < 0.05 {
+                break None;
+            }
+        };
+        let Some(better) = better else { return Some(fit) };
+        fit = better;
+        if largest < SETTLED {
+            break;
+        }
+    }
+    Some(fit)
+}
+
+/// Doses with their amplitudes moved by usual sizes, within what can be.
+fn moved_by(doses: &[Dose], columns: &[Column], step: &DVector<f64>) -> Vec<Dose> {
+    let mut doses = doses.to_vec();
+    for (column, step) in columns.iter().zip(step.iter()) {
+        let parameter = &column.effect.parameters[column.parameter];
+        if let Some(dose) = doses.iter_mut().find(|dose| std::ptr::eq(dose.effect, column.effect)) {
+            let value = &mut dose.values[column.parameter];
+            *value += step * parameter.prior_scale;
+            if parameter.range.0 >= 0.0 {
+                *value = value.max(0.0);
+            }
+        }
+    }
+    doses
+}

@@ -1,0 +1,174 @@
+//! A recorded movement: what the encoders of a rig said, as a source of truth.
+//!
+//! Angle, rate and acceleration of each gimbal are those of a cubic through the readings within [`REACH`] of a row, by
+//! least squares: a reading's noise is averaged, and a movement whose angle is a cubic over that time stays as it is.
+//! Between rows the nearest row's swing goes on with constant acceleration. Not modelled: readings that lag the gimbal.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix4, Vector4};
+
+use super::{
+    gimbal::direction,
+    truth::{Motion, Place, on_rig},
+};
+use crate::{
+    effect::{Machine, Swing, Truth},
+    recording::manifest::{Axis, Rig, RigKind},
+};
+
+/// Readings within this time of a row tell its swing, s.
+const REACH: f64 = 0.031;
+/// At least this many readings to each side.
+const FEWEST: usize = 2;
+
+/// The movement of a recorded rig.
+#[derive(Clone, Debug)]
+pub struct Replay {
+    time: Vec<f64>,
+    swings: Vec<[Swing; 3]>,
+    temperature: Vec<f64>,
+    axes: [Axis; 3],
+    place: Place,
+}
+
+impl Replay {
+    /// The movement that encoders tell, rad, wrapped or not; rows without a reading follow their neighbours.
+    /// `temperature` in °C, one a row. Times strictly increase. `None` where no row has a reading of all three.
+    pub fn new(
+        time: &[f64],
+        encoders: &[[f64; 3]],
+        temperature: Vec<f64>,
+        axes: [Axis; 3],
+        place: Place,
+    ) -> Option<Self> {
+        let angles = unwrapped(encoders)?;
+        let median = (time.last()? - time.first()?) / (time.len().max(2) - 1) as f64;
+        let reach = ((REACH / median).floor() as usize).max(FEWEST);
+        let swings = (0..time.len()).map(|row| swing(time, &angles, row, reach)).collect();
+        Some(Self { time: time.to_vec(), swings, temperature, axes, place })
+    }
+
+    /// Swings of the gimbals at each row, outermost first.
+    pub fn swings(&self) -> &[[Swing; 3]] {
+        &self.swings
+    }
+
+    fn nearest(&self, time: f64) -> usize {
+        let after = self.time.partition_point(|t| *t < time).min(self.time.len().saturating_sub(1));
+        let before = after.saturating_sub(1);
+        match (self.time.get(before), self.time.get(after)) {
+            (Some(b), Some(a)) if time - b < a - time => before,
+            _ => after,
+        }
+    }
+}
+
+impl Motion for Replay {
+    fn duration(&self) -> f64 {
+        self.time.last().copied().unwrap_or(0.0)
+    }
+
+    fn truth(&self, time: f64, rig: &dyn Fn(&mut Machine)) -> Truth {
+        let row = self.nearest(time);
+        let since = time - self.time.get(row).copied().unwrap_or(time);
+        let mut machine = Machine::exact(self.axes.map(direction));
+        machine.gimbals = self.swings.get(row).copied().unwrap_or_default().map(|swing| Swing {
+            angle: swing.angle + since * (swing.rate + 0.5 * since * swing.acceleration),
+            rate: swing.rate + since * swing.acceleration,
+            acceleration: swing.acceleration,
+        });
+        rig(&mut machine);
+        on_rig(time, &machine, &self.place, self.temperature.get(row).copied().unwrap_or_default())
+    }
+
+    fn encoders(&self, time: f64) -> Option<[f64; 3]> {
+        self.swings.get(self.nearest(time)).map(|swings| swings.map(|swing| swing.angle))
+    }
+
+    fn rig(&self) -> Rig {
+        Rig { kind: RigKind::FlightMotionSimulator, axes: Some(self.axes.to_vec()) }
+    }
+
+    fn place(&self) -> Place {
+        self.place
+    }
+}
+
+/// Readings without the wrap at ±π; missing ones repeat the last. `None` where there is none at all.
+fn unwrapped(encoders: &[[f64; 3]]) -> Option<Vec<[f64; 3]>> {
+    let measured = |row: &&[f64; 3]| row.iter().all(|angle| angle.is_finite());
+    let mut last = *encoders.iter().find(measured)?;
+    let unwrap = |row: &[f64; 3]| {
+        if measured(&row) {
+            for (last, angle) in last.iter_mut().zip(row) {
+                let step = angle - *last;
+                *last += step - TAU * (step / TAU).round();
+            }
+        }
+        last
+    };
+    Some(encoders.iter().map(unwrap).collect())
+}
+
+/// The cubic through the readings about a row, by least squares.
+fn swing(time: &[f64], angles: &[[f64; 3]], row: usize, reach: usize) -> [Swing; 3] {
+    let from = row.saturating_sub(reach).min(time.len().saturating_sub(2 * reach + 1));
+    let to = (from + 2 * reach + 1).min(time.len());
+    let scale = 1.0 / (time[to - 1] - time[from]).max(f64::MIN_POSITIVE);
+    let mut normal = Matrix4::zeros();
+    let mut right = [Vector4::zeros(); 3];
+    for k in from..to {
+        let s = (time[k] - time[row]) * scale;
+        let powers = Vector4::new(1.0, s, s * s, s * s * s);
+        normal += powers * powers.transpose();
+        for (axis, right) in right.iter_mut().enumerate() {
+            // From the row's own reading, so that many turns cost no digits.
+            *right += powers * (angles[k][axis] - angles[row][axis]);
+        }
+    }
+    let inverse = normal.try_inverse().unwrap_or_else(Matrix4::zeros);
+    std::array::from_fn(|axis| {
+        let cubic = inverse * right[axis];
+        Swing {
+            angle: angles[row][axis] + cubic[0],
+            rate: cubic[1] * scale,
+            acceleration: 2.0 * cubic[2] * scale * scale,
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    fn replayed(angle: impl Fn(f64) -> f64) -> Replay {
+        let time: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
+        let wrap = |a: f64| a - TAU * (a / TAU).round();
+        let encoders: Vec<[f64; 3]> = time.iter().map(|t| [wrap(angle(*t)), 0.3, -PI]).collect();
+        let axes = [Axis::Z, Axis::Y, Axis::X];
+        Replay::new(&time, &encoders, vec![25.0; 1000], axes, Place::ankara()).unwrap()
+    }
+
+    #[test]
+    fn a_sinusoid_through_many_turns_keeps_its_rate_and_acceleration() {
+        let (amplitude, w) = (20.0, 2.0);
+        let replay = replayed(|t| amplitude * (w * t).sin());
+        for k in 0..90 {
+            let t = 0.5 + 0.1 * f64::from(k) + 0.004;
+            let truth = replay.truth(t, &|_| ());
+            assert!((truth.gimbals[0].angle - amplitude * (w * t).sin()).abs() < 1e-5, "{t}");
+            assert!((truth.gimbals[0].rate - amplitude * w * (w * t).cos()).abs() < 2e-3, "{t}");
+            assert!((truth.gimbals[0].acceleration + amplitude * w * w * (w * t).sin()).abs() < 1.0, "{t}");
+        }
+    }
+
+    #[test]
+    fn a_missing_reading_repeats_the_one_before_it() {
+        let encoders = [[f64::NAN; 3], [1.0, 2.0, 3.0], [f64::NAN; 3], [1.1, 2.0, 3.0]];
+        let angles = unwrapped(&encoders).unwrap();
+        assert_eq!(angles, [[1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [1.1, 2.0, 3.0]]);
+        assert!(unwrapped(&[[f64::NAN; 3]]).is_none());
+    }
+}
