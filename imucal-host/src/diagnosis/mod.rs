@@ -2,6 +2,7 @@
 
 pub mod block;
 pub mod candidates;
+pub mod convention;
 pub mod design;
 pub mod evidence;
 pub mod finding;
