@@ -147,8 +147,14 @@ impl<'s> Linear<'s> {
         let whitenings = self.weighing.whitenings(&self.design, &noise);
         let normal = self.design.normal(&whitenings, &fitted);
         let log_evidence = log_evidence(&normal, &self.design, self.baseline.len(), set, &fitted)?
-            - set.len() as f64 * (self.candidates.effects.len() as f64).ln();
+            - set.iter().map(|effect| self.surprise(effect)).sum::<f64>();
         Some(Judged { set: set.to_vec(), noise, log_evidence })
+    }
+
+    /// −ln of an effect's prior: one of the candidates, in one of its shapes.
+    fn surprise(&self, effect: &Effect) -> f64 {
+        let shapes = shape::choices(effect, self.scene.duration());
+        ((self.candidates.effects.len() * shapes) as f64).ln()
     }
 
     /// Σ⁻¹ of each channel.
@@ -165,7 +171,11 @@ impl<'s> Linear<'s> {
     }
 
     /// Candidates by ln BF of a set with each of them added, best first; the set itself has the value returned beside.
-    fn ranked(&self, set: &[&'static Effect], noise: &Noise) -> Option<(f64, Vec<(f64, &'static Effect)>)> {
+    pub fn ranked(
+        &self,
+        set: &[&'static Effect],
+        noise: &Noise,
+    ) -> Option<(f64, Vec<(f64, &'static Effect)>)> {
         let (projected, others) = self.projected(noise)?;
         let places = |effect: &Effect| -> Vec<usize> {
             (0..others.len()).filter(|at| self.design.columns[others[*at]].is_of(effect)).collect()
@@ -180,7 +190,7 @@ impl<'s> Linear<'s> {
             .effects
             .iter()
             .filter(|effect| !set.iter().any(|other| std::ptr::eq(*other, **effect)))
-            .map(|effect| (value(Some(&places(effect))), *effect))
+            .map(|effect| (value(Some(&places(effect))) - self.surprise(effect), *effect))
             .collect();
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         Some((value(None), ranked))

@@ -49,6 +49,14 @@ pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backd
     best.map(|(_, shape)| shape)
 }
 
+/// Number of shapes that an effect's menu holds in a recording of `duration` s: a choice among them that costs evidence.
+pub fn choices(effect: &Effect, duration: f64) -> usize {
+    let single = menu(effect, duration).len();
+    let instants = effect.parameters.iter().filter(|p| matches!(p.role, Role::Instant { .. })).count();
+    // Of two instants the second comes after the first.
+    if instants == 2 { single / 2 } else { single }
+}
+
 /// ln BF of each shape.
 pub fn judge(
     effect: &'static Effect,
