@@ -1,6 +1,9 @@
 //! Which other effects could stand in a cause's place.
 
-use super::search::{Judged, Linear};
+use super::{
+    noise::NEAR,
+    search::{Judged, Linear},
+};
 use crate::effect::Effect;
 
 /// Alternatives judged with a noise of their own.
@@ -33,7 +36,7 @@ pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> O
         let mut set = rest.clone();
         set.push(effect);
         let anew: Vec<_> = cause.sensors.iter().chain(effect.sensors).copied().collect();
-        if let Some(found) = linear.judge(&set, &best.noise, &anew) {
+        if let Some(found) = linear.judge(&set, &best.noise, &anew, &NEAR) {
             judged.push((found.log_evidence, effect));
         }
     }

@@ -24,6 +24,12 @@ use crate::recording::SensorKind;
 
 /// Correlation times of the two drifts, s.
 const TIMES: [f64; 2] = [8.0, 120.0];
+/// Factors of a search that begins anywhere.
+pub const FAR: [f64; 2] = [4.0, 1.7];
+/// Factors of a search that begins near its end.
+pub const NEAR: [f64; 1] = [2.0];
+/// Rounds over all standard deviations for each factor.
+const ROUNDS: usize = 4;
 /// Pieces of which neighbours are compared, s.
 const PIECE: f64 = 0.1;
 
@@ -184,8 +190,16 @@ impl<'s> Weighing<'s> {
         Whitening::new(&self.times, weights, &rests, &drifts)
     }
 
-    /// The noise of a sensor under which its residual, less `columns`, is likeliest; the search begins at `start`.
-    pub fn fit(&self, design: &Design, kind: SensorKind, columns: &[usize], start: &Noise) -> SensorNoise {
+    /// The noise of a sensor under which its residual, less `columns`, is likeliest; the search begins at `start`
+    /// and goes by these factors.
+    pub fn fit(
+        &self,
+        design: &Design,
+        kind: SensorKind,
+        columns: &[usize],
+        start: &Noise,
+        steps: &[f64],
+    ) -> SensorNoise {
         let channels: Vec<&Channel> = design.channels.iter().filter(|channel| channel.kind == kind).collect();
         let places: Vec<Vec<usize>> = channels
             .iter()
@@ -211,14 +225,14 @@ impl<'s> Weighing<'s> {
         };
         let mut best = start.sensors[kind as usize];
         let mut least = likelihood(&best);
-        for factor in [4.0, 1.7] {
+        for factor in steps {
             let mut improved = true;
             let mut rounds = 0;
-            while improved && rounds < 4 {
+            while improved && rounds < ROUNDS {
                 improved = false;
                 rounds += 1;
                 for coordinate in 0..if kind == SensorKind::Gyr { 2 } else { 3 } {
-                    for step in [factor, 1.0 / factor] {
+                    for step in [*factor, 1.0 / factor] {
                         loop {
                             let mut tried = best;
                             let value = tried.coordinate(coordinate);

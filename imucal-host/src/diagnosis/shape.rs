@@ -96,6 +96,7 @@ fn project(
 /// Shapes to try: positive ones by factors, others along their axes, instants along the recording.
 fn menu(effect: &Effect, duration: f64) -> Vec<Vec<f64>> {
     let mut menu = vec![effect.neutral(duration)];
+    let timed = effect.parameters.iter().any(|p| matches!(p.role, Role::Instant { .. }));
     let either: Vec<usize> = (0..effect.parameters.len())
         .filter(|at| {
             matches!(effect.parameters[*at].role, Role::Shape { .. }) && effect.parameters[*at].range.0 < 0.0
@@ -115,7 +116,10 @@ fn menu(effect: &Effect, duration: f64) -> Vec<Vec<f64>> {
     for (at, parameter) in effect.parameters.iter().enumerate() {
         menu = match parameter.role {
             Role::Shape { usual } if parameter.range.0 >= 0.0 => {
-                vary(&menu, at, [0.2, 0.5, 1.0, 2.0, 5.0].map(|factor| usual * factor).as_slice())
+                // What is placed in time as well is scanned broadly and refined afterwards.
+                let factors: &[f64] = if timed { &[0.7, 2.0] } else { &[0.2, 0.5, 1.0, 2.0, 5.0] };
+                let values: Vec<f64> = factors.iter().map(|factor| usual * factor).collect();
+                vary(&menu, at, &values)
             }
             Role::Instant { .. } => {
                 let step = GRID.0.max(GRID.1 * duration);
