@@ -59,7 +59,7 @@ pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str
     };
     let integrity = integrity::inspect(recording);
     let triads = [Triad::identity(); SensorKind::ALL.len()];
-    let scene = Scene::new(recording, &integrity, &replay, replay.swings(), triads);
+    let scene = Scene::new(recording, &integrity, &replay, triads);
     let thermometer = recording.temperature.is_some();
     let candidates = Candidates::new(&scene.kinds, thermometer, false, &options.without);
     let explained = search::search(&scene, &candidates, progress);

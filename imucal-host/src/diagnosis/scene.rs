@@ -11,7 +11,7 @@ use crate::{
     effect::{Act, Effect, Input, Role, Swing, Truth},
     recording::{Recording, SensorKind, integrity::Integrity},
     simulator::{
-        Dose, Motion,
+        Dose, Motion, Replay,
         chain::{Chain, inputs},
     },
 };
@@ -74,7 +74,7 @@ pub struct Scene<'a> {
     pub swings: &'a [[Swing; 3]],
     /// Usable rows of each block, by sensor.
     pub counts: [Vec<usize>; 3],
-    motion: &'a (dyn Motion + Sync),
+    motion: &'a Replay,
     usable: [Vec<bool>; 3],
     triads: [Triad<f64>; 3],
     /// Nodes for signatures.
@@ -88,12 +88,11 @@ impl<'a> Scene<'a> {
     pub fn new(
         recording: &'a Recording,
         integrity: &Integrity,
-        motion: &'a (dyn Motion + Sync),
-        swings: &'a [[Swing; 3]],
+        motion: &'a Replay,
         triads: [Triad<f64>; 3],
     ) -> Self {
         let interval = recording.median_interval().unwrap_or(0.01);
-        let blocks = cut(&recording.time, swings, interval);
+        let blocks = cut(&recording.time, motion.moving(), interval);
         let usable = SensorKind::ALL
             .map(|kind| integrity.sensor(kind).map(|sensor| sensor.usable.clone()).unwrap_or_default());
         let counts = usable.each_ref().map(|usable| {
@@ -105,7 +104,18 @@ impl<'a> Scene<'a> {
         let fine = Nodes::choose(&recording.time, &blocks, |_, row| row % stride == stride / 2);
         let centre = |block: &Block, row: usize| row == (block.rows.start + block.rows.end) / 2;
         let coarse = Nodes::choose(&recording.time, &blocks, centre);
-        Self { recording, blocks, kinds, swings, counts, motion, usable, triads, fine, coarse }
+        Self {
+            recording,
+            blocks,
+            kinds,
+            swings: motion.swings(),
+            counts,
+            motion,
+            usable,
+            triads,
+            fine,
+            coarse,
+        }
     }
 
     /// Length of the recording, s.
