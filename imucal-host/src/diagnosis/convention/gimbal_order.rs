@@ -10,13 +10,15 @@ use super::pairs::Pairs;
 use crate::{
     effect::{Machine, Truth},
     recording::{Recording, SensorKind, integrity::Integrity, manifest::Axis},
-    simulator::{Motion, gimbal::direction, truth::on_rig},
+    simulator::{Motion, gimbal::direction, programme::wrap, truth::on_rig},
 };
 
 /// A triad follows where K v + b leaves no more than this share of its variance.
 const FOLLOWS: f64 = 0.1;
 /// Rows that are replayed.
 const ROWS: usize = 250;
+/// Rates are told from readings this far before and after, s.
+const REACH: f64 = 0.01;
 /// Of orders that leave as much as the best, within this factor and share, the one with the fewest changes is named.
 const ALIKE: (f64, f64) = (1.5, 0.003);
 /// Steps of the base's heading that are tried, degrees.
@@ -163,13 +165,18 @@ fn best(
         .filter(|(row, _)| encoders[*row].iter().all(|angle| angle.is_finite()))
         .collect();
     let at: Vec<usize> = chosen.iter().map(|(row, _)| *row).collect();
+    let reach = (REACH / recording.median_interval()?).round().max(1.0) as usize;
     let left = |reading: &Reading| {
         let replayed = |(row, truth): &(usize, &Truth)| {
             let mut machine = Machine::exact(reading.axes.map(direction));
+            let (before, after) = (row.saturating_sub(reach), (row + reach).min(encoders.len() - 1));
+            let span = recording.time[after] - recording.time[before];
             for ((gimbal, column), sign) in machine.gimbals.iter_mut().zip(reading.columns).zip(reading.signs)
             {
-                *gimbal = truth.gimbals[column].through(0.0, sign * reading.factor, 0.0);
-                gimbal.angle = sign * reading.factor * encoders[*row][column];
+                let angle = |row: usize| sign * reading.factor * encoders[row][column];
+                // A reading that is wrapped is so in its own unit.
+                gimbal.angle = angle(*row);
+                gimbal.rate = wrap(angle(after) - angle(before)) / span;
             }
             on_rig(truth.time, &machine, &place, truth.temperature)
         };
