@@ -12,6 +12,7 @@ pub mod finding;
 pub mod gap;
 pub mod noise;
 pub mod refit;
+pub mod revisits;
 pub mod scene;
 pub mod search;
 pub mod shape;
