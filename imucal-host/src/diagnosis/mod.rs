@@ -7,6 +7,7 @@ pub mod design;
 pub mod driver;
 pub mod estimate;
 pub mod evidence;
+pub mod experiment;
 pub mod finding;
 pub mod gap;
 pub mod noise;
@@ -29,6 +30,7 @@ use self::{
     search::Explained,
 };
 use crate::{
+    effect::Effect,
     recording::{Recording, SensorKind, integrity, manifest::Axis},
     simulator::{Motion, Place, Replay},
 };
@@ -69,16 +71,21 @@ pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str
     })
 }
 
+/// The rig's axes, outermost first.
+fn axes(recording: &Recording) -> Result<[Axis; 3], String> {
+    let axes = recording.manifest.rig.as_ref().and_then(|rig| rig.axes.clone());
+    axes.and_then(|axes| axes.try_into().ok()).ok_or_else(|| {
+        "the manifest's [rig] names no three axes, outermost first, such as [\"z\", \"y\", \"x\"]".to_owned()
+    })
+}
+
 /// The recorded movement, or why there is none.
 fn replay(recording: &Recording) -> Result<Replay, String> {
     let gimbal = recording.gimbal.as_deref().ok_or(
         "there are no encoder columns (gimbal_outer, gimbal_middle, gimbal_inner): without a rig the simulator cannot \
          be given the movement",
     )?;
-    let axes = recording.manifest.rig.as_ref().and_then(|rig| rig.axes.clone());
-    let axes: [Axis; 3] = axes
-        .and_then(|axes| axes.try_into().ok())
-        .ok_or("the manifest's [rig] names no three axes, outermost first, such as [\"z\", \"y\", \"x\"]")?;
+    let axes = axes(recording)?;
     let site = &recording.manifest.site;
     if recording.mag.is_some() && site.field_ned_ut.is_none() {
         return Err(
@@ -156,13 +163,23 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
             credible_set.push(effect.id.clone());
         }
     }
+    let pairs: Vec<(&'static Effect, &'static Effect)> = best
+        .set
+        .iter()
+        .zip(&standings)
+        .flat_map(|(cause, standing)| standing.equivalents.iter().map(|other| (*cause, *other)))
+        .collect();
+    let next_experiment = match axes(recording) {
+        Ok(axes) => experiment::next(explained, axes, &pairs)?,
+        Err(_) => Vec::new(),
+    };
     let (absent, not_testable) = testable::testable(linear, &best.set, &best.noise)?;
     let found = !causes.is_empty();
     Some(Diagnosis {
         verdict: verdict(&causes, left, &closed),
         remarks: Vec::new(),
         gap: gap::table(linear, &best.set, &best.noise)?,
-        places: places(if found { &before } else { &after }, closed.explainable),
+        places: places(if found { &before } else { &after }, gap::size(linear, &best.set, &best.noise)?),
         causes,
         credible_set,
         gap_closed_total: found.then_some(closed.total.value),
@@ -170,6 +187,7 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
         held_out: true,
         absent,
         not_testable,
+        next_experiment,
         ..untestable(recording, String::new())
     })
 }
@@ -190,7 +208,9 @@ fn verdict(causes: &[Cause], left: Option<&Following>, closed: &gap::Closed) -> 
     }
 }
 
-fn places(following: &[Following], explainable: f64) -> Vec<Driven> {
+/// Drivers that are followed; `explained` is the size of what the causes explain.
+fn places(following: &[Following], explained: f64) -> Vec<Driven> {
+    let explainable = following.iter().map(|f| f.size).fold(explained.max(f64::MIN_POSITIVE), f64::max);
     let mut places: Vec<Driven> = following
         .iter()
         .filter(|f| is_followed(f, following.len()))

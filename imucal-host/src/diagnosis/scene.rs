@@ -76,7 +76,8 @@ pub struct Scene<'a> {
     pub counts: [Vec<usize>; 3],
     motion: &'a Replay,
     usable: [Vec<bool>; 3],
-    triads: [Triad<f64>; 3],
+    /// The triads that the simulator starts from, by [`SensorKind::ALL`].
+    pub triads: [Triad<f64>; 3],
     /// Nodes for signatures.
     pub fine: Nodes,
     /// One node a block: to look where in time an effect without memory lies.
