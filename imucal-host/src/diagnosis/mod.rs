@@ -2,6 +2,7 @@
 
 pub mod block;
 pub mod candidates;
+pub mod convention;
 pub mod credible;
 pub mod design;
 pub mod driver;
