@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{
     effect::Effect,
-    recording::{SensorKind, integrity, manifest::Axis},
+    recording::{SensorKind, manifest::Axis},
     simulator::{Motion, Programme, Replay, Simulation},
 };
 
@@ -123,8 +123,8 @@ fn information<'m>(
     let place = simulation.schedule().ok()?.place();
     let temperature = recording.temperature.clone()?;
     let replay = Replay::new(&recording.time, recording.gimbal.as_deref()?, temperature, axes, place)?;
-    let integrity = integrity::inspect(&recording);
-    let scene = Scene::new(&recording, &integrity, &replay, linear.scene.triads);
+    let usable = SensorKind::ALL.map(|_| vec![true; recording.rows()]);
+    let scene = Scene::new(&recording, usable, &replay, linear.scene.triads);
     let reference = scene.reference(explained.fit.doses.clone(), &scene.fine)?;
     let columns = linear.design.columns.clone();
     let shape = |effect: &'static Effect| {
