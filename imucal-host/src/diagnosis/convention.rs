@@ -72,6 +72,10 @@ pub struct Conventions {
     pub findings: Vec<Finding>,
     /// What else a reader ought to know.
     pub remarks: Vec<String>,
+    /// Code of the turn, as `axis_swap` counts them, that all triads share: that of the mount.
+    pub turned: Option<usize>,
+    /// How the encoders contradict every sensor: no baseline fits before that is mended.
+    pub contradiction: Option<String>,
 }
 
 /// Checks a recording against a movement that was told from it or besides it.
@@ -83,7 +87,7 @@ pub fn check(recording: &Recording, integrity: &Integrity, motion: &dyn Motion) 
     let pairs = SensorKind::ALL.map(|kind| Pairs::of(recording, integrity, kind, &rows, &truth));
     match gimbal_order::remark(recording, integrity, motion, &rows, &truth, &pairs) {
         // Against a wrong movement no sensor's axes mean anything.
-        Some(remark) => found.remarks.push(remark),
+        Some(remark) => found.contradiction = Some(remark),
         None => {
             let scales = axis_swap::check(&pairs, &mut found);
             for (kind, scale) in SensorKind::ALL.into_iter().zip(scales) {

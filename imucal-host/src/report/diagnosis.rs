@@ -147,7 +147,8 @@ fn write_causes(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
             if diagnosis.causes.len() == 1 { "cause".to_owned() } else { format!("cause {}", index + 1) };
         writeln!(text, "\n{heading}: {}", cause.effect)?;
         let certain = finite(cause.probability, certainty);
-        let share = share_words(cause.gap_closed, cause.gap_closed_ci95);
+        let share =
+            share_words(cause.gap_closed.unwrap_or(f64::NAN), cause.gap_closed_ci95.unwrap_or([f64::NAN; 2]));
         let material = if cause.material { "" } else { "; too small to matter" };
         text.push_str(&hanging("  ", &format!("probability {certain}; closes {share} of the gap{material}")));
         let amounts: Vec<String> = cause.parameters.iter().map(amount).collect();
@@ -299,8 +300,8 @@ mod tests {
                     amount("t_end", None, None, "s"),
                 ],
                 material: true,
-                gap_closed: 0.97,
-                gap_closed_ci95: [0.95, 0.98],
+                gap_closed: Some(0.97),
+                gap_closed_ci95: Some([0.95, 0.98]),
             }],
             credible_set: vec!["mag.bias_step".into(), "mag.bias_drift".into()],
             gap_closed_total: Some(0.97),

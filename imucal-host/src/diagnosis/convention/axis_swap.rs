@@ -42,6 +42,7 @@ pub(super) fn check(pairs: &[Option<Pairs>; 3], found: &mut Conventions) -> [Opt
     });
     if let Some(code) = turned {
         found.remarks.push(turned_words(*code, codes.len()));
+        found.turned = Some(*code);
     } else {
         for (kind, order) in SensorKind::ALL.into_iter().zip(&orders) {
             let Some(order) = order.filter(|order| order.code != 0 && order.p_value < SURE) else { continue };
