@@ -17,7 +17,9 @@ pub fn remark(motion: &dyn Motion) -> Option<String> {
     let rests = rests(motion);
     let again = |at: usize, rest: &Matrix3<f64>| {
         let earlier = rests[..at.saturating_sub(1)].iter();
-        earlier.map(|other| Rotation3::from_matrix_unchecked(other.tr_mul(rest)).angle()).any(|angle| angle < SAME)
+        earlier
+            .map(|other| Rotation3::from_matrix_unchecked(other.tr_mul(rest)).angle())
+            .any(|angle| angle < SAME)
     };
     let revisits = rests.iter().enumerate().filter(|(at, rest)| again(*at, rest)).count();
     (revisits == 0 && !rests.is_empty()).then(|| {
@@ -69,11 +71,7 @@ mod tests {
             fn duration(&self) -> f64 {
                 30.0
             }
-            fn truth(
-                &self,
-                time: f64,
-                rig: &dyn Fn(&mut crate::effect::Machine),
-            ) -> crate::effect::Truth {
+            fn truth(&self, time: f64, rig: &dyn Fn(&mut crate::effect::Machine)) -> crate::effect::Truth {
                 self.0.truth(time, rig)
             }
             fn encoders(&self, time: f64) -> Option<[f64; 3]> {
