@@ -205,3 +205,6 @@ fn places(following: &[Following], explained: f64) -> Vec<Driven> {
     places.sort_by(|a, b| b.share.total_cmp(&a.share));
     places
 }
+
+#[cfg(test)]
+mod tests;
