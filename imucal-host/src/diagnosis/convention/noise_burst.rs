@@ -6,8 +6,7 @@
 //!
 //! Fourth differences leave nothing of a movement. Their mean squares over windows of a second, without the largest
 //! quarter lest a jump count as noise, each axis by its own median, are compared in logarithms; how much they scatter is
-//! told from neighbouring windows. Where enough of them are at rest only those are asked, since a movement may make
-//! noise of its own. Of all stretches of windows the one is taken whose mean stands highest above that of the others,
+//! told from neighbouring windows. Where a movement makes noise of its own, only the windows at rest are asked. Of all stretches of windows the one is taken whose mean stands highest above that of the others,
 //! and all stretches are counted in its probability. Its ends are then moved to the rows where the likelihood is
 //! greatest.
 
@@ -30,6 +29,8 @@ const WINDOW: f64 = 1.0;
 const ROWS: usize = 20;
 /// Fewer windows say nothing.
 const WINDOWS: usize = 20;
+/// A movement makes no noise of its own where it is no more than this many times that of a rest, as mean squares.
+const SAME: f64 = 1.25;
 /// A gimbal turns above this rate, rad/s.
 const STILL: f64 = 3e-3;
 
@@ -61,11 +62,12 @@ pub(super) fn check(
     };
     let bends = bends(time, triple, &fresh, interval);
     let mut windows = windows(time, &bends, interval, moves);
-    for state in [false, true] {
-        normalise(&bends, &mut windows, state);
-    }
+    let usual = [false, true].map(|state| normalise(&bends, &mut windows, state));
     windows.retain(|window| window.level.is_finite());
-    if windows.iter().filter(|window| !window.moves).count() >= WINDOWS {
+    if let [Some(rest), Some(motion)] = usual
+        && rest.iter().zip(motion.iter()).any(|(rest, motion)| *motion > SAME * rest)
+        && windows.iter().filter(|window| !window.moves).count() >= WINDOWS
+    {
         windows.retain(|window| !window.moves);
     }
     let Some(stretch) = scan(&windows) else { return };
@@ -130,11 +132,11 @@ fn windows(time: &[f64], bends: &[Bend], interval: f64, moves: &dyn Fn(usize) ->
     windows
 }
 
-/// Levels of the windows of one state, by their scatter.
-fn normalise(bends: &[Bend], windows: &mut [Window], moves: bool) {
+/// Levels of the windows of one state, by their scatter; gives their usual mean squares, `None` of too few windows.
+fn normalise(bends: &[Bend], windows: &mut [Window], moves: bool) -> Option<Vector3<f64>> {
     let mut own: Vec<&mut Window> = windows.iter_mut().filter(|window| window.moves == moves).collect();
     if own.len() < WINDOWS / 4 {
-        return;
+        return None;
     }
     let means: Vec<Vector3<f64>> = own.iter().map(|window| trimmed(&bends[window.bends.clone()])).collect();
     let usual = [0, 1, 2].map(|axis| median(means.iter().map(|mean| mean[axis]).collect()).unwrap_or(0.0));
@@ -156,6 +158,7 @@ fn normalise(bends: &[Bend], windows: &mut [Window], moves: bool) {
     for (window, level) in own.iter_mut().zip(levels) {
         window.level = level / scatter;
     }
+    Some(Vector3::from(usual))
 }
 
 /// Mean squares without the largest quarter.
