@@ -137,7 +137,10 @@ pub fn drivers(scene: &Scene<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Driver>
     drivers
 }
 
-fn per_gimbal(name: &str, swings: &[[Swing; 3]], of: &[(&str, &dyn Fn(&Swing) -> f64)]) -> Driver {
+/// A function of a gimbal's swing, and what it is.
+type OfSwing<'a> = (&'a str, &'a dyn Fn(&Swing) -> f64);
+
+fn per_gimbal(name: &str, swings: &[[Swing; 3]], of: &[OfSwing<'_>]) -> Driver {
     let mut functions = Vec::new();
     for (gimbal, which) in ["outer", "middle", "inner"].iter().enumerate() {
         for (detail, value) in of {
