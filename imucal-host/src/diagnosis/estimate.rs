@@ -2,7 +2,12 @@
 
 use nalgebra::DMatrix;
 
-use super::{design::Column, finding::Amount, scene::Means, search::Explained};
+use super::{
+    design::Column,
+    finding::Amount,
+    scene::{Means, shapes},
+    search::Explained,
+};
 use crate::{
     effect::{Effect, Role},
     simulator::Dose,
@@ -16,23 +21,18 @@ pub fn amounts(explained: &Explained<'_>) -> Option<Vec<Vec<Amount>>> {
     let (linear, set) = (&explained.linear, &explained.best.set);
     let reference = linear.scene.reference(explained.fit.doses.clone(), &linear.scene.fine)?;
     let dose = |effect: &Effect| explained.fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, effect));
-    let shaped = |dose: &Dose| {
+    let shaped = |dose: &Dose| -> Vec<Column> {
         let effect = dose.effect;
-        let free = move |at: &usize| {
-            matches!(effect.parameters[*at].role, Role::Shape { .. } | Role::Instant { .. })
-        };
-        let finite: Vec<usize> =
-            (0..effect.parameters.len()).filter(free).filter(|at| dose.values[*at].is_finite()).collect();
-        finite.into_iter().map(move |parameter| Column { effect, parameter })
+        shapes(effect, &dose.values).map(|parameter| Column { effect, parameter }).collect()
     };
-    let shapes: Vec<Column> = set.iter().filter_map(|effect| dose(effect)).flat_map(shaped).collect();
-    let means: Vec<Means> = shapes
+    let shape_columns: Vec<Column> = set.iter().filter_map(|effect| dose(effect)).flat_map(shaped).collect();
+    let means: Vec<Means> = shape_columns
         .iter()
         .map(|column| reference.signature(column.effect, column.parameter, &[]))
         .collect::<Option<_>>()?;
     let fitted = linear.fitted(set);
     let columns: Vec<Column> =
-        fitted.iter().map(|id| linear.design.columns[*id]).chain(shapes.iter().copied()).collect();
+        fitted.iter().map(|id| linear.design.columns[*id]).chain(shape_columns.iter().copied()).collect();
     let design = linear.design.extended(&fitted, columns.clone(), &means);
     let every: Vec<usize> = (0..design.size).collect();
     let normal = design.normal(&linear.whitenings(&explained.best.noise), &every);

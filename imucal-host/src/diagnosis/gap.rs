@@ -20,9 +20,11 @@ use crate::effect::Effect;
 /// Folds.
 const FOLDS: usize = 8;
 /// Stretches dealt to folds, s.
-const STRETCH: f64 = 15.0;
-/// Loose prior, in usual sizes, that keeps inverses finite.
+const STRETCH: f64 = 3.0;
+/// Standard deviation of a baseline parameter's prior, in usual sizes.
 const LOOSE: f64 = 1e4;
+/// Of an effect's: what few blocks tell of it must not run away on the others.
+const LARGE: f64 = 30.0;
 /// Standard deviation of a driver's statistic where there is nothing to follow: √(2·18).
 const UNSEEN: f64 = 6.0;
 
@@ -66,8 +68,8 @@ pub fn closed(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise, remai
             })
             .collect()
     };
-    let before = held_out(&folds, &(0..baseline).collect::<Vec<_>>())?;
-    let after = held_out(&folds, &without(None))?;
+    let before = held_out(&folds, &(0..baseline).collect::<Vec<_>>(), baseline)?;
+    let after = held_out(&folds, &without(None), baseline)?;
     let gain = |after: &[Fold]| -> Vec<f64> {
         before.iter().zip(after).map(|(before, after)| before.energy - after.energy).collect()
     };
@@ -93,7 +95,7 @@ pub fn closed(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise, remai
     let total = share(&closed);
     let mut each = Vec::new();
     for k in 0..set.len() {
-        let rest = held_out(&folds, &without(Some(k)))?;
+        let rest = held_out(&folds, &without(Some(k)), baseline)?;
         let gains: Vec<f64> =
             rest.iter().zip(&after).map(|(rest, after)| rest.energy - after.energy).collect();
         each.push(share(&gains));
@@ -120,7 +122,8 @@ struct Fold {
     cost: f64,
 }
 
-fn held_out(folds: &[Normal], places: &[usize]) -> Option<Vec<Fold>> {
+/// Each fold's residual after a fit of columns to the others; the first `baseline` columns are the baseline's.
+fn held_out(folds: &[Normal], places: &[usize], baseline: usize) -> Option<Vec<Fold>> {
     let part = |normal: &Normal| {
         let n = places.len();
         let g = DMatrix::from_fn(n, n, |i, j| normal.information[(places[i], places[j])]);
@@ -128,7 +131,8 @@ fn held_out(folds: &[Normal], places: &[usize]) -> Option<Vec<Fold>> {
     };
     let parts: Vec<(DMatrix<f64>, DVector<f64>)> = folds.iter().map(part).collect();
     let n = places.len();
-    let loose = DMatrix::identity(n, n) / (LOOSE * LOOSE);
+    let precision = |place: &usize| if *place < baseline { LOOSE.powi(-2) } else { LARGE.powi(-2) };
+    let loose = DMatrix::from_diagonal(&DVector::from_iterator(n, places.iter().map(precision)));
     folds
         .iter()
         .enumerate()

@@ -9,12 +9,15 @@ use super::{
     candidates,
     design::{Column, Design},
     noise::{Noise, Weighing},
-    scene::{Means, Reference, Scene, amplitudes},
+    scene::{Means, Reference, Scene, amplitudes, shapes},
 };
-use crate::{effect::Effect, simulator::Dose};
+use crate::{
+    effect::{Effect, Role},
+    simulator::Dose,
+};
 
 /// Steps at most.
-const STEPS: usize = 6;
+const STEPS: usize = 8;
 /// A step is small enough when no parameter moves by more than this share of its standard error.
 const SETTLED: f64 = 0.05;
 
@@ -22,6 +25,8 @@ const SETTLED: f64 = 0.05;
 const FREE: f64 = 1e4;
 /// Of an effect.
 const LARGE: f64 = 30.0;
+/// A shape goes no further than this in one step, in usual sizes; it is not drawn to anywhere.
+const STRIDE: f64 = 1.0;
 
 /// Effects with fitted amplitudes and what they leave.
 #[derive(Clone, Debug)]
@@ -36,6 +41,16 @@ pub struct Fit {
 pub fn columns(effects: &[&'static Effect]) -> Vec<Column> {
     let of = |effect: &'static Effect| amplitudes(effect).map(move |parameter| Column { effect, parameter });
     effects.iter().flat_map(|effect| of(effect)).collect()
+}
+
+/// All amplitudes of some doses, and the shapes of those.
+fn free(doses: &[Dose]) -> Vec<Column> {
+    let of = |dose: &Dose| -> Vec<Column> {
+        let effect = dose.effect;
+        let parameters = amplitudes(effect).chain(shapes(effect, &dose.values));
+        parameters.map(|parameter| Column { effect, parameter }).collect()
+    };
+    doses.iter().flat_map(of).collect()
 }
 
 /// Signatures of columns in a run; `neutral` gives an effect's parameters where the run does not hold it. `None` where
@@ -53,8 +68,7 @@ pub fn signatures(
 
 /// Fits the amplitudes of all doses. `None` where the simulator fails.
 pub fn refit(scene: &Scene<'_>, doses: Vec<Dose>, noise: Option<&Noise>) -> Option<Fit> {
-    let effects: Vec<&'static Effect> = doses.iter().map(|dose| dose.effect).collect();
-    let columns = columns(&effects);
+    let columns = free(&doses);
     let residual = scene.residual(&doses)?;
     let mut fit = Fit { doses, residual };
     for _ in 0..STEPS {
@@ -104,11 +118,19 @@ pub fn refit(scene: &Scene<'_>, doses: Vec<Dose>, noise: Option<&Noise>) -> Opti
 /// Precision of each column's prior, and where the column stands, in usual sizes. A term of the baseline may be of any
 /// size; an effect is not many times its usual one, so that what the data do not show stays small.
 fn prior(doses: &[Dose], columns: &[Column]) -> (DVector<f64>, DVector<f64>) {
+    let role = |column: &Column| column.effect.parameters[column.parameter].role;
     let precision = columns.iter().map(|column| {
-        let loose = if candidates::is_term(column.effect) { FREE } else { LARGE };
+        let loose = match role(column) {
+            Role::Amplitude if candidates::is_term(column.effect) => FREE,
+            Role::Amplitude => LARGE,
+            _ => STRIDE,
+        };
         1.0 / (loose * loose)
     });
     let at = columns.iter().map(|column| {
+        if role(column) != Role::Amplitude {
+            return 0.0;
+        }
         let dose = doses.iter().find(|dose| column.is_of(dose.effect));
         dose.map_or(0.0, |dose| dose.values[column.parameter])
             / column.effect.parameters[column.parameter].prior_scale
@@ -124,8 +146,10 @@ fn moved_by(doses: &[Dose], columns: &[Column], step: &DVector<f64>) -> Vec<Dose
         if let Some(dose) = doses.iter_mut().find(|dose| std::ptr::eq(dose.effect, column.effect)) {
             let value = &mut dose.values[column.parameter];
             *value += step * parameter.prior_scale;
-            if parameter.range.0 >= 0.0 {
-                *value = value.max(0.0);
+            match parameter.role {
+                Role::Amplitude if parameter.range.0 < 0.0 => {}
+                Role::Amplitude => *value = value.max(0.0),
+                _ => *value = value.clamp(parameter.range.0, parameter.range.1),
             }
         }
     }

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::block::{Block, cut};
 use crate::{
-    effect::{Act, Effect, Input, Role, Swing, Truth},
+    effect::{Act, Effect, Input, Parameter, Role, Swing, Truth},
     recording::{Recording, SensorKind},
     simulator::{
         Dose, Motion, Replay,
@@ -56,8 +56,9 @@ impl Nodes {
             .collect()
     }
 }
-/// A derivative's step, as a share of the parameter's usual size.
-const STEP: f64 = 0.1;
+/// A derivative's step along an amplitude, as a share of its usual size; along a shape, of its usual value; of an
+/// instant, s.
+const STEP: (f64, f64, f64) = (0.1, 0.02, 0.25);
 
 /// Block means of each sensor, by [`SensorKind::ALL`]; `None` without the sensor.
 pub type Means = [Option<Vec<Vector3<f64>>>; 3];
@@ -205,7 +206,7 @@ impl Reference<'_> {
     pub fn signature(&self, effect: &'static Effect, parameter: usize, neutral: &[f64]) -> Option<Means> {
         let scale = effect.parameters.get(parameter)?.prior_scale;
         let mut doses = self.doses.clone();
-        let step = STEP * scale;
+        let step = step(effect.parameters.get(parameter)?);
         match doses.iter_mut().find(|dose| std::ptr::eq(dose.effect, effect)) {
             Some(dose) => *dose.values.get_mut(parameter)? += step,
             None => {
@@ -238,14 +239,29 @@ impl Reference<'_> {
         let mut means: Means = Default::default();
         for kind in effect.sensors.iter().filter(|kind| self.scene.kinds.contains(kind)) {
             let (with, without) = (&outputs[*kind as usize], &self.outputs[*kind as usize]);
-            let change: Vec<_> = with.iter().zip(without).map(|(a, b)| (a - b) / STEP).collect();
+            let change: Vec<_> = with.iter().zip(without).map(|(a, b)| (a - b) * (scale / step)).collect();
             means[*kind as usize] = Some(self.nodes.averaged(&change, self.scene.blocks.len()));
         }
         Some(means)
     }
 }
 
+fn step(parameter: &Parameter) -> f64 {
+    match parameter.role {
+        Role::Amplitude | Role::Choice => STEP.0 * parameter.prior_scale,
+        Role::Shape { usual } => STEP.1 * usual.abs(),
+        Role::Instant { .. } => STEP.2,
+    }
+}
+
 /// Parameters of an effect that its signature is linear in.
 pub fn amplitudes(effect: &Effect) -> impl Iterator<Item = usize> {
     effect.parameters.iter().enumerate().filter(|(_, p)| p.role == Role::Amplitude).map(|(index, _)| index)
+}
+
+/// Parameters that say how or when, at these values; an instant that never comes has none.
+pub fn shapes<'e>(effect: &'e Effect, values: &'e [f64]) -> impl Iterator<Item = usize> + 'e {
+    let is_shape = |role: &Role| matches!(role, Role::Shape { .. } | Role::Instant { .. });
+    let known = effect.parameters.iter().zip(values).enumerate();
+    known.filter(move |(_, (p, value))| is_shape(&p.role) && value.is_finite()).map(|(index, _)| index)
 }
