@@ -6,7 +6,7 @@ use crate::simulator::Motion;
 
 /// The movement is looked at this often, s.
 const STEP: f64 = 0.1;
-/// It rests below this rate, rad/s, for at least so long, s.
+/// It rests below this rate, rad/s, for at least so long, s; what is shorter is a jerk.
 const STILL: f64 = 3e-3;
 const SHORTEST: f64 = 1.0;
 /// Rests within this angle of each other are in one attitude, rad.
@@ -15,13 +15,10 @@ const SAME: f64 = 0.02;
 /// What a recording without revisits costs; `None` where an attitude is held again after another, or nothing rests.
 pub fn remark(motion: &dyn Motion) -> Option<String> {
     let rests = rests(motion);
-    let again = |at: usize, rest: &Matrix3<f64>| {
-        let earlier = rests[..at.saturating_sub(1)].iter();
-        earlier
-            .map(|other| Rotation3::from_matrix_unchecked(other.tr_mul(rest)).angle())
-            .any(|angle| angle < SAME)
-    };
-    let revisits = rests.iter().enumerate().filter(|(at, rest)| again(*at, rest)).count();
+    let same =
+        |a: &Matrix3<f64>, b: &Matrix3<f64>| Rotation3::from_matrix_unchecked(a.tr_mul(b)).angle() < SAME;
+    let again = |at: usize| rests[..at].iter().any(|earlier| same(earlier, &rests[at]));
+    let revisits = (0..rests.len()).filter(|at| again(*at)).count();
     (revisits == 0 && !rests.is_empty()).then(|| {
         format!(
             "none of {} rests is a revisit of an earlier attitude: how well a rest repeats, and what drifts, is told by \
@@ -32,11 +29,21 @@ pub fn remark(motion: &dyn Motion) -> Option<String> {
     })
 }
 
-/// Attitude in the middle of each rest, table to base.
+/// Attitude in the middle of each rest, table to base. A jerk does not end a rest.
 fn rests(motion: &dyn Motion) -> Vec<Matrix3<f64>> {
     let steps = (motion.duration() / STEP) as usize;
     let truth = |step: usize| motion.truth(step as f64 * STEP, &|_| ());
-    let still: Vec<bool> = (0..=steps).map(|step| truth(step).w_pt_t.norm() < STILL).collect();
+    let mut still: Vec<bool> = (0..=steps).map(|step| truth(step).w_pt_t.norm() < STILL).collect();
+    let mut from = 0;
+    let jerks: Vec<std::ops::Range<usize>> = still
+        .chunk_by(|a, b| a == b)
+        .map(|run| {
+            from += run.len();
+            from - run.len()..from
+        })
+        .filter(|run| !still[run.start] && run.len() as f64 * STEP < SHORTEST)
+        .collect();
+    jerks.into_iter().for_each(|jerk| still[jerk].fill(true));
     let mut rests = Vec::new();
     let mut from = 0;
     for run in still.chunk_by(|a, b| a == b) {
@@ -62,6 +69,10 @@ mod tests {
         };
         assert_eq!(remark(&schedule(None)), None);
         assert!(rests(&schedule(None)).len() >= 30);
+        let axes = crate::simulator::Simulation::default().axes;
+        // Its first attitude and its last are the same, and there is no other.
+        let rates = Programme::Rates.schedule(axes, 3, Some(150.0), Place::ankara()).unwrap();
+        assert_eq!(remark(&rates), None);
     }
 
     #[test]
