@@ -12,7 +12,7 @@ use crate::{
     effect::{self, Act, CATALOGUE, Effect, Parameter, Role},
     recording::{AtomicFile, Manifest, manifest::Axis, spelling::nearest},
     simulator::{
-        Programme, Simulation, UnitKind,
+        Conditions, Programme, Simulation, UnitKind,
         random::{Purpose, Random},
     },
 };
@@ -31,7 +31,7 @@ pub(super) struct Arguments {
     /// The unit: mtx or 3dm-gx2
     #[arg(long, value_name = "UNIT", default_value = "mtx", value_parser = unit)]
     unit: UnitKind,
-    /// What the rig does: multi-position, rates, sinusoids, gyroscope, thermal or full
+    /// What the rig does: multi-position, rates, sinusoids, gyroscope, thermal, full or mixed
     #[arg(long, value_name = "NAME", default_value = "full", value_parser = programme)]
     programme: Programme,
     /// An effect beyond the baseline, e.g. acc.lever_arm or mag.bias_step=3: its size in multiples of its usual one.
@@ -119,6 +119,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         seed: arguments.seed,
         unit_seed: None,
         noise: !arguments.no_noise,
+        conditions: Conditions::default(),
         counts: !arguments.si,
         doses: Vec::new(),
     };
