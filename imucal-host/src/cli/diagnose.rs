@@ -18,8 +18,10 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let recording = read(&arguments.recording)?;
+    let clock = std::time::Instant::now();
     let options = Options { without: arguments.without.clone() };
-    let diagnosis = diagnose(&recording, &options, &|stage| eprintln!("{stage}"));
+    let diagnosis =
+        diagnose(&recording, &options, &|stage| eprintln!("{:6.2} {stage}", clock.elapsed().as_secs_f64()));
     say!("{}", serde_json::to_string_pretty(&diagnosis)?);
     Ok(Ending::Done)
 }

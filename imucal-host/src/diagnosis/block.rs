@@ -5,14 +5,10 @@
 
 use std::ops::Range;
 
-use crate::effect::Swing;
-
 /// Longest block while a gimbal moves, s.
 const MOVING: f64 = 0.1;
 /// Longest block at rest, s.
 const RESTING: f64 = 0.5;
-/// A gimbal moves above this rate, rad/s.
-const STILL: f64 = 3e-3;
 /// A rest of a single group lasts no longer, s: the group's offset may creep.
 const LONGEST_REST: f64 = 10.0;
 
@@ -27,9 +23,8 @@ pub struct Block {
     pub rest: Option<usize>,
 }
 
-/// Cuts rows into blocks. `interval` is the usual one between rows, s; a gap of more than five of them ends a block.
-pub fn cut(time: &[f64], swings: &[[Swing; 3]], interval: f64) -> Vec<Block> {
-    let moves: Vec<bool> = swings.iter().map(|s| s.iter().any(|swing| swing.rate.abs() > STILL)).collect();
+/// Cuts rows into blocks; `moves` tells where a gimbal does. `interval` is the usual one between rows, s; a gap of more than five of them ends a block.
+pub fn cut(time: &[f64], moves: &[bool], interval: f64) -> Vec<Block> {
     let mut blocks: Vec<Block> = Vec::new();
     let (mut from, mut rest, mut rest_from) = (0, 0, 0.0);
     for row in 1..=time.len() {
@@ -64,10 +59,8 @@ mod tests {
     #[test]
     fn blocks_are_short_in_motion_and_end_where_it_begins() {
         let time: Vec<f64> = (0..300).map(|k| 0.01 * f64::from(k)).collect();
-        let turning = Swing { angle: 0.0, rate: 0.2, acceleration: 0.0 };
-        let swings: Vec<[Swing; 3]> =
-            (0..300).map(|k| [if k < 120 { Swing::default() } else { turning }; 3]).collect();
-        let blocks = cut(&time, &swings, 0.01);
+        let moves: Vec<bool> = (0..300).map(|k| k >= 120).collect();
+        let blocks = cut(&time, &moves, 0.01);
         assert_eq!(blocks.iter().map(|b| b.rows.len()).sum::<usize>(), 300);
         assert_eq!(blocks[0].rows, 0..50);
         assert_eq!(blocks[2].rows, 100..120);

@@ -45,8 +45,10 @@ pub struct Channel {
 /// All channels.
 #[derive(Clone, Debug)]
 pub struct Design {
-    /// The columns.
+    /// What the first columns stand for; those behind them belong to no effect.
     pub columns: Vec<Column>,
+    /// Number of columns.
+    pub size: usize,
     /// The channels, sensor by sensor.
     pub channels: Vec<Channel>,
 }
@@ -122,10 +124,10 @@ impl Design {
             .into_par_iter()
             .map(|(kind, axis)| channel(kind, axis, scene.blocks.len(), signatures, residual))
             .collect();
-        Self { columns, channels }
+        Self { size: columns.len(), columns, channels }
     }
 
-    /// Some of its columns, by index, and further ones behind them; `columns` names all of these.
+    /// Some of its columns, by index, and further ones behind them; `columns` names the first of these.
     pub fn extended(&self, kept: &[usize], columns: Vec<Column>, further: &[Means]) -> Self {
         let channels = self
             .channels
@@ -143,7 +145,7 @@ impl Design {
                 Channel { kind: channel.kind, axis: channel.axis, ids, x, y: channel.y.clone() }
             })
             .collect();
-        Self { columns, channels }
+        Self { columns, size: kept.len() + further.len(), channels }
     }
 
     /// With the residual as it would be without some effects: their columns times `amplitudes` added, usual sizes.
@@ -164,7 +166,7 @@ impl Design {
 
     /// Normal equations of some columns, given each channel's whitening.
     pub fn normal(&self, whitenings: &[Whitening], wanted: &[usize]) -> Normal {
-        let mut place = vec![None; self.columns.len()];
+        let mut place = vec![None; self.size];
         wanted.iter().enumerate().for_each(|(to, index)| place[*index] = Some(to));
         let parts: Vec<(Normal, Vec<usize>)> = self
             .channels

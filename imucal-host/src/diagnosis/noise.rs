@@ -15,6 +15,7 @@ use nalgebra::{DMatrix, Vector3};
 use rayon::prelude::*;
 
 use super::{
+    block::Block,
     design::{Channel, Design, Normal},
     scene::{Means, Scene},
     whitening::{Process, Shared, Whitening},
@@ -23,6 +24,12 @@ use crate::recording::SensorKind;
 
 /// Correlation times of the two drifts, s.
 const TIMES: [f64; 2] = [8.0, 120.0];
+/// Factors of a search that begins anywhere.
+pub const FAR: [f64; 2] = [4.0, 1.7];
+/// Factors of a search that begins near its end.
+pub const NEAR: [f64; 1] = [2.0];
+/// Rounds over all standard deviations for each factor.
+const ROUNDS: usize = 4;
 /// Pieces of which neighbours are compared, s.
 const PIECE: f64 = 0.1;
 
@@ -120,28 +127,62 @@ impl<'s> Weighing<'s> {
         design.channels.par_iter().map(|channel| self.whitening(channel, noise)).collect()
     }
 
+    /// Σ⁻¹ of each channel over some of the blocks, as if the others had not been measured.
+    pub fn whitenings_within(
+        &self,
+        design: &Design,
+        noise: &Noise,
+        inside: &(dyn Fn(usize) -> bool + Sync),
+    ) -> Vec<Whitening> {
+        design.channels.par_iter().map(|channel| self.whitening_within(channel, noise, inside)).collect()
+    }
+
     fn whitening(&self, channel: &Channel, noise: &Noise) -> Whitening {
+        self.whitening_within(channel, noise, &|_| true)
+    }
+
+    /// Variance of a block's mean by noise alone.
+    pub fn variance(&self, channel: &Channel, noise: &Noise, block: usize) -> f64 {
+        let sensor = &noise.sensors[channel.kind as usize];
+        let count = self.scene.counts[channel.kind as usize][block].max(1) as f64;
+        let rest = self.scene.blocks[block].rest.is_some();
+        let white = if rest { sensor.white } else { sensor.moving }[channel.axis];
+        let scatter = if rest { self.scatter(channel, sensor, block) } else { 0.0 };
+        white * white / count + sensor.drift.iter().map(|sigma| sigma * sigma).sum::<f64>() + scatter
+    }
+
+    /// Variance that the scatter of a rest gives a channel.
+    fn scatter(&self, channel: &Channel, sensor: &SensorNoise, block: usize) -> f64 {
+        if channel.kind == SensorKind::Gyr {
+            return 0.0;
+        }
+        let given = self.given[channel.kind as usize][block];
+        sensor.scatter * sensor.scatter * (given.norm_squared() - given[channel.axis].powi(2))
+    }
+
+    fn whitening_within(
+        &self,
+        channel: &Channel,
+        noise: &Noise,
+        inside: &(dyn Fn(usize) -> bool + Sync),
+    ) -> Whitening {
         let sensor = &noise.sensors[channel.kind as usize];
         let blocks = &self.scene.blocks;
         let counts = &self.scene.counts[channel.kind as usize];
-        let weight = |(block, count): (&super::block::Block, &usize)| {
+        let weight = |(at, (block, count)): (usize, (&Block, &usize))| {
             let sigma = if block.rest.is_some() { sensor.white } else { sensor.moving }[channel.axis];
-            *count as f64 / (sigma * sigma)
+            if inside(at) { *count as f64 / (sigma * sigma) } else { 0.0 }
         };
-        let weights: Vec<f64> = blocks.iter().zip(counts).map(weight).collect();
+        let weights: Vec<f64> = blocks.iter().zip(counts).enumerate().map(weight).collect();
         let mut rests: Vec<Shared> = Vec::new();
-        if channel.kind != SensorKind::Gyr {
-            let mut from = 0;
-            for at in 1..=blocks.len() {
-                if at == blocks.len() || blocks[at].rest != blocks[from].rest {
-                    if blocks[from].rest.is_some() {
-                        let given = self.given[channel.kind as usize][(from + at) / 2];
-                        let across = given.norm_squared() - given[channel.axis].powi(2);
-                        let variance = sensor.scatter * sensor.scatter * across;
-                        rests.push(Shared { blocks: from..at, variance });
-                    }
-                    from = at;
+        let mut from = 0;
+        for at in 1..=blocks.len() {
+            if at == blocks.len() || blocks[at].rest != blocks[from].rest {
+                if blocks[from].rest.is_some() {
+                    let variance = self.scatter(channel, sensor, (from + at) / 2);
+                    rests.push(Shared { blocks: from..at, variance });
                 }
+                from = at;
             }
         }
         let drifts: Vec<Process> =
@@ -149,8 +190,16 @@ impl<'s> Weighing<'s> {
         Whitening::new(&self.times, weights, &rests, &drifts)
     }
 
-    /// The noise of a sensor under which its residual, less `columns`, is likeliest; the search begins at `start`.
-    pub fn fit(&self, design: &Design, kind: SensorKind, columns: &[usize], start: &Noise) -> SensorNoise {
+    /// The noise of a sensor under which its residual, less `columns`, is likeliest; the search begins at `start`
+    /// and goes by these factors.
+    pub fn fit(
+        &self,
+        design: &Design,
+        kind: SensorKind,
+        columns: &[usize],
+        start: &Noise,
+        steps: &[f64],
+    ) -> SensorNoise {
         let channels: Vec<&Channel> = design.channels.iter().filter(|channel| channel.kind == kind).collect();
         let places: Vec<Vec<usize>> = channels
             .iter()
@@ -176,14 +225,14 @@ impl<'s> Weighing<'s> {
         };
         let mut best = start.sensors[kind as usize];
         let mut least = likelihood(&best);
-        for factor in [4.0, 1.7] {
+        for factor in steps {
             let mut improved = true;
             let mut rounds = 0;
-            while improved && rounds < 4 {
+            while improved && rounds < ROUNDS {
                 improved = false;
                 rounds += 1;
                 for coordinate in 0..if kind == SensorKind::Gyr { 2 } else { 3 } {
-                    for step in [factor, 1.0 / factor] {
+                    for step in [*factor, 1.0 / factor] {
                         loop {
                             let mut tried = best;
                             let value = tried.coordinate(coordinate);

@@ -8,10 +8,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::block::{Block, cut};
 use crate::{
-    effect::{Act, Effect, Input, Role, Truth},
+    effect::{Act, Effect, Input, Role, Swing, Truth},
     recording::{Recording, SensorKind, integrity::Integrity},
     simulator::{
-        Dose, Motion,
+        Dose, Motion, Replay,
         chain::{Chain, inputs},
     },
 };
@@ -70,9 +70,11 @@ pub struct Scene<'a> {
     pub blocks: Vec<Block>,
     /// Sensors that are there.
     pub kinds: Vec<SensorKind>,
+    /// Swings of the gimbals at each row.
+    pub swings: &'a [[Swing; 3]],
     /// Usable rows of each block, by sensor.
     pub counts: [Vec<usize>; 3],
-    motion: &'a (dyn Motion + Sync),
+    motion: &'a Replay,
     usable: [Vec<bool>; 3],
     triads: [Triad<f64>; 3],
     /// Nodes for signatures.
@@ -86,12 +88,11 @@ impl<'a> Scene<'a> {
     pub fn new(
         recording: &'a Recording,
         integrity: &Integrity,
-        motion: &'a (dyn Motion + Sync),
-        swings: &[[crate::effect::Swing; 3]],
+        motion: &'a Replay,
         triads: [Triad<f64>; 3],
     ) -> Self {
         let interval = recording.median_interval().unwrap_or(0.01);
-        let blocks = cut(&recording.time, swings, interval);
+        let blocks = cut(&recording.time, motion.moving(), interval);
         let usable = SensorKind::ALL
             .map(|kind| integrity.sensor(kind).map(|sensor| sensor.usable.clone()).unwrap_or_default());
         let counts = usable.each_ref().map(|usable| {
@@ -103,7 +104,18 @@ impl<'a> Scene<'a> {
         let fine = Nodes::choose(&recording.time, &blocks, |_, row| row % stride == stride / 2);
         let centre = |block: &Block, row: usize| row == (block.rows.start + block.rows.end) / 2;
         let coarse = Nodes::choose(&recording.time, &blocks, centre);
-        Self { recording, blocks, kinds, counts, motion, usable, triads, fine, coarse }
+        Self {
+            recording,
+            blocks,
+            kinds,
+            swings: motion.swings(),
+            counts,
+            motion,
+            usable,
+            triads,
+            fine,
+            coarse,
+        }
     }
 
     /// Length of the recording, s.

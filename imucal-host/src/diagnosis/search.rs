@@ -8,7 +8,7 @@ use super::{
     candidates::{Candidates, is_shaped},
     design::{Column, Design, Normal},
     evidence::Projected,
-    noise::{Noise, Weighing},
+    noise::{FAR, NEAR, Noise, Weighing},
     refit::{Fit, columns, refit, signatures},
     scene::Scene,
     shape::{self, Backdrop},
@@ -138,17 +138,29 @@ impl<'s> Linear<'s> {
     }
 
     /// Noise and evidence of a set; the noise is estimated anew for the sensors that `anew` reaches.
-    pub fn judge(&self, set: &[&'static Effect], start: &Noise, anew: &[SensorKind]) -> Option<Judged> {
+    pub fn judge(
+        &self,
+        set: &[&'static Effect],
+        start: &Noise,
+        anew: &[SensorKind],
+        steps: &[f64],
+    ) -> Option<Judged> {
         let fitted = self.fitted(set);
         let mut noise = start.clone();
         for kind in self.scene.kinds.iter().filter(|kind| anew.contains(kind)) {
-            noise.sensors[*kind as usize] = self.weighing.fit(&self.design, *kind, &fitted, start);
+            noise.sensors[*kind as usize] = self.weighing.fit(&self.design, *kind, &fitted, start, steps);
         }
         let whitenings = self.weighing.whitenings(&self.design, &noise);
         let normal = self.design.normal(&whitenings, &fitted);
         let log_evidence = log_evidence(&normal, &self.design, self.baseline.len(), set, &fitted)?
-            - set.len() as f64 * (self.candidates.effects.len() as f64).ln();
+            - set.iter().map(|effect| self.surprise(effect)).sum::<f64>();
         Some(Judged { set: set.to_vec(), noise, log_evidence })
+    }
+
+    /// −ln of an effect's prior: one of the candidates, in one of its shapes.
+    fn surprise(&self, effect: &Effect) -> f64 {
+        let shapes = shape::choices(effect, self.scene.duration());
+        ((self.candidates.effects.len() * shapes) as f64).ln()
     }
 
     /// Σ⁻¹ of each channel.
@@ -165,7 +177,11 @@ impl<'s> Linear<'s> {
     }
 
     /// Candidates by ln BF of a set with each of them added, best first; the set itself has the value returned beside.
-    fn ranked(&self, set: &[&'static Effect], noise: &Noise) -> Option<(f64, Vec<(f64, &'static Effect)>)> {
+    pub fn ranked(
+        &self,
+        set: &[&'static Effect],
+        noise: &Noise,
+    ) -> Option<(f64, Vec<(f64, &'static Effect)>)> {
         let (projected, others) = self.projected(noise)?;
         let places = |effect: &Effect| -> Vec<usize> {
             (0..others.len()).filter(|at| self.design.columns[others[*at]].is_of(effect)).collect()
@@ -180,7 +196,7 @@ impl<'s> Linear<'s> {
             .effects
             .iter()
             .filter(|effect| !set.iter().any(|other| std::ptr::eq(*other, **effect)))
-            .map(|effect| (value(Some(&places(effect))), *effect))
+            .map(|effect| (value(Some(&places(effect))) - self.surprise(effect), *effect))
             .collect();
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         Some((value(None), ranked))
@@ -191,8 +207,9 @@ impl<'s> Linear<'s> {
         let quiet = quieter(&from.noise);
         let mut shortlist: Vec<&'static Effect> = Vec::new();
         for noise in [&from.noise, &quiet] {
-            let (_, ranked) = self.ranked(&from.set, noise)?;
-            for (_, effect) in ranked.into_iter().take(JUDGED) {
+            let (own, ranked) = self.ranked(&from.set, noise)?;
+            // Less noise than is true makes evidence, never takes it.
+            for (_, effect) in ranked.into_iter().take(JUDGED).filter(|(value, _)| *value > own) {
                 if !shortlist.iter().any(|other| std::ptr::eq(*other, effect)) {
                     shortlist.push(effect);
                 }
@@ -211,7 +228,7 @@ impl<'s> Linear<'s> {
         sets: impl Iterator<Item = (Vec<&'static Effect>, &'static [SensorKind])>,
         noise: &Noise,
     ) -> Option<Judged> {
-        sets.filter_map(|(set, anew)| self.judge(&set, noise, anew))
+        sets.filter_map(|(set, anew)| self.judge(&set, noise, anew, &NEAR))
             .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
     }
 
@@ -285,13 +302,13 @@ pub fn search<'s>(
     trace("baseline fitted");
     let mut linear = Linear::new(scene, candidates, &fit, None)?;
     let white = linear.weighing.white(&fit.residual);
-    let none = linear.judge(&[], &white, &SensorKind::ALL)?;
+    let none = linear.judge(&[], &white, &SensorKind::ALL, &FAR)?;
     trace(&format!("none: {:.1} {:?}", none.log_evidence, none.noise));
     let mut best = none.clone();
     linear = Linear::new(scene, candidates, &fit, Some(&best.noise))?;
     trace("shapes");
     loop {
-        best = linear.judge(&best.set, &best.noise, &SensorKind::ALL)?;
+        best = linear.judge(&best.set, &best.noise, &SensorKind::ALL, &FAR)?;
         let mut next: Option<Judged> = None;
         if best.set.len() < MOST {
             next = linear.added(&best)?.filter(|judged| judged.log_evidence > best.log_evidence + GAIN);

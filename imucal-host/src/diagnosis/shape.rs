@@ -49,6 +49,14 @@ pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backd
     best.map(|(_, shape)| shape)
 }
 
+/// Number of shapes that an effect's menu holds in a recording of `duration` s: a choice among them that costs evidence.
+pub fn choices(effect: &Effect, duration: f64) -> usize {
+    let single = menu(effect, duration).len();
+    let instants = effect.parameters.iter().filter(|p| matches!(p.role, Role::Instant { .. })).count();
+    // Of two instants the second comes after the first.
+    if instants == 2 { single / 2 } else { single }
+}
+
 /// ln BF of each shape.
 pub fn judge(
     effect: &'static Effect,
@@ -88,6 +96,7 @@ fn project(
 /// Shapes to try: positive ones by factors, others along their axes, instants along the recording.
 fn menu(effect: &Effect, duration: f64) -> Vec<Vec<f64>> {
     let mut menu = vec![effect.neutral(duration)];
+    let timed = effect.parameters.iter().any(|p| matches!(p.role, Role::Instant { .. }));
     let either: Vec<usize> = (0..effect.parameters.len())
         .filter(|at| {
             matches!(effect.parameters[*at].role, Role::Shape { .. }) && effect.parameters[*at].range.0 < 0.0
@@ -107,7 +116,10 @@ fn menu(effect: &Effect, duration: f64) -> Vec<Vec<f64>> {
     for (at, parameter) in effect.parameters.iter().enumerate() {
         menu = match parameter.role {
             Role::Shape { usual } if parameter.range.0 >= 0.0 => {
-                vary(&menu, at, [0.2, 0.5, 1.0, 2.0, 5.0].map(|factor| usual * factor).as_slice())
+                // What is placed in time as well is scanned broadly and refined afterwards.
+                let factors: &[f64] = if timed { &[0.7, 2.0] } else { &[0.2, 0.5, 1.0, 2.0, 5.0] };
+                let values: Vec<f64> = factors.iter().map(|factor| usual * factor).collect();
+                vary(&menu, at, &values)
             }
             Role::Instant { .. } => {
                 let step = GRID.0.max(GRID.1 * duration);

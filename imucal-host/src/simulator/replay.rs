@@ -2,7 +2,8 @@
 //!
 //! Angle, rate and acceleration of each gimbal are those of a cubic through the readings within [`REACH`] of a row, by
 //! least squares: a reading's noise is averaged, and a movement whose angle is a cubic over that time stays as it is.
-//! Between rows the nearest row's swing goes on with constant acceleration. Not modelled: readings that lag the gimbal.
+//! Between rows the nearest row's swing goes on with constant acceleration. A rig whose readings change no more than
+//! their noise would make them stands still: its rates are zero. Not modelled: readings that lag the gimbal.
 
 use std::f64::consts::TAU;
 
@@ -14,11 +15,20 @@ use super::{
 };
 use crate::{
     effect::{Machine, Swing, Truth},
-    recording::manifest::{Axis, Rig, RigKind},
+    recording::{
+        manifest::{Axis, Rig, RigKind},
+        median,
+    },
 };
 
 /// Readings within this time of a row tell its swing, s.
 const REACH: f64 = 0.031;
+/// A gimbal moves if its reading changes over twice this time, s,
+const WINDOW: f64 = 0.1;
+/// by more than this rate would make it, rad/s,
+const CREEP: f64 = 3e-3;
+/// and by more than this many standard deviations of a reading's noise.
+const NOISES: f64 = 8.0;
 /// At least this many readings to each side.
 const FEWEST: usize = 2;
 
@@ -27,6 +37,7 @@ const FEWEST: usize = 2;
 pub struct Replay {
     time: Vec<f64>,
     swings: Vec<[Swing; 3]>,
+    moving: Vec<bool>,
     temperature: Vec<f64>,
     axes: [Axis; 3],
     place: Place,
@@ -45,13 +56,25 @@ impl Replay {
         let angles = unwrapped(encoders)?;
         let median = (time.last()? - time.first()?) / (time.len().max(2) - 1) as f64;
         let reach = ((REACH / median).floor() as usize).max(FEWEST);
-        let swings = (0..time.len()).map(|row| swing(time, &angles, row, reach)).collect();
-        Some(Self { time: time.to_vec(), swings, temperature, axes, place })
+        let moving = moving(time, &angles);
+        let still = |swing: Swing| Swing::still(swing.angle);
+        let swings = (0..time.len())
+            .map(|row| {
+                let swings = swing(time, &angles, row, reach);
+                if moving[row] { swings } else { swings.map(still) }
+            })
+            .collect();
+        Some(Self { time: time.to_vec(), swings, moving, temperature, axes, place })
     }
 
     /// Swings of the gimbals at each row, outermost first.
     pub fn swings(&self) -> &[[Swing; 3]] {
         &self.swings
+    }
+
+    /// Whether a gimbal moves, row by row.
+    pub fn moving(&self) -> &[bool] {
+        &self.moving
     }
 
     fn nearest(&self, time: f64) -> usize {
@@ -111,6 +134,31 @@ fn unwrapped(encoders: &[[f64; 3]]) -> Option<Vec<[f64; 3]>> {
     Some(encoders.iter().map(unwrap).collect())
 }
 
+/// Rows at which a gimbal moves.
+fn moving(time: &[f64], angles: &[[f64; 3]]) -> Vec<bool> {
+    let noise = [0, 1, 2].map(|axis| {
+        let bends = angles.windows(3).map(|w| (w[0][axis] - 2.0 * w[1][axis] + w[2][axis]).abs()).collect();
+        // The median of |x| is 0.674 of its standard deviation; a bend has that of a reading, times √6.
+        median(bends).unwrap_or(0.0) / (0.674 * 6.0f64.sqrt())
+    });
+    let (mut before, mut after) = (0, 0);
+    (0..time.len())
+        .map(|row| {
+            while time[before] < time[row] - WINDOW {
+                before += 1;
+            }
+            while after + 1 < time.len() && time[after] < time[row] + WINDOW {
+                after += 1;
+            }
+            let span = time[after] - time[before];
+            (0..3).any(|axis| {
+                let change = (angles[after][axis] - angles[before][axis]).abs();
+                change > CREEP * span + NOISES * noise[axis]
+            })
+        })
+        .collect()
+}
+
 /// The cubic through the readings about a row, by least squares.
 fn swing(time: &[f64], angles: &[[f64; 3]], row: usize, reach: usize) -> [Swing; 3] {
     let from = row.saturating_sub(reach).min(time.len().saturating_sub(2 * reach + 1));
@@ -162,6 +210,19 @@ mod tests {
             assert!((truth.gimbals[0].rate - amplitude * w * (w * t).cos()).abs() < 2e-3, "{t}");
             assert!((truth.gimbals[0].acceleration + amplitude * w * w * (w * t).sin()).abs() < 1.0, "{t}");
         }
+    }
+
+    #[test]
+    fn noisy_readings_of_a_rig_that_stands_still_are_no_movement() {
+        let time: Vec<f64> = (0..600).map(|k| 0.01 * f64::from(k)).collect();
+        let angle = |k: usize| if k < 300 { 0.0 } else { 0.2 * (time[k] - 3.0) };
+        let encoders: Vec<[f64; 3]> =
+            (0..600).map(|k| [angle(k) + 1e-4 * ((k * k) as f64).sin(), 0.0, 0.0]).collect();
+        let axes = [Axis::Z, Axis::Y, Axis::X];
+        let replay = Replay::new(&time, &encoders, vec![25.0; 600], axes, Place::ankara()).unwrap();
+        assert!(replay.moving()[..285].iter().all(|moves| !moves));
+        assert!(replay.moving()[300..].iter().all(|moves| *moves));
+        assert_eq!(replay.swings()[100][0].rate, 0.0);
     }
 
     #[test]
