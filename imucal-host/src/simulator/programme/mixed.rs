@@ -16,8 +16,8 @@ enum Part {
     Cruise { gimbal: usize, rate: f64 },
     /// Swings of one gimbal, of this peak rate, rad/s.
     Swings { gimbal: usize, count: f64, rate: f64 },
-    /// A slew of all gimbals that is followed by hardly any rest.
-    Leg([f64; 3]),
+    /// A slew of all gimbals, none above a rate, rad/s, that is followed by hardly any rest.
+    Leg { angles: [f64; 3], rate: f64 },
 }
 
 impl Part {
@@ -27,7 +27,7 @@ impl Part {
             Self::Pose(_) => 6.0,
             Self::Cruise { .. } => 10.5,
             Self::Swings { .. } => 11.0,
-            Self::Leg(_) => 6.0,
+            Self::Leg { .. } => 5.0,
         }
     }
 
@@ -48,8 +48,8 @@ impl Part {
                 plan.sine(gimbal, rate * duration / (TAU * count), count, duration);
                 plan.rest(random.between(1.0, 2.0));
             }
-            Self::Leg(angles) => {
-                plan.slew_within(angles, random.between(4.0, 6.0));
+            Self::Leg { angles, rate } => {
+                plan.slew_at(angles, rate);
                 plan.rest(random.between(0.4, 1.0));
             }
         }
@@ -98,7 +98,7 @@ pub(super) fn add(plan: &mut Plan, axes: [Axis; 3], extent: f64, random: &mut Ra
             }
             1 => cruise(gimbal, random),
             2 => swings(gimbal, random),
-            _ => Part::Leg(anywhere(2.6, random)),
+            _ => Part::Leg { angles: anywhere(3.1, random), rate: random.between(0.6, 2.2) },
         };
         left -= part.length();
         parts.insert(random.below(parts.len() + 1), part);
