@@ -11,6 +11,8 @@ pub mod effect;
 
 pub mod simulator;
 
+pub mod noise;
+
 pub mod observe;
 
 pub mod ellipsoid;

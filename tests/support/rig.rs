@@ -95,7 +95,8 @@ pub fn poses(
         let clean = parameters.predict(&GimbalPose::new(Vector3::zeros(), angles).rotations(&axes));
         GimbalPose::new(clean + draw.normals() * sigma, angles)
     });
-    Poses { poses: poses.collect(), axes }
+    let spans = (0..angles.len()).map(|k| 6.0 * k as f64).map(|from| from..from + 4.0).collect();
+    Poses { poses: poses.collect(), axes, spans, density: None }
 }
 
 /// Mean and standard deviation.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use imucal_core::{model::parameterisation::FULL, observation::Moments};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::{
@@ -12,6 +12,7 @@ use super::{
     outcome::BiasWander,
 };
 use crate::{
+    noise::{self, Noise, Span, white},
     observe::{
         motion::{self, Attitudes, MotionData, MotionInput},
         pose,
@@ -40,6 +41,8 @@ pub struct Observations {
     pub bias: Vector3<f64>,
     /// How the bias moved from one still stretch to another, where there are any.
     pub wander: Option<BiasWander>,
+    /// Noise of the rates, as the still stretches show it.
+    pub noise: Option<Noise>,
     /// Motions left out, in words.
     pub left_out: Vec<String>,
     /// How the motions were made, in words.
@@ -70,6 +73,7 @@ pub fn on_encoders(
         data: Vec::new(),
         bias,
         wander: Some(wander),
+        noise: noise(&input, &stretches, &stills),
         left_out: Vec::new(),
         notes: vec!["against the encoders' attitude, from one still stretch of the table to the next".into()],
     };
@@ -106,10 +110,27 @@ fn still(input: &MotionInput<'_>, rows: &Range<usize>, attitude: &Matrix3<f64>) 
     rows.clone().filter(|k| input.usable[*k]).for_each(|k| moments.push(&input.rates[k]));
     let count = f64::from(moments.count());
     (moments.count() > 10).then(|| Still {
-        time: 0.5 * (input.time[rows.start] + input.time[rows.end - 1]),
+        span: input.time[rows.start]..input.time[rows.end - 1],
         mean: moments.mean() - attitude.tr_mul(&input.earth_p),
         // Rounding to counts may leave no spread at all.
         variance: (moments.variance() / count).map(|v| v.max(1e-14)),
+    })
+}
+
+/// What the mean rates of the still stretches show of noise, beside one constant bias.
+fn noise(
+    input: &MotionInput<'_>,
+    stretches: &[(Range<usize>, Matrix3<f64>)],
+    stills: &[Still],
+) -> Option<Noise> {
+    let rows: Vec<Range<usize>> = stretches.iter().map(|(rows, _)| rows.clone()).collect();
+    let spans: Vec<Span> = stills.iter().map(|still| still.span.clone()).collect();
+    let means = stills.iter().flat_map(|still| still.mean.iter().copied());
+    Noise::of(&noise::Residuals {
+        spans: &spans,
+        density: white::density(input.time, input.rates, input.usable, &rows),
+        residuals: &DVector::from_iterator(3 * stills.len(), means),
+        jacobian: &DMatrix::from_fn(3 * stills.len(), 3, |row, k| f64::from(u8::from(row % 3 == k))),
     })
 }
 
@@ -127,6 +148,7 @@ pub fn on_reference(
         data: Vec::new(),
         bias: Vector3::zeros(),
         wander: None,
+        noise: None,
         left_out: Vec::new(),
         notes: vec![format!(
             "against the reference attitude, {OPTICAL} s a motion; {valid} of {} rows have one",

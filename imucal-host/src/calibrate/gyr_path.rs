@@ -15,19 +15,27 @@
 use nalgebra::Vector3;
 
 use super::outcome::BiasWander;
+use crate::noise::Span;
 
 /// Least gain of the log-likelihood for which a bias is taken to walk: chance explains it once in 200 times.
 pub const WALKS: f64 = 3.3;
 
 /// The mean rate of one still stretch.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Still {
-    /// Middle of it, s.
-    pub time: f64,
+    /// When, s.
+    pub span: Span,
     /// Mean rate less Earth's rotation, rad/s.
     pub mean: Vector3<f64>,
     /// Variance of the mean if the samples' noise is white, (rad/s)².
     pub variance: Vector3<f64>,
+}
+
+impl Still {
+    /// Middle of it, s.
+    fn time(&self) -> f64 {
+        0.5 * (self.span.start + self.span.end)
+    }
 }
 
 /// How far the bias is from its mean, linear between the still stretches.
@@ -50,14 +58,14 @@ impl Wander {
             spread[axis] = (of(&|s| (s.mean[axis] - mean[axis]).powi(2)) / (count - 1.0).max(1.0)).sqrt();
             expected[axis] = (of(&|s| s.variance[axis]) / count).sqrt();
             let points: Vec<Point> =
-                stills.iter().map(|s| Point { t: s.time, y: s.mean[axis], r: s.variance[axis] }).collect();
+                stills.iter().map(|s| Point { t: s.time(), y: s.mean[axis], r: s.variance[axis] }).collect();
             if let Some(smooth) = walk(&points) {
                 interpolated = true;
                 let level = smooth.iter().sum::<f64>() / count;
                 path.iter_mut().zip(smooth).for_each(|(node, value)| node[axis] = value - level);
             }
         }
-        let nodes = stills.iter().map(|s| s.time).zip(path).collect();
+        let nodes = stills.iter().map(Still::time).zip(path).collect();
         (Self { nodes }, mean, BiasWander { spread, expected, interpolated })
     }
 
@@ -131,7 +139,7 @@ mod tests {
                 let time = 7.0 * f64::from(k);
                 let noise = 1e-4 * (1.9 * f64::from(k * k)).sin() * 2f64.sqrt();
                 let mean = Vector3::new(bias(time) + noise, noise, -noise);
-                Still { time, mean, variance: Vector3::repeat(1e-8) }
+                Still { span: time - 2.0..time + 2.0, mean, variance: Vector3::repeat(1e-8) }
             })
             .collect()
     }

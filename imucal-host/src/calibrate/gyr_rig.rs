@@ -14,7 +14,7 @@ use imucal_core::{
     coverage::Coverage,
     model::parameterisation::{FULL, FULL_WITH_SENSITIVITY},
 };
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{
     Options, compare,
@@ -23,6 +23,7 @@ use super::{
     outcome::{Calibration, FitSummary, Refused, RigFindings, SensorOutcome},
 };
 use crate::{
+    noise::Span,
     observe::{motion, pose},
     recording::{Recording, SensorKind, Triple, Unit},
 };
@@ -158,8 +159,18 @@ fn refused(model: &'static str, refusal: Refusal, fit: Option<FitSummary>) -> Se
     SensorOutcome { kind: SensorKind::Gyr, model, verdict, fit, evidence: None }
 }
 
+/// Of a fit to motions whose errors are independent, and of the bias's drift: that from one motion to the next is a
+/// part of those errors, and a bias is not told better than the mean of its drift is.
+fn covariance(fit: &MotionFit, observations: &Observations) -> DMatrix<f64> {
+    let Some(noise) = &observations.noise else { return fit.covariance.clone() };
+    let drift = noise.without_white();
+    let spans: Vec<Span> = fit.kept.iter().map(|k| observations.data[*k].span.clone()).collect();
+    &fit.covariance + drift.propagated(&spans, &fit.bias_influence)
+}
+
 fn summarise(fit: &MotionFit, sensor: &Triple, observations: &Observations) -> FitSummary {
-    let std = |k: usize| fit.covariance[(k, k)].sqrt();
+    let covariance = covariance(fit, observations);
+    let std = |k: usize| covariance[(k, k)].sqrt();
     let used = || fit.kept.iter().map(|k| &observations.data[*k]);
     let axes = used().filter_map(|d| d.turned().try_normalize(1e-6)).flat_map(|a| [a, -a]);
     let axes: Vec<Vector3<f64>> = axes.collect();
@@ -181,16 +192,11 @@ fn summarise(fit: &MotionFit, sensor: &Triple, observations: &Observations) -> F
         let at = |of: &dyn Fn(usize) -> f64| Matrix3::from_fn(|i, j| of(12 + 3 * i + j));
         (at(&|k| fit.parameters[k]), at(&std))
     });
-    // A bias that wanders is not told better than its own mean is.
-    let wandering = observations.wander.filter(|w| w.interpolated).map_or_else(Vector3::zeros, |w| {
-        let count = (observations.data.len() + 1) as f64;
-        w.spread.zip_map(&w.expected, |s, e| (s * s - e * e).max(0.0) / count)
-    });
     FitSummary {
         triad: fit.triad,
         gain_std: Matrix3::from_fn(|i, j| std(3 * i + j)),
-        bias_std: Vector3::from_fn(|i, _| std(9 + i).hypot(wandering[i].sqrt())),
-        covariance: fit.covariance.view((0, 0), (12, 12)).into_owned(),
+        bias_std: Vector3::from_fn(|i, _| std(9 + i)),
+        covariance: covariance.view((0, 0), (12, 12)).into_owned(),
         covariance_of: fit.entries[..12].to_vec(),
         unit_in: sensor.unit,
         unit_out: Unit::RadianPerSecond,

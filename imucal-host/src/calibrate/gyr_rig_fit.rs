@@ -25,7 +25,7 @@ use super::{
     compare::Step,
     norm_fit::dynamic,
     outlier::outliers,
-    rows::{Residuals, Rows},
+    rows::{Residuals, Rows, influence},
 };
 use crate::observe::motion::MotionData;
 
@@ -125,6 +125,8 @@ pub struct MotionFit {
     pub entries: Vec<u8>,
     /// In the entries' order.
     pub covariance: DMatrix<f64>,
+    /// By how much a change of the bias during each motion moves each parameter: three rows a motion.
+    pub bias_influence: DMatrix<f64>,
     /// All parameters, in the entries' order.
     pub parameters: Vec<f64>,
     /// The solver's report.
@@ -164,8 +166,8 @@ impl MotionFit {
 
 /// Weight of each motion: the square root of the mean duration over its own.
 fn weights(data: &[&MotionData]) -> Vec<f64> {
-    let mean = data.iter().map(|d| d.duration).sum::<f64>() / data.len().max(1) as f64;
-    data.iter().map(|d| (mean / d.duration).sqrt()).collect()
+    let mean = data.iter().map(|d| d.duration()).sum::<f64>() / data.len().max(1) as f64;
+    data.iter().map(|d| (mean / d.duration()).sqrt()).collect()
 }
 
 /// Attitude error of each motion, rad, times its weight.
@@ -257,7 +259,7 @@ fn scout<const P: usize>(
     start: &SVector<f64, P>,
 ) -> Option<SVector<f64, P>> {
     let mut shortest = used.to_vec();
-    shortest.sort_by(|a, b| a.duration.total_cmp(&b.duration));
+    shortest.sort_by(|a, b| a.duration().total_cmp(&b.duration()));
     let motions: Vec<_> = shortest.iter().take(SWARM_MOTIONS).map(|d| d.motion()).collect();
     let cost = AttitudeModel { motions: &motions, form: model.form };
     let reach = SVector::from_fn(|k, _| match model.form.entries()[k] {
@@ -286,6 +288,8 @@ fn summarise<const P: usize>(
         triad: model.form.triad(theta),
         entries: model.form.entries().to_vec(),
         covariance: dynamic(&covariance),
+        bias_influence: bias_influence(model, theta)
+            .unwrap_or_else(|| DMatrix::zeros(3 * model.motions.len(), P)),
         parameters: theta.iter().copied().collect(),
         report: solver.report(),
         search,
@@ -296,6 +300,19 @@ fn summarise<const P: usize>(
         kept,
         gross,
     }
+}
+
+/// `None` where the motions do not determine the parameters.
+fn bias_influence<const P: usize>(model: &Weighted<'_, P>, theta: &SVector<f64, P>) -> Option<DMatrix<f64>> {
+    let rows = Rows::of(model, theta);
+    let count = 3 * model.motions.len();
+    let mut influence = influence(&rows.derivatives(count, &Vec::from_iter(0..P)))?;
+    let by_bias = rows.derivatives(count, &[9, 10, 11]);
+    for first in (0..count).step_by(3) {
+        let moved = by_bias.rows(first, 3).tr_mul(&influence.rows(first, 3));
+        influence.rows_mut(first, 3).copy_from(&moved);
+    }
+    Some(influence)
 }
 
 /// Rms error of motions left out in turn, rad: one Gauss–Newton step from the optimum of all, and the motion left

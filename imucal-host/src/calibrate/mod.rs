@@ -16,7 +16,6 @@ use crate::{
 pub mod acc;
 pub mod alignment;
 pub mod compare;
-pub mod drift;
 pub mod gyr;
 pub mod gyr_motions;
 pub mod gyr_path;

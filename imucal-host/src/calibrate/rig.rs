@@ -5,7 +5,7 @@ use imucal_core::{
     coverage::Coverage,
     model::unified::UnifiedParameters,
 };
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::{
     Options, compare,
@@ -67,11 +67,14 @@ fn tells_tilt(fit: &RigFit) -> bool {
     })
 }
 
-/// The base's tilt as the accelerometer has it; `None` where it is none or hardly told: an error of its own would pass
-/// for one of the field.
+/// The base's tilt as the accelerometer has it, and its standard errors, rad.
+fn tilt(calibration: &Calibration) -> Option<([f64; 2], [f64; 2])> {
+    calibration.sensor(SensorKind::Acc)?.accepted()?.rig.as_ref()?.tilt
+}
+
+/// The base's tilt; `None` where it is none or hardly told: an error of its own would pass for one of the field.
 fn known_tilt(calibration: &Calibration) -> Option<[f64; 2]> {
-    let fit = calibration.sensor(SensorKind::Acc)?.accepted()?;
-    let (tilt, std) = fit.rig.as_ref()?.tilt?;
+    let (tilt, std) = tilt(calibration)?;
     tilt.iter().zip(std).any(|(tilt, std)| tilt.abs() > SIGNIFICANT_TILT * std).then_some(tilt)
 }
 
@@ -99,7 +102,7 @@ pub fn magnetometer(
             .comparisons
             .extend(compare::climb(SensorKind::Mag, steps.map(|rung| rung.step()).collect()));
     }
-    let Some(rung) = ladder::rung_from(name, &poses, &base) else {
+    let Some(mut rung) = ladder::rung_from(name, &poses, &base) else {
         return Some(too_few(SensorKind::Mag, name, &poses));
     };
     let pointed = match name {
@@ -117,7 +120,28 @@ pub fn magnetometer(
              [site] field is off; use mag={better}, or point the base"
         ));
     }
+    if let Some((_, std)) = tilt(calibration) {
+        allow_for_tilt(&mut rung, &poses, &base, std);
+    }
     Some(outcome(SensorKind::Mag, &rung, &poses, sensor, field.norm()))
+}
+
+/// Adds to a rung's covariance what errors of the base's tilt, of these standard deviations in rad, do to it.
+fn allow_for_tilt(rung: &mut Rung, poses: &Poses, base: &UnifiedParameters<f64>, std: [f64; 2]) {
+    let values = |rung: &Rung| {
+        let all = rung.fit.parameters.to_vector();
+        let held = |entry: u8| rung.fit.held.iter().any(|(held, _)| *held == entry);
+        let value = |entry: &u8| if held(*entry) { 0.0 } else { all[usize::from(*entry)] };
+        DVector::from_iterator(rung.fit.entries.len(), rung.fit.entries.iter().map(value))
+    };
+    for (axis, std) in std.into_iter().enumerate() {
+        let mut leaning = *base;
+        leaning.tilt[axis] += std;
+        if let Some(other) = ladder::rung_from(rung.name, poses, &leaning) {
+            let moved = values(&other) - values(rung);
+            rung.fit.covariance += &moved * moved.transpose();
+        }
+    }
 }
 
 /// The poses of a recording that has encoders; what is wrong with them is said once.

@@ -7,11 +7,11 @@ use imucal_core::{
 };
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
 
-use super::{
-    drift,
-    rows::{Residuals, Rows},
+use super::rows::{Residuals, Rows, influence};
+use crate::{
+    noise::{self, Noise},
+    observe::pose::Poses,
 };
-use crate::observe::pose::Poses;
 
 /// A column that its predecessors leave less than this share of is told by them: far below what noise leaves of an
 /// observable one, far above rounding.
@@ -58,14 +58,14 @@ pub fn fit<const P: usize>(poses: &Poses, base: &UnifiedParameters<f64>, terms: 
     }
     let found = terms.parameters(base, solver.theta());
     let Some(field) = of_known_length(poses, base, &found, &terms, &gauge) else {
-        return summarise(&model, &solver, &gauge);
+        return summarise(poses, &model, &solver, &gauge);
     };
     // Held anew where the field has its length: K and sources are then those of the field that is known.
     let model = UnifiedModel { base: UnifiedParameters { vector_n: field, ..*base }, ..model };
     let start = terms.theta(&UnifiedParameters { vector_n: field, ..found });
     solver = LevenbergMarquardt::new(start, Settings::default());
     solver.run(&model);
-    summarise(&model, &solver, &gauge)
+    summarise(poses, &model, &solver, &gauge)
 }
 
 /// The field that is known, where what was found of it allows; `None` where nothing of it is held.
@@ -111,6 +111,7 @@ fn headed(known: &Vector3<f64>, normal: &Vector3<f64>) -> Option<Vector3<f64>> {
 }
 
 fn summarise<const P: usize>(
+    poses: &Poses,
     model: &UnifiedModel<'_, f64, P>,
     solver: &LevenbergMarquardt<f64, P>,
     gauge: &Gauge<f64, P>,
@@ -118,12 +119,14 @@ fn summarise<const P: usize>(
     let entries = model.terms.entries();
     let held: Vec<usize> = (0..P).filter(|k| gauge.is_held(*k)).collect();
     let rows = Rows::of(model, solver.theta());
-    let white = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
-    let mut covariance = drift::covariance(&rows, 3 * model.poses.len(), &held).unwrap_or(white);
-    for k in &held {
-        covariance.column_mut(*k).fill(0.0);
-        covariance.row_mut(*k).fill(0.0);
-    }
+    let covariance = covariance(poses, &rows, &held).unwrap_or_else(|| {
+        let mut white = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
+        for k in &held {
+            white.column_mut(*k).fill(0.0);
+            white.row_mut(*k).fill(0.0);
+        }
+        DMatrix::from_column_slice(P, P, white.as_slice())
+    });
     let parameters = model.terms.parameters(&model.base, solver.theta());
     RigFit {
         parameters,
@@ -133,12 +136,36 @@ fn summarise<const P: usize>(
             .map(|k| (entries[*k], gauge.like[*k].map(|like| entries[usize::from(like)])))
             .collect(),
         report: solver.report(),
-        covariance: DMatrix::from_column_slice(P, P, covariance.as_slice()),
+        covariance,
         rms: solver.variance().map_or(f64::NAN, f64::sqrt),
         held_out_rms: held_out(model, solver.theta()),
         squared_sum: 2.0 * solver.report().cost,
         residuals: 3 * model.poses.len(),
     }
+}
+
+/// Covariance A V Aᵀ of least squares, A = (JᵀJ)⁻¹Jᵀ, for noise that drifts; zero where held. `None` where the rows do
+/// not determine the parameters, leave nothing, or are too many.
+fn covariance<const P: usize>(poses: &Poses, rows: &Rows<P>, held: &[usize]) -> Option<DMatrix<f64>> {
+    let count = 3 * poses.poses.len();
+    let free: Vec<usize> = (0..P).filter(|k| !held.contains(k)).collect();
+    let residuals = DVector::from_fn(count, |row, _| rows.residuals[row]);
+    let jacobian = rows.derivatives(count, &free);
+    let noise = Noise::of(&noise::Residuals {
+        spans: &poses.spans,
+        density: poses.density,
+        residuals: &residuals,
+        jacobian: &jacobian,
+    })?;
+    let influence = influence(&jacobian)?;
+    let told = noise.propagated(&poses.spans, &influence);
+    let mut covariance = DMatrix::zeros(P, P);
+    for (i, row) in free.iter().enumerate() {
+        for (j, column) in free.iter().enumerate() {
+            covariance[(*row, *column)] = told[(i, j)];
+        }
+    }
+    covariance.iter().all(|x| x.is_finite()).then_some(covariance)
 }
 
 /// Each pose left out in turn, one Gauss–Newton step from the optimum of all.

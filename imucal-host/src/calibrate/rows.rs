@@ -6,7 +6,7 @@ use imucal_core::{
     model::{Model, RowSink},
     solver::triangular::Triangular,
 };
-use nalgebra::SVector;
+use nalgebra::{DMatrix, SVector};
 
 /// Residuals and derivatives in the model's order.
 #[derive(Clone, Debug)]
@@ -36,6 +36,26 @@ impl<const P: usize> Rows<P> {
         }
         factor.damped_step(0.0, &SVector::repeat(0.0))
     }
+
+    /// The derivatives of the first `count` rows by the parameters in `free`.
+    pub fn derivatives(&self, count: usize, free: &[usize]) -> DMatrix<f64> {
+        DMatrix::from_fn(count, free.len(), |row, k| self.jacobian[row][free[k]])
+    }
+}
+
+/// J (JᵀJ)⁻¹: by how much each residual moves each parameter of a fit of least squares. `None` where J is not of full
+/// rank.
+pub fn influence(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    // Columns at unit length: parameters of different units would spoil the inverse.
+    let length: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
+    let scaled = |matrix: &mut DMatrix<f64>| {
+        matrix.column_iter_mut().zip(&length).for_each(|(mut column, length)| column /= *length);
+    };
+    let mut unit = jacobian.clone();
+    scaled(&mut unit);
+    let mut influence = &unit * unit.tr_mul(&unit).try_inverse()?;
+    scaled(&mut influence);
+    Some(influence)
 }
 
 impl<const P: usize> RowSink<f64, P> for Rows<P> {

@@ -45,7 +45,7 @@ enum Command {
     Demo(demo::Arguments),
     /// Simulated comparisons of estimators and models, each printed as a table.
     Study(study::Arguments),
-    /// Name what the simulator lacks
+    /// Say where recording and simulator differ, which effect causes it, and how far it closes the gap.
     Diagnose(diagnose::Arguments),
     /// Sealed trials of the diagnosis, and how often it was right.
     Blind(blind::Arguments),

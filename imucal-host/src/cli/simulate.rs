@@ -6,14 +6,15 @@ use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 
-use super::Ending;
+use super::{Ending, output};
 use crate::{
     blind::{
         case::{Omission, omission},
         seal::{Nonce, digest},
     },
-    effect::{self, CATALOGUE, Effect, Parameter, Role},
+    effect::{self, CATALOGUE, Effect},
     recording::{AtomicFile, Manifest, manifest::Axis, spelling::nearest},
+    report,
     simulator::{
         Conditions, Programme, Simulation, UnitKind,
         random::{Purpose, Random},
@@ -84,7 +85,11 @@ fn dose(text: &str) -> Result<(&'static Effect, f64), String> {
 }
 
 /// What was found, and the nearest name or all there are.
-fn unknown<'a>(what: &str, found: &str, names: impl IntoIterator<Item = &'a str> + Clone) -> String {
+pub(super) fn unknown<'a>(
+    what: &str,
+    found: &str,
+    names: impl IntoIterator<Item = &'a str> + Clone,
+) -> String {
     match nearest(found, names.clone(), NEAR) {
         Some(name) => format!("there is no {what} `{found}`; did you mean `{name}`?"),
         None => {
@@ -110,7 +115,7 @@ fn axes(text: &str) -> Result<[Axis; 3], String> {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let Some(out) = arguments.out.as_deref().filter(|_| !arguments.list) else {
-        CATALOGUE.iter().for_each(|effect| print!("{}", listed(effect)));
+        output::text(&report::catalogue::catalogue())?;
         return Ok(Ending::Done);
     };
     let mut simulation = Simulation {
@@ -140,26 +145,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         println!("  {}: {}", dose.effect.id, values.join(", "));
     }
     Ok(Ending::Done)
-}
-
-/// An effect for people; parameters of the same size and unit together.
-fn listed(effect: &Effect) -> String {
-    let mut text = format!("{}\n  {}\n", effect.id, effect.words.cause);
-    let alike = |a: &Parameter, b: &Parameter| {
-        (a.prior_scale, &a.unit, a.neutral(1.0)) == (b.prior_scale, &b.unit, b.neutral(1.0))
-    };
-    for group in effect.parameters.chunk_by(alike) {
-        let names: Vec<&str> = group.iter().map(|parameter| parameter.name.as_str()).collect();
-        let first = &group[0];
-        let usual = match first.role {
-            Role::Amplitude => format!("{} {}", first.prior_scale, first.unit),
-            Role::Shape { usual } => format!("{usual} {}", first.unit),
-            Role::Instant { share } => format!("{:.0} % of the run", 100.0 * share),
-            Role::Choice => format!("0 to {}", first.range.1),
-        };
-        text += &format!("  {}: {usual}\n", names.join(", "));
-    }
-    text
 }
 
 fn write(simulation: &Simulation, out: &Path) -> anyhow::Result<()> {
@@ -253,13 +238,6 @@ mod tests {
         for text in ["gyr.warmup=", "gyr.warmup=big", "gyr.warmup=inf"] {
             assert!(dose(text).unwrap_err().contains("no number"), "{text}");
         }
-    }
-
-    #[test]
-    fn the_list_says_what_an_effect_is_and_how_large() {
-        let text = listed(effect::find("acc.warmup").unwrap());
-        assert!(text.starts_with("acc.warmup\n  The unit warms itself"), "{text}");
-        assert!(text.contains("x, y, z: 0.02 m/s^2\n  tau: 150 s\n"), "{text}");
     }
 
     #[test]

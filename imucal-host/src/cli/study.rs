@@ -3,7 +3,7 @@
 use clap::{Args, Subcommand};
 
 use super::{Ending, output};
-use crate::study::{coverage, units};
+use crate::study::{coverage, recovery, units};
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
@@ -22,6 +22,15 @@ enum Study {
         #[arg(long, value_name = "N", default_value_t = 1)]
         seed: u64,
     },
+    /// Errors of calibrations of simulated recordings over the standard errors that they report
+    Recovery {
+        /// Recordings, of two units in turn
+        #[arg(long, value_name = "N", default_value_t = 200)]
+        runs: u64,
+        /// Seed of the first; each further one has the next
+        #[arg(long, value_name = "N", default_value_t = 1000)]
+        seed: u64,
+    },
     /// Two simulated units on the simulated rig, before and after calibration by each model
     Units {
         /// Everything random follows from it
@@ -33,6 +42,7 @@ enum Study {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     match arguments.study {
         Study::Coverage { runs, seed } => output::text(&coverage::report(runs, seed))?,
+        Study::Recovery { runs, seed } => output::text(&recovery::report(seed, runs)?)?,
         Study::Units { seed } => output::text(&units::report(seed)?)?,
     }
     Ok(Ending::Done)

@@ -14,6 +14,9 @@ pub struct Candidates {
     pub effects: Vec<&'static Effect>,
 }
 
+/// Effects against a calibration made elsewhere: one made of the recording itself holds them.
+pub const ELSEWHERE: [&str; 2] = ["mag.hard_iron", "mag.soft_iron"];
+
 /// Terms of each triad in the baseline; the rig's are beside them.
 const TRIAD_TERMS: [&str; 3] = ["bias", "scale", "misalignment"];
 
@@ -36,6 +39,7 @@ impl Candidates {
             .into_iter()
             .filter(|effect| thermometer || !effect.id.contains(".temp_"))
             .filter(|effect| term(effect, kinds).is_some() || !named(effect))
+            .filter(|effect| calibrated || !ELSEWHERE.contains(&effect.id.as_str()))
             .collect();
         Self { baseline, effects }
     }

@@ -102,10 +102,11 @@ pub struct Cause {
     pub parameters: Vec<Amount>,
     /// It is large enough to matter.
     pub material: bool,
-    /// Share of the explainable gap that it closes, on held-out blocks.
-    pub gap_closed: f64,
+    /// Share of the explainable gap that it closes, on held-out blocks; `None` for a fault of the recording itself, which
+    /// is undone or left out before any gap is measured.
+    pub gap_closed: Option<f64>,
     /// Its 95 % interval.
-    pub gap_closed_ci95: [f64; 2],
+    pub gap_closed_ci95: Option<[f64; 2]>,
 }
 
 /// A fitted parameter.

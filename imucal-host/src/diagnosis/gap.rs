@@ -14,7 +14,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{design::Normal, finding::Gap, noise::Noise, search::Linear};
+use super::{design::Normal, evidence::Projected, finding::Gap, noise::Noise, search::Linear};
 use crate::effect::Effect;
 
 /// Folds.
@@ -99,6 +99,17 @@ pub fn closed(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise, remai
         each.push(share(&gains));
     }
     Some(Closed { total, each, explainable })
+}
+
+/// Whitened squared size of what a set explains beyond the baseline, less what noise alone would give.
+pub fn size(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise) -> Option<f64> {
+    let fitted = linear.fitted(set);
+    let normal = linear.design.normal(&linear.whitenings(noise), &fitted);
+    let every: Vec<usize> = (0..fitted.len()).collect();
+    let (baseline, own) = every.split_at(linear.baseline.len());
+    let projected = Projected::new(&normal, baseline, own)?;
+    let places: Vec<usize> = (0..own.len()).collect();
+    Some((projected.explained(&places) - own.len() as f64).max(0.0))
 }
 
 /// A fold that was not fitted.

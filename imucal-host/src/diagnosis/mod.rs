@@ -2,12 +2,15 @@
 
 pub mod block;
 pub mod candidates;
+pub mod convention;
 pub mod credible;
 pub mod design;
 pub mod driver;
 pub mod estimate;
 pub mod evidence;
+pub mod experiment;
 pub mod finding;
+pub mod footing;
 pub mod gap;
 pub mod noise;
 pub mod refit;
@@ -18,20 +21,16 @@ mod skyline;
 pub mod testable;
 pub mod whitening;
 
-use imucal_core::triad::Triad;
-
 pub use self::finding::{Diagnosis, Verdict};
 use self::{
     candidates::Candidates,
     driver::Following,
     finding::{Cause, Place as Driven},
+    footing::Footing,
     scene::Scene,
     search::Explained,
 };
-use crate::{
-    recording::{Recording, SensorKind, integrity, manifest::Axis},
-    simulator::{Motion, Place, Replay},
-};
+use crate::{effect::Effect, recording::Recording};
 
 /// A driver is followed when noise alone would do as much less often than this, all tests counted.
 const FOLLOWED: f64 = 0.01;
@@ -41,8 +40,6 @@ const REMAINDER: f64 = 0.05;
 const EXPLAINS: f64 = 0.2;
 /// A cause as probable as this has no rival.
 const CERTAIN: f64 = 0.95;
-/// Recordings are at least this long, s.
-const SHORTEST: f64 = 30.0;
 
 /// What a diagnosis may be told beforehand.
 #[derive(Clone, Debug, Default)]
@@ -53,54 +50,43 @@ pub struct Options {
 
 /// Diagnoses a recording; `progress` hears of each stage.
 pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str)) -> Diagnosis {
-    let replay = match replay(recording) {
-        Ok(replay) => replay,
+    let footing = match Footing::new(recording) {
+        Ok(footing) => footing,
         Err(why) => return untestable(recording, why),
     };
-    let integrity = integrity::inspect(recording);
-    let triads = [Triad::identity(); SensorKind::ALL.len()];
-    let scene = Scene::new(recording, &integrity, &replay, triads);
+    let scene = Scene::new(recording, footing.usable.clone(), &footing.replay, footing.triads);
     let thermometer = recording.temperature.is_some();
     let candidates = Candidates::new(&scene.kinds, thermometer, false, &options.without);
     let explained = search::search(&scene, &candidates, progress);
     let answer = explained.as_ref().and_then(|explained| answer(recording, explained, progress));
-    answer.unwrap_or_else(|| {
-        untestable(recording, "the baseline cannot be fitted to this recording".to_owned())
-    })
+    match answer {
+        Some(answer) => with_faults(answer, &footing),
+        None => untestable(recording, "the baseline cannot be fitted to this recording".to_owned()),
+    }
 }
 
-/// The recorded movement, or why there is none.
-fn replay(recording: &Recording) -> Result<Replay, String> {
-    let gimbal = recording.gimbal.as_deref().ok_or(
-        "there are no encoder columns (gimbal_outer, gimbal_middle, gimbal_inner): without a rig the simulator cannot \
-         be given the movement",
-    )?;
-    let axes = recording.manifest.rig.as_ref().and_then(|rig| rig.axes.clone());
-    let axes: [Axis; 3] = axes
-        .and_then(|axes| axes.try_into().ok())
-        .ok_or("the manifest's [rig] names no three axes, outermost first, such as [\"z\", \"y\", \"x\"]")?;
-    let site = &recording.manifest.site;
-    if recording.mag.is_some() && site.field_ned_ut.is_none() {
-        return Err(
-            "the manifest's [site] lacks field_ned_ut, against which the magnetometer is compared".to_owned()
+/// Adds what was wrong with the recording itself: that is certain, and comes first.
+fn with_faults(mut diagnosis: Diagnosis, footing: &Footing) -> Diagnosis {
+    for finding in footing.findings.iter().rev() {
+        diagnosis.causes.insert(
+            0,
+            Cause {
+                effect: finding.effect.id.clone(),
+                probability: 1.0 - finding.p_value,
+                equivalents: Vec::new(),
+                parameters: finding.parameters.clone(),
+                material: true,
+                gap_closed: None,
+                gap_closed_ci95: None,
+            },
         );
+        diagnosis.credible_set.insert(0, finding.effect.id.clone());
     }
-    let place = Place {
-        latitude_deg: site.latitude_deg.unwrap_or(0.0),
-        height: site.height_m.unwrap_or(0.0),
-        gravity: site.gravity().unwrap_or(crate::recording::unit::STANDARD_GRAVITY),
-        field_n: site.field_ned_ut.unwrap_or_default().into(),
-    };
-    let temperature = recording.temperature.clone().unwrap_or_else(|| vec![25.0; recording.rows()]);
-    let replay = Replay::new(&recording.time, gimbal, temperature, axes, place)
-        .ok_or("no row has a reading of all three encoders")?;
-    if replay.duration() < SHORTEST {
-        return Err(format!(
-            "{:.0} s are too short to tell drift from anything else; {SHORTEST:.0} s at least",
-            replay.duration()
-        ));
+    if !footing.findings.is_empty() && diagnosis.verdict == Verdict::None {
+        diagnosis.verdict = Verdict::Explained;
     }
-    Ok(replay)
+    diagnosis.remarks.extend(footing.remarks.iter().cloned());
+    diagnosis
 }
 
 fn untestable(recording: &Recording, why: String) -> Diagnosis {
@@ -145,8 +131,8 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
             equivalents: standing.equivalents.iter().map(|other| other.id.clone()).collect(),
             material: estimate::is_material(effect, &amounts),
             parameters: amounts,
-            gap_closed: share.value,
-            gap_closed_ci95: share.interval,
+            gap_closed: Some(share.value),
+            gap_closed_ci95: Some(share.interval),
         });
     }
     causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
@@ -156,13 +142,23 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
             credible_set.push(effect.id.clone());
         }
     }
+    let pairs: Vec<(&'static Effect, &'static Effect)> = best
+        .set
+        .iter()
+        .zip(&standings)
+        .flat_map(|(cause, standing)| standing.equivalents.iter().map(|other| (*cause, *other)))
+        .collect();
+    let next_experiment = match footing::axes(recording) {
+        Ok(axes) => experiment::next(explained, axes, &pairs)?,
+        Err(_) => Vec::new(),
+    };
     let (absent, not_testable) = testable::testable(linear, &best.set, &best.noise)?;
     let found = !causes.is_empty();
     Some(Diagnosis {
         verdict: verdict(&causes, left, &closed),
         remarks: Vec::new(),
         gap: gap::table(linear, &best.set, &best.noise)?,
-        places: places(if found { &before } else { &after }, closed.explainable),
+        places: places(if found { &before } else { &after }, gap::size(linear, &best.set, &best.noise)?),
         causes,
         credible_set,
         gap_closed_total: found.then_some(closed.total.value),
@@ -170,6 +166,7 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
         held_out: true,
         absent,
         not_testable,
+        next_experiment,
         ..untestable(recording, String::new())
     })
 }
@@ -190,7 +187,9 @@ fn verdict(causes: &[Cause], left: Option<&Following>, closed: &gap::Closed) -> 
     }
 }
 
-fn places(following: &[Following], explainable: f64) -> Vec<Driven> {
+/// Drivers that are followed; `explained` is the size of what the causes explain.
+fn places(following: &[Following], explained: f64) -> Vec<Driven> {
+    let explainable = following.iter().map(|f| f.size).fold(explained.max(f64::MIN_POSITIVE), f64::max);
     let mut places: Vec<Driven> = following
         .iter()
         .filter(|f| is_followed(f, following.len()))

@@ -84,7 +84,10 @@ impl<'s> Weighing<'s> {
         let interval = self.scene.recording.median_interval().unwrap_or(PIECE);
         let length = ((PIECE / interval).round() as usize).max(1);
         let mut squares: [Vec<f64>; 3] = Default::default();
-        for block in self.scene.blocks.iter().filter(|block| block.rest.is_some()) {
+        let usable = &self.scene.usable[kind as usize];
+        let whole =
+            |block: &&Block| block.rest.is_some() && usable[block.rows.clone()].iter().all(|row| *row);
+        for block in self.scene.blocks.iter().filter(whole) {
             let pieces: Vec<Vector3<f64>> = triple.values[block.rows.clone()]
                 .chunks_exact(length)
                 .map(|rows| rows.iter().sum::<Vector3<f64>>() / length as f64)

@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::block::{Block, cut};
 use crate::{
     effect::{Act, Effect, Input, Role, Swing, Truth},
-    recording::{Recording, SensorKind, integrity::Integrity},
+    recording::{Recording, SensorKind},
     simulator::{
         Dose, Motion, Replay,
         chain::{Chain, inputs},
@@ -75,8 +75,10 @@ pub struct Scene<'a> {
     /// Usable rows of each block, by sensor.
     pub counts: [Vec<usize>; 3],
     motion: &'a Replay,
-    usable: [Vec<bool>; 3],
-    triads: [Triad<f64>; 3],
+    /// Rows of each sensor that are used, by [`SensorKind::ALL`].
+    pub usable: [Vec<bool>; 3],
+    /// The triads that the simulator starts from, by [`SensorKind::ALL`].
+    pub triads: [Triad<f64>; 3],
     /// Nodes for signatures.
     pub fine: Nodes,
     /// One node a block: to look where in time an effect without memory lies.
@@ -84,17 +86,15 @@ pub struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    /// Beside `recording`, a movement and the triads that the simulator starts from, by [`SensorKind::ALL`].
+    /// Beside `recording`, the rows of each sensor that are to be used, a movement, and the triads that the simulator starts from, by [`SensorKind::ALL`].
     pub fn new(
         recording: &'a Recording,
-        integrity: &Integrity,
+        usable: [Vec<bool>; 3],
         motion: &'a Replay,
         triads: [Triad<f64>; 3],
     ) -> Self {
         let interval = recording.median_interval().unwrap_or(0.01);
         let blocks = cut(&recording.time, motion.moving(), interval);
-        let usable = SensorKind::ALL
-            .map(|kind| integrity.sensor(kind).map(|sensor| sensor.usable.clone()).unwrap_or_default());
         let counts = usable.each_ref().map(|usable| {
             let count = |block: &Block| usable.get(block.rows.clone()).unwrap_or_default();
             blocks.iter().map(|block| count(block).iter().filter(|usable| **usable).count()).collect()

@@ -15,7 +15,7 @@ use crate::recording::{SensorKind, Unit};
 
 mod angular_acceleration;
 mod axis_nonorthogonality;
-mod axis_swap;
+pub mod axis_swap;
 mod bandwidth;
 mod bias;
 mod bias_drift;

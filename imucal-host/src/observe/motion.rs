@@ -13,6 +13,7 @@ use imucal_core::{
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
 use super::turn::TurnGap;
+use crate::noise::Span;
 
 /// A block lasts about this long, s: five samples at 100 Hz.
 const BLOCK: f64 = 0.05;
@@ -85,8 +86,8 @@ pub struct MotionInput<'a> {
 pub struct MotionData {
     /// Rows whose rates were integrated.
     pub rows: Range<usize>,
-    /// How long it lasts, s.
-    pub duration: f64,
+    /// When, s.
+    pub span: Span,
     blocks: Vec<Block<f64>>,
     durations: Vec<f64>,
     earth: Vec<Vector3<f64>>,
@@ -97,6 +98,11 @@ pub struct MotionData {
 }
 
 impl MotionData {
+    /// How long it lasts, s.
+    pub fn duration(&self) -> f64 {
+        self.span.end - self.span.start
+    }
+
     /// The motion as the model takes it.
     pub fn motion(&self) -> Motion<'_, f64> {
         Motion {
@@ -138,7 +144,7 @@ impl MotionInput<'_> {
         let [start, end] = ends.map(quaternion);
         let size = (BLOCK / self.interval).round().clamp(1.0, 20.0) as u16;
         let mut data = MotionData {
-            duration: self.time[rows.end - 1] - self.time[rows.start],
+            span: self.time[rows.start]..self.time[rows.end - 1],
             rows: rows.clone(),
             blocks: Vec::new(),
             durations: Vec::new(),

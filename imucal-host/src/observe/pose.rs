@@ -8,18 +8,24 @@ use imucal_core::{
 };
 use nalgebra::Vector3;
 
-use crate::recording::{
-    Recording, Triple,
-    manifest::{Axis as FileAxis, Rig},
+use crate::{
+    noise::{Span, white},
+    recording::{
+        Recording, Triple,
+        manifest::{Axis as FileAxis, Rig},
+    },
 };
 
 /// Encoders that move more than this during a rest belong to no pose, rad (0.1°).
 const STILL: f64 = 1.7e-3;
 
 /// A pose lasts at least this long, s.
-const SHORTEST: f64 = 1.0;
+const SHORTEST: f64 = 0.75;
 /// The table settles for this long after it stops, s.
 const SETTLING: f64 = 0.5;
+/// It has been on its way for up to this long before it shows, s: to a gyroscope, 0.1° in the mean over 4 s is a rate of
+/// 0.025 °/s, and more than its noise.
+const STARTING: f64 = 0.25;
 
 /// Encoders that do not wrap may count a turn; no gimbal shows more, rad.
 const LARGEST: f64 = 6.6;
@@ -55,6 +61,10 @@ pub struct Poses {
     pub poses: Vec<GimbalPose<f64>>,
     /// The rig's axes.
     pub axes: RigAxes,
+    /// When each was held.
+    pub spans: Vec<Span>,
+    /// White noise within them, nominal unit²·s, where they are long enough to tell.
+    pub density: Option<Vector3<f64>>,
 }
 
 /// The rig's axes, of three gimbals.
@@ -89,7 +99,7 @@ pub fn axes_and_encoders(recording: &Recording) -> Result<(RigAxes, &[[f64; 3]])
     Ok((axes, gimbal))
 }
 
-/// Stretches in which all encoders stand still, as half-open row ranges; the table's settling is left out.
+/// Stretches in which all encoders stand still, as half-open row ranges; how the table settles and starts is left out.
 pub fn still_stretches(time: &[f64], gimbal: &[[f64; 3]]) -> Vec<Range<usize>> {
     let mut stretches = Vec::new();
     let mut from = 0;
@@ -97,8 +107,9 @@ pub fn still_stretches(time: &[f64], gimbal: &[[f64; 3]]) -> Vec<Range<usize>> {
         let still = gimbal.get(k).is_some_and(|angles| turned(angles, &gimbal[from]).amax() <= STILL);
         if !still {
             let settled = from + time[from..k].partition_point(|t| *t < time[from] + SETTLING);
-            if settled < k && time[k - 1] - time[settled] >= SHORTEST {
-                stretches.push(settled..k);
+            let end = from + time[from..k].partition_point(|t| *t <= time[k - 1] - STARTING);
+            if settled < end && time[end - 1] - time[settled] >= SHORTEST {
+                stretches.push(settled..end);
             }
             from = k;
         }
@@ -119,16 +130,20 @@ fn turned(to: &[f64; 3], from: &[f64; 3]) -> Vector3<f64> {
 /// [`NoPoses`] where there are no encoders or the manifest does not name the rig's axes.
 pub fn poses(recording: &Recording, sensor: &Triple, usable: &[bool]) -> Result<Poses, NoPoses> {
     let (axes, gimbal) = axes_and_encoders(recording)?;
-    let mut poses = Vec::new();
-    for rows in still_stretches(&recording.time, gimbal) {
+    let stretches = still_stretches(&recording.time, gimbal);
+    let density = white::density(&recording.time, &sensor.values, usable, &stretches);
+    let (mut poses, mut spans) = (Vec::new(), Vec::new());
+    for rows in stretches {
         let Some(angles) = mean_angles(&gimbal[rows.clone()]) else { continue };
         let mut moments = Moments::default();
+        let span = recording.time[rows.start]..recording.time[rows.end - 1];
         rows.filter(|k| usable[*k]).for_each(|k| moments.push(&sensor.values[k]));
         if moments.count() > 0 {
             poses.push(GimbalPose::new(moments.mean(), &angles));
+            spans.push(span);
         }
     }
-    Ok(Poses { poses, axes })
+    Ok(Poses { poses, axes, spans, density })
 }
 
 /// Mean encoder angles of a stretch, through the wrap at ±π; `None` where none is measured.
@@ -163,7 +178,7 @@ mod tests {
         let mut gimbal = vec![[0.5, 0.0, 0.0]; 1000];
         gimbal[400..].fill([0.9, 0.0, 0.0]);
         gimbal[700] = [f64::NAN; 3];
-        // Half a second of settling is left out of each.
-        assert_eq!(still_stretches(&time, &gimbal), [50..400, 450..700, 751..1000]);
+        // Half a second of settling is left out of each, and a quarter before the next movement.
+        assert_eq!(still_stretches(&time, &gimbal), [50..375, 450..675, 751..975]);
     }
 }

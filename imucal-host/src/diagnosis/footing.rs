@@ -1,0 +1,164 @@
+//! What a diagnosis stands on: the movement, rows that can be used, and triads to start from.
+//!
+//! Faults of the recording itself are undone or left out here, so that the search sees none of them.
+
+use imucal_core::triad::Triad;
+use nalgebra::{Matrix3, Vector3};
+
+use super::convention::{self, Finding};
+use crate::{
+    effect::{Act, DataRun, Effect, axis_swap},
+    recording::{Recording, SensorKind, integrity, manifest::Axis, unit::STANDARD_GRAVITY},
+    simulator::{Motion, Place, Replay},
+};
+
+/// Recordings are at least this long, s.
+const SHORTEST: f64 = 30.0;
+
+/// What a diagnosis stands on.
+#[derive(Debug)]
+pub struct Footing {
+    /// The recorded movement.
+    pub replay: Replay,
+    /// Rows of each sensor that can be used, by [`SensorKind::ALL`].
+    pub usable: [Vec<bool>; 3],
+    /// Triads that put axes and units right, nominal SI to SI.
+    pub triads: [Triad<f64>; 3],
+    /// Faults of the recording that are effects of the catalogue.
+    pub findings: Vec<Finding>,
+    /// What else a reader ought to know.
+    pub remarks: Vec<String>,
+}
+
+impl Footing {
+    /// Of a recording.
+    ///
+    /// # Errors
+    ///
+    /// Why the recording cannot be diagnosed, for a reader.
+    pub fn new(recording: &Recording) -> Result<Self, String> {
+        let replay = replay(recording)?;
+        let integrity = integrity::inspect(recording);
+        let conventions = convention::check(recording, &integrity, &replay);
+        if let Some(contradiction) = conventions.contradiction {
+            return Err(contradiction);
+        }
+        let mut usable = SensorKind::ALL
+            .map(|kind| integrity.sensor(kind).map(|sensor| sensor.usable.clone()).unwrap_or_default());
+        let mut triads = [Triad::identity(); 3];
+        if let Some(turn) = conventions.turned.and_then(axis_swap::signed_permutation) {
+            triads.iter_mut().for_each(|triad| triad.gain *= turn.transpose());
+        }
+        for finding in &conventions.findings {
+            let Some(kind) = finding.effect.sensors.first().copied() else { continue };
+            leave_out(finding, recording, kind, &mut usable[kind as usize]);
+            if let Some(matrix) = finding.dose().and_then(|dose| response(finding.effect, &dose.values)) {
+                let triad = &mut triads[kind as usize];
+                // The samples are M v: what undoes M comes first.
+                triad.gain *= matrix.try_inverse().unwrap_or_else(Matrix3::identity);
+            }
+        }
+        let Some(measured) =
+            SensorKind::ALL.iter().find(|kind| usable[**kind as usize].iter().any(|row| *row))
+        else {
+            return Err("no sensor has a usable row".to_owned());
+        };
+        debug_assert!(recording.sensor(*measured).is_some());
+        let mut remarks = conventions.remarks;
+        remarks.extend(shortcomings(recording));
+        Ok(Self { replay, usable, triads, findings: conventions.findings, remarks })
+    }
+}
+
+/// What the samples of a data effect are of those before it, where that is linear: a column an axis.
+fn response(effect: &Effect, values: &[f64]) -> Option<Matrix3<f64>> {
+    let Act::Data(_, alter) = effect.act else { return None };
+    let linear = effect.id.ends_with(".axis_swap") || effect.id.ends_with(".unit_error");
+    linear.then(|| {
+        let mut samples = [Vector3::x(), Vector3::y(), Vector3::z()];
+        alter(values, &mut DataRun { samples: &mut samples });
+        Matrix3::from_columns(&samples)
+    })
+}
+
+/// Rows that a fault has spoilt are not used.
+fn leave_out(finding: &Finding, recording: &Recording, kind: SensorKind, usable: &mut [bool]) {
+    let Some(triple) = recording.sensor(kind) else { return };
+    if finding.effect.id.ends_with(".stuck_samples") {
+        for row in 1..usable.len() {
+            usable[row] &= triple.values[row] != triple.values[row - 1];
+        }
+    }
+    if finding.effect.id.ends_with(".noise_burst") {
+        let time = |name: &str| {
+            let amount = finding.parameters.iter().find(|amount| amount.name == name);
+            amount.and_then(|amount| amount.value)
+        };
+        if let (Some(start), Some(end)) = (time("t_start"), time("t_end")) {
+            for (usable, time) in usable.iter_mut().zip(&recording.time) {
+                *usable &= !(start..end).contains(time);
+            }
+        }
+    }
+}
+
+/// The rig's axes, outermost first.
+///
+/// # Errors
+///
+/// What the manifest lacks, for a reader.
+pub fn axes(recording: &Recording) -> Result<[Axis; 3], String> {
+    let axes = recording.manifest.rig.as_ref().and_then(|rig| rig.axes.clone());
+    axes.and_then(|axes| axes.try_into().ok()).ok_or_else(|| {
+        "the manifest's [rig] names no three axes, outermost first, such as [\"z\", \"y\", \"x\"]".to_owned()
+    })
+}
+
+/// The recorded movement, or why there is none.
+fn replay(recording: &Recording) -> Result<Replay, String> {
+    let gimbal = recording.gimbal.as_deref().ok_or(
+        "there are no encoder columns (gimbal_outer, gimbal_middle, gimbal_inner): without a rig the simulator cannot \
+         be given the movement",
+    )?;
+    let axes = axes(recording)?;
+    let site = &recording.manifest.site;
+    if recording.mag.is_some() && site.field_ned_ut.is_none() {
+        return Err(
+            "the manifest's [site] lacks field_ned_ut, against which the magnetometer is compared".to_owned()
+        );
+    }
+    let place = Place {
+        latitude_deg: site.latitude_deg.unwrap_or(0.0),
+        height: site.height_m.unwrap_or(0.0),
+        gravity: site.gravity().unwrap_or(STANDARD_GRAVITY),
+        field_n: site.field_ned_ut.unwrap_or_default().into(),
+    };
+    let temperature = recording.temperature.clone().unwrap_or_else(|| vec![25.0; recording.rows()]);
+    let replay = Replay::new(&recording.time, gimbal, temperature, axes, place)
+        .ok_or("no row has a reading of all three encoders")?;
+    if replay.duration() < SHORTEST {
+        return Err(format!(
+            "{:.0} s are too short to tell drift from anything else; {SHORTEST:.0} s at least",
+            replay.duration()
+        ));
+    }
+    if !replay.moving().iter().any(|moves| *moves) {
+        return Err("the rig stands still: nothing tells an effect from a bias".to_owned());
+    }
+    Ok(replay)
+}
+
+/// What the recording lacks, and what that costs.
+fn shortcomings(recording: &Recording) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if recording.temperature.is_none() {
+        remarks.push("there is no temperature: what follows it looks like drift".to_owned());
+    }
+    if recording.manifest.site.gravity().is_none() && recording.acc.is_some() {
+        remarks.push(
+            "the site's gravity is not given: standard gravity stands in, and the scale takes up the rest"
+                .to_owned(),
+        );
+    }
+    remarks
+}
