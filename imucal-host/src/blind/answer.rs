@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     case::{Drawn, Label},
-    lambda::difference,
     seal::digest,
 };
 use crate::{
@@ -123,13 +122,14 @@ impl Finished {
 /// The share of the gap's whitened square that the asserted effects, as they were fitted, close:
 ///
 /// ```text
-/// φ = 1 − Σ λ(s − ŝ) / Σ λ(s)      s: what all true effects change, ŝ: what the asserted ones change; over sensors
+/// φ = 1 − Σ λ(y, ŷ) / Σ λ(y, y₀)      y: all true effects, ŷ: the asserted ones, y₀: none; over sensors
 /// ```
 ///
-/// both in runs without noise of the trial's own unit and rig, the baseline projected out of either as [`Lambda`] does.
-/// `None` without causes, or without a gap.
+/// all of them runs without noise of the trial's own unit and rig; λ(a, b) is the whitened square of what is left of run
+/// a where the baseline is fitted to it on top of run b, see [`Lambda::remainder`]. `None` without causes, or without a
+/// gap.
 ///
-/// [`Lambda`]: super::lambda::Lambda
+/// [`Lambda::remainder`]: super::lambda::Lambda::remainder
 ///
 /// # Errors
 ///
@@ -141,8 +141,8 @@ pub fn truly_closed(drawn: &Drawn, answer: &Answer) -> Result<Option<f64>, Simul
     }
     let lambda = &drawn.lambda;
     let (truth, fitted) = (lambda.run(&drawn.simulation.doses)?, lambda.run(&doses)?);
-    let whole: f64 = lambda.of(&difference(&truth, &lambda.healthy), &[]).iter().sum();
-    let left: f64 = lambda.of(&difference(&truth, &fitted), &[]).iter().sum();
+    let whole: f64 = lambda.remainder(&truth, &lambda.healthy).iter().sum();
+    let left: f64 = lambda.remainder(&truth, &fitted).iter().sum();
     Ok((whole > 0.0).then(|| 1.0 - left / whole))
 }
 

@@ -46,13 +46,19 @@ pub struct Lambda {
     simulation: Simulation,
     /// The run without effects.
     pub healthy: Signal,
+    /// What small values of the rig's terms change in it.
+    rig: Vec<Signal>,
     sensors: Vec<Measure>,
 }
 
-/// Of one sensor.
+/// Whitens the block means of one sensor.
 #[derive(Clone, Debug)]
-struct Measure {
-    factor: Cholesky<f64, Dyn>,
+struct Measure(Cholesky<f64, Dyn>);
+
+/// What the baseline may change in the output of one sensor.
+#[derive(Clone, Debug)]
+struct Baseline<'a> {
+    measure: &'a Measure,
     /// Orthonormal columns of one axis, whitened.
     axis: Vec<DVector<f64>>,
     /// Orthonormal columns of all axes, whitened.
@@ -77,22 +83,22 @@ impl Lambda {
                 ..simulation.clone()
             },
             healthy: Default::default(),
+            rig: Vec::new(),
             sensors: Vec::new(),
         };
         lambda.healthy = lambda.run(&[])?;
-        let mut rig = Vec::new();
         for (id, parameter) in RIG {
             let Some(effect) = effect::find(id) else { continue };
             let mut values = effect.neutral(0.0);
             values.iter_mut().skip(parameter).take(1).for_each(|value| *value = SMALL);
-            rig.push(difference(&lambda.run(&[Dose { effect, values }])?, &lambda.healthy));
+            let altered = lambda.run(&[Dose { effect, values }])?;
+            lambda.rig.push(difference(&altered, &lambda.healthy));
         }
         for kind in SensorKind::ALL {
             let triad = unit.triad(kind);
             let white = triad.noise * triad.noise / samples;
             let covariance = |one: f64, other: f64| triad.drift.covariance(one, other);
-            let healthy = &lambda.healthy[kind as usize];
-            let measure = Measure::new(healthy, &rig, kind, white, covariance);
+            let measure = Measure::new(lambda.healthy[kind as usize].len(), white, covariance);
             lambda.sensors.push(measure.ok_or(SimulationError::Singular { sensor: kind })?);
         }
         Ok(lambda)
@@ -120,52 +126,60 @@ impl Lambda {
 
     /// λ of a signal by sensor, with what the signals `beside` it span projected out as well.
     pub fn of(&self, signal: &Signal, beside: &[Signal]) -> [f64; 3] {
+        self.squared(signal, &self.healthy, beside)
+    }
+
+    /// λ of what is left of a run where another explains it and the baseline is fitted anew: K acts on the other run's
+    /// output, so that what an effect shares with the baseline may stand in either.
+    pub fn remainder(&self, run: &Signal, explanation: &Signal) -> [f64; 3] {
+        self.squared(run, explanation, &[])
+    }
+
+    fn squared(&self, signal: &Signal, output: &Signal, beside: &[Signal]) -> [f64; 3] {
         std::array::from_fn(|k| {
             let Some(measure) = self.sensors.get(k) else { return 0.0 };
+            let rig: Vec<&[Vector3<f64>]> = self.rig.iter().map(|signal| signal[k].as_slice()).collect();
             let beside: Vec<&[Vector3<f64>]> = beside.iter().map(|signal| signal[k].as_slice()).collect();
-            measure.squared(&signal[k], &beside)
+            measure.baseline(&output[k], &rig).squared(&signal[k], &beside)
         })
     }
 }
 
 impl Measure {
     /// `None` where the noise has no variance.
-    fn new(
-        healthy: &[Vector3<f64>],
-        rig: &[Signal],
-        kind: SensorKind,
-        white: f64,
-        covariance: impl Fn(f64, f64) -> f64,
-    ) -> Option<Self> {
-        let blocks = healthy.len();
+    fn new(blocks: usize, white: f64, covariance: impl Fn(f64, f64) -> f64) -> Option<Self> {
         let centre = |k: usize| BLOCK * (k as f64 + 0.5);
         let sigma = DMatrix::from_fn(blocks, blocks, |i, j| {
             covariance(centre(i), centre(j)) + if i == j { white } else { 0.0 }
         });
-        let mut measure = Self { factor: sigma.cholesky()?, axis: Vec::new(), all: Vec::new() };
-        // K and b change each axis by any combination of the outputs and a constant.
-        let mut columns = vec![DVector::from_element(blocks, 1.0)];
-        columns.extend((0..3).map(|axis| column(healthy, axis)));
-        for column in columns {
-            let whitened = measure.whitened(&column);
-            add_orthonormal(&mut measure.axis, whitened);
-        }
-        for signal in rig {
-            let column = measure.projected(&signal[kind as usize]);
-            add_orthonormal(&mut measure.all, column);
-        }
-        Some(measure)
+        Some(Self(sigma.cholesky()?))
     }
 
     fn whitened(&self, column: &DVector<f64>) -> DVector<f64> {
-        self.factor.l_dirty().solve_lower_triangular(column).unwrap_or_else(|| DVector::zeros(column.len()))
+        self.0.l_dirty().solve_lower_triangular(column).unwrap_or_else(|| DVector::zeros(column.len()))
     }
 
+    /// K and b change each axis by any combination of the outputs and a constant, the rig all axes together.
+    fn baseline<'a>(&'a self, output: &[Vector3<f64>], rig: &[&[Vector3<f64>]]) -> Baseline<'a> {
+        let mut baseline = Baseline { measure: self, axis: Vec::new(), all: Vec::new() };
+        let constant = DVector::from_element(output.len(), 1.0);
+        for column in std::iter::once(constant).chain((0..3).map(|axis| column(output, axis))) {
+            add_orthonormal(&mut baseline.axis, self.whitened(&column));
+        }
+        for signal in rig {
+            let column = baseline.projected(signal);
+            add_orthonormal(&mut baseline.all, column);
+        }
+        baseline
+    }
+}
+
+impl Baseline<'_> {
     /// All axes, whitened, less bias and K.
     fn projected(&self, signal: &[Vector3<f64>]) -> DVector<f64> {
         let mut stacked = DVector::zeros(3 * signal.len());
         for axis in 0..3 {
-            let mut whitened = self.whitened(&column(signal, axis));
+            let mut whitened = self.measure.whitened(&column(signal, axis));
             project(&mut whitened, &self.axis);
             stacked.rows_mut(axis * signal.len(), signal.len()).copy_from(&whitened);
         }
@@ -250,13 +264,14 @@ mod tests {
         let white = 0.25;
         let signal: Vec<Vector3<f64>> = (0..40).map(|k| Vector3::new(f64::from(k), 0.0, 0.0)).collect();
         let flat = vec![Vector3::zeros(); 40];
-        let measure = Measure::new(&flat, &[], SensorKind::Acc, white, |_, _| 0.0).unwrap();
+        let measure = Measure::new(40, white, |_, _| 0.0).unwrap();
+        let measure = measure.baseline(&flat, &[]);
         // Σ (k − mean)² = N (N² − 1) / 12
         let expected = 40.0 * (40.0 * 40.0 - 1.0) / 12.0 / white;
         assert!((measure.squared(&signal, &[]) / expected - 1.0).abs() < 1e-12);
         // A constant offset common to all times that drifts as one is no information at all.
-        let loose = Measure::new(&flat, &[], SensorKind::Acc, white, |_, _| 1e6).unwrap();
-        assert!((loose.squared(&signal, &[]) / expected - 1.0).abs() < 1e-6);
+        let loose = Measure::new(40, white, |_, _| 1e6).unwrap();
+        assert!((loose.baseline(&flat, &[]).squared(&signal, &[]) / expected - 1.0).abs() < 1e-6);
         assert!(measure.squared(&signal, &[&signal]) < 1e-9);
     }
 
@@ -278,6 +293,19 @@ mod tests {
         }
         let tilted = of(&lambda, &[dose("rig.level_tilt", &[1e-4, -2e-4])]);
         assert!(largest(&tilted) < 0.01, "{tilted:?}");
+    }
+
+    #[test]
+    fn a_source_is_explained_by_another_that_differs_by_what_the_baseline_takes_up() {
+        let simulation = quiet_drift(Programme::Mixed);
+        let lambda = Lambda::new(&simulation).unwrap();
+        let run = |d: [f64; 3]| lambda.run(&[dose("mag.gimbal_hard_iron_middle", &d)]).unwrap();
+        // The part along the inner axis, x, turns with the table.
+        let (truth, explanation) = (run([0.5, 1.0, -1.0]), run([-1.5, 1.0, -1.0]));
+        let whole = largest(&lambda.of(&difference(&truth, &lambda.healthy), &[]));
+        assert!(largest(&lambda.remainder(&truth, &explanation)) < 1e-6 * whole);
+        let half = largest(&lambda.remainder(&truth, &run([0.0, 0.5, -0.5])));
+        assert!((half / whole - 0.25).abs() < 0.01, "{half} {whole}");
     }
 
     #[test]
