@@ -26,7 +26,10 @@ fn a_set_is_run_scored_gone_on_with_and_scored_again() {
 #[test]
 fn one_case_is_written_for_a_closer_look() {
     let folder = Folder::new();
-    folder.run("blind --nonce b11d --open afflicted-0000 --out case").with(0).printing(&["afflicted-0000.csv.gz"]);
+    folder
+        .run("blind --nonce b11d --open afflicted-0000 --out case")
+        .with(0)
+        .printing(&["afflicted-0000.csv.gz"]);
     let label = String::from_utf8(folder.bytes("case/afflicted-0000.label.json")).unwrap();
     assert!(label.contains("lambda_beside"), "{label}");
     assert!(!folder.bytes("case/afflicted-0000.toml").is_empty());

@@ -79,7 +79,8 @@ impl Answer {
     fn doses(&self) -> Vec<Dose> {
         let dose = |cause: &Asserted| {
             let effect = effect::find(&cause.effect)?;
-            let told = |name: &str| cause.parameters.iter().find(|(told, _)| told == name).map(|(_, value)| *value);
+            let told =
+                |name: &str| cause.parameters.iter().find(|(told, _)| told == name).map(|(_, value)| *value);
             let value = |parameter: &effect::Parameter| match told(&parameter.name) {
                 Some(Some(value)) => value,
                 // An episode that has not ended.
@@ -155,7 +156,10 @@ pub(super) mod tests {
     };
 
     /// An answer that asserts these effects with these parameters.
-    pub(in crate::blind) fn asserting(verdict: Verdict, causes: &[(&str, Vec<(String, Option<f64>)>)]) -> Answer {
+    pub(in crate::blind) fn asserting(
+        verdict: Verdict,
+        causes: &[(&str, Vec<(String, Option<f64>)>)],
+    ) -> Answer {
         let cause = |(effect, parameters): &(&str, Vec<(String, Option<f64>)>)| Asserted {
             effect: (*effect).to_owned(),
             probability: Some(0.99),
@@ -176,9 +180,10 @@ pub(super) mod tests {
         let [present] = &drawn.label.effects[..] else { panic!("{:?}", drawn.label) };
         let effect = effect::find(&present.effect).unwrap();
         let closed = |share: f64| {
-            let parameters = effect.parameters.iter().zip(&present.parameters).map(|(parameter, (name, value))| {
-                (name.clone(), Some(if parameter.switches() { value * share } else { *value }))
-            });
+            let parameters =
+                effect.parameters.iter().zip(&present.parameters).map(|(parameter, (name, value))| {
+                    (name.clone(), Some(if parameter.switches() { value * share } else { *value }))
+                });
             let answer = asserting(Verdict::Explained, &[(&present.effect, parameters.collect())]);
             truly_closed(&drawn, &answer).unwrap().unwrap()
         };

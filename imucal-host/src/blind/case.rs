@@ -71,8 +71,7 @@ pub enum Omission {
 /// Why an effect is not drawn; `None` for those that are.
 pub fn omission(effect: &Effect) -> Option<Omission> {
     let ends = |names: &[&str]| names.iter().any(|name| effect.id.ends_with(name));
-    let baseline =
-        ["rig.level_tilt", "rig.heading", "acc.gravity_error", "mag.hard_iron", "mag.soft_iron"];
+    let baseline = ["rig.level_tilt", "rig.heading", "acc.gravity_error", "mag.hard_iron", "mag.soft_iron"];
     if matches!(effect.act, Act::Triad(..)) || baseline.contains(&effect.id.as_str()) {
         return Some(Omission::Baseline);
     }
@@ -264,7 +263,11 @@ fn sized(lambda: &Lambda, unit: &Dose, wanted: f64) -> Result<Option<Dose>, Simu
         if miss.abs() < NEAR {
             break;
         }
-        if miss < 0.0 { low = low.max(size) } else { high = high.min(size) }
+        if miss < 0.0 {
+            low = low.max(size)
+        } else {
+            high = high.min(size)
+        }
         // λ grows as the square; where it does not, the bounds are halved.
         size *= libm::sqrt(wanted / found).clamp(0.05, 20.0);
         if size <= low || size >= high {
@@ -294,7 +297,8 @@ fn present(lambda: &Lambda, doses: &[Dose]) -> Result<Vec<Present>, SimulationEr
     };
     let signals: Vec<_> = doses.iter().map(signal).collect::<Result<_, _>>()?;
     let describe = |(at, dose): (usize, &Dose)| {
-        let others: Vec<_> = (0..doses.len()).filter(|other| *other != at).map(|k| signals[k].clone()).collect();
+        let others: Vec<_> =
+            (0..doses.len()).filter(|other| *other != at).map(|k| signals[k].clone()).collect();
         let names = dose.effect.parameters.iter().map(|parameter| parameter.name.clone());
         Present {
             effect: dose.effect.id.clone(),
@@ -314,7 +318,8 @@ mod tests {
     #[test]
     fn a_case_follows_from_nonce_and_name_and_a_label_from_neither_alone() {
         let nonce = Nonce::parse("12").unwrap();
-        let (one, again) = (draw(&nonce, Case::Afflicted(2)).unwrap(), draw(&nonce, Case::Afflicted(2)).unwrap());
+        let (one, again) =
+            (draw(&nonce, Case::Afflicted(2)).unwrap(), draw(&nonce, Case::Afflicted(2)).unwrap());
         assert_eq!(one.label, again.label);
         assert_eq!(one.label.effects.len(), 2);
         assert_ne!(one.label.salt, draw(&nonce, Case::Afflicted(3)).unwrap().label.salt);

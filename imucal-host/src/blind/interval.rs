@@ -28,9 +28,11 @@ mod tests {
         let [low, high] = clopper_pearson(77, 77);
         assert!(high == 1.0 && (low - 0.025f64.powf(1.0 / 77.0)).abs() < 1e-9, "{low}");
         // R: binom.test(5, 100), binom.test(50, 1000), binom.test(4, 10).
-        for (hits, trials, expected) in
-            [(5, 100, [0.016_431_88, 0.112_834_9]), (50, 1000, [0.037_335_4, 0.065_390_5]), (4, 10, [0.121_552_3, 0.737_621_9])]
-        {
+        for (hits, trials, expected) in [
+            (5, 100, [0.016_431_88, 0.112_834_9]),
+            (50, 1000, [0.037_335_4, 0.065_390_5]),
+            (4, 10, [0.121_552_3, 0.737_621_9]),
+        ] {
             let found = clopper_pearson(hits, trials);
             for (found, expected) in found.iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-6, "{hits}/{trials}: {found} {expected}");

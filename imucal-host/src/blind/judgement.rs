@@ -83,7 +83,8 @@ impl Judgement {
             [cause] => Some(cause),
             _ => None,
         };
-        let smallest = |size: fn(&Present) -> f64| label.effects.iter().map(size).reduce(f64::min).unwrap_or(0.0);
+        let smallest =
+            |size: fn(&Present) -> f64| label.effects.iter().map(size).reduce(f64::min).unwrap_or(0.0);
         let closed = trial.truly_closed.map(|truly| Closed {
             said: answer.gap_closed,
             interval: answer.gap_closed_ci95,
@@ -97,7 +98,10 @@ impl Judgement {
             right_or_equivalent: same(&there, &answer.causes, stands_for_class),
             exact: there.len() == 1 && one.is_some_and(|cause| stands_for(cause, there[0])),
             credible: there.iter().all(|id| answer.credible_set.iter().any(|held| class(held) == class(id))),
-            absent_asserted: answer.causes.iter().any(|cause| !there.iter().any(|id| stands_for_class(cause, id))),
+            absent_asserted: answer
+                .causes
+                .iter()
+                .any(|cause| !there.iter().any(|id| stands_for_class(cause, id))),
             flagged: matches!(answer.verdict, Some(Verdict::Unknown | Verdict::Partly)),
             alarmed: answer.verdict != Some(Verdict::None),
             closed,
@@ -126,7 +130,10 @@ impl Judgement {
         let setting = &self.label.setting;
         let effect = |effect: &Present| {
             let [acc, gyr, mag] = effect.lambda;
-            format!("{} [λ acc {acc:.0} gyr {gyr:.0} mag {mag:.0}; beside {:.0}]", effect.effect, effect.lambda_beside)
+            format!(
+                "{} [λ acc {acc:.0} gyr {gyr:.0} mag {mag:.0}; beside {:.0}]",
+                effect.effect, effect.lambda_beside
+            )
         };
         let there: Vec<String> = self.label.effects.iter().map(effect).collect();
         let cause = |cause: &Asserted| {

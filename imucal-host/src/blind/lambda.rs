@@ -29,8 +29,8 @@ const RATE: f64 = 25.0;
 /// Terms of the rig in the baseline, their parameters and a small value, rad.
 const RIG: [(&str, usize); 3] = [("rig.level_tilt", 0), ("rig.level_tilt", 1), ("rig.heading", 0)];
 const SMALL: f64 = 1e-4;
-/// A column of which less than this is left, by the one before, is in the others' span.
-const LEFT: f64 = 1e-7;
+/// A column of which less than this share is left beside the others is in their span.
+const LEFT: f64 = 1e-5;
 
 /// Block means of each sensor, by [`SensorKind::ALL`].
 pub type Signal = [Vec<Vector3<f64>>; 3];
@@ -89,10 +89,14 @@ impl Lambda {
         lambda.healthy = lambda.run(&[])?;
         for (id, parameter) in RIG {
             let Some(effect) = effect::find(id) else { continue };
-            let mut values = effect.neutral(0.0);
-            values.iter_mut().skip(parameter).take(1).for_each(|value| *value = SMALL);
-            let altered = lambda.run(&[Dose { effect, values }])?;
-            lambda.rig.push(difference(&altered, &lambda.healthy));
+            let altered = |by: f64| {
+                let mut values = effect.neutral(0.0);
+                values.iter_mut().skip(parameter).take(1).for_each(|value| *value = by);
+                lambda.run(&[Dose { effect, values }])
+            };
+            // To both sides: what is of second order is along the field itself, and would stand for K.
+            let change = difference(&altered(SMALL)?, &altered(-SMALL)?);
+            lambda.rig.push(change);
         }
         for kind in SensorKind::ALL {
             let triad = unit.triad(kind);

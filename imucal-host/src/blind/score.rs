@@ -110,13 +110,30 @@ pub fn score(judged: &[Judgement]) -> Score {
     };
     let right = |j: &Judgement| j.classes_right;
     let claimed: Vec<Closed> = judged.iter().filter_map(|j| j.closed).collect();
-    let covered = |closed: &Closed| {
-        closed.interval.is_some_and(|[low, high]| (low..=high).contains(&closed.truly))
-    };
+    let covered =
+        |closed: &Closed| closed.interval.is_some_and(|[low, high]| (low..=high).contains(&closed.truly));
     let shares = vec![
-        share("false alarm on healthy recordings", &healthy, &|j| j.alarmed, Some(AtMost(0.05)), Some(AtMost(0.05))),
-        share("one effect, class-correct, λ ≥ 100", &|j| one(j) && j.lambda >= 100.0, &right, Some(AtLeast(0.95)), None),
-        share("one effect, class-correct, λ ≥ 60", &|j| one(j) && j.lambda >= 60.0, &right, None, Some(AtLeast(0.98))),
+        share(
+            "false alarm on healthy recordings",
+            &healthy,
+            &|j| j.alarmed,
+            Some(AtMost(0.05)),
+            Some(AtMost(0.05)),
+        ),
+        share(
+            "one effect, class-correct, λ ≥ 100",
+            &|j| one(j) && j.lambda >= 100.0,
+            &right,
+            Some(AtLeast(0.95)),
+            None,
+        ),
+        share(
+            "one effect, class-correct, λ ≥ 60",
+            &|j| one(j) && j.lambda >= 60.0,
+            &right,
+            None,
+            Some(AtLeast(0.98)),
+        ),
         share("one effect, exact or declared equivalent", &one, &|j| j.exact, Some(AtLeast(0.9)), None),
         share(
             "one effect, exact or declared equivalent, λ ≥ 100",
@@ -125,12 +142,48 @@ pub fn score(judged: &[Judgement]) -> Score {
             None,
             Some(AtLeast(0.97)),
         ),
-        share("95 % credible set holds the truth, one effect", &one, &|j| j.credible, Some(AtLeast(0.93)), Some(Within(0.94, 0.98))),
-        share("two effects, exact set of classes", &|j| j.truth == Truth::Catalogue(2), &right, Some(AtLeast(0.85)), Some(AtLeast(0.95))),
-        share("three effects, exact set of classes", &|j| j.truth == Truth::Catalogue(3), &right, Some(AtLeast(0.75)), Some(AtLeast(0.90))),
-        share("an effect asserted that is not there", &in_catalogue, &|j| j.absent_asserted, Some(AtMost(0.10)), Some(AtMost(0.05))),
-        share("outside the catalogue, flagged, λ ≥ 200", &|j| outside(j) && j.lambda >= 200.0, &|j| j.flagged, Some(AtLeast(0.70)), Some(AtLeast(0.85))),
-        share("outside the catalogue, flagged, λ > 800", &|j| outside(j) && j.lambda > 800.0, &|j| j.flagged, None, Some(AtLeast(0.95))),
+        share(
+            "95 % credible set holds the truth, one effect",
+            &one,
+            &|j| j.credible,
+            Some(AtLeast(0.93)),
+            Some(Within(0.94, 0.98)),
+        ),
+        share(
+            "two effects, exact set of classes",
+            &|j| j.truth == Truth::Catalogue(2),
+            &right,
+            Some(AtLeast(0.85)),
+            Some(AtLeast(0.95)),
+        ),
+        share(
+            "three effects, exact set of classes",
+            &|j| j.truth == Truth::Catalogue(3),
+            &right,
+            Some(AtLeast(0.75)),
+            Some(AtLeast(0.90)),
+        ),
+        share(
+            "an effect asserted that is not there",
+            &in_catalogue,
+            &|j| j.absent_asserted,
+            Some(AtMost(0.10)),
+            Some(AtMost(0.05)),
+        ),
+        share(
+            "outside the catalogue, flagged, λ ≥ 200",
+            &|j| outside(j) && j.lambda >= 200.0,
+            &|j| j.flagged,
+            Some(AtLeast(0.70)),
+            Some(AtLeast(0.85)),
+        ),
+        share(
+            "outside the catalogue, flagged, λ > 800",
+            &|j| outside(j) && j.lambda > 800.0,
+            &|j| j.flagged,
+            None,
+            Some(AtLeast(0.95)),
+        ),
         share("within the catalogue, flagged", &in_catalogue, &|j| j.flagged, None, Some(AtMost(0.03))),
         Share {
             name: "closed share's interval holds the true one",
@@ -145,8 +198,20 @@ pub fn score(judged: &[Judgement]) -> Score {
         share("one effect, class-correct, λ < 60", &between(0.0, 60.0), &right, None, None),
         share("one effect, class-correct, λ 60 to 100", &between(60.0, 100.0), &right, None, None),
         share("one effect, class-correct, λ 100 to 300", &between(100.0, 300.0), &right, None, None),
-        share("one effect, class-correct, λ 300 and more", &between(300.0, f64::INFINITY), &right, None, None),
-        share("one effect, its class or a declared equivalent's, λ ≥ 100", &|j| one(j) && j.lambda >= 100.0, &|j| j.right_or_equivalent, None, None),
+        share(
+            "one effect, class-correct, λ 300 and more",
+            &between(300.0, f64::INFINITY),
+            &right,
+            None,
+            None,
+        ),
+        share(
+            "one effect, its class or a declared equivalent's, λ ≥ 100",
+            &|j| one(j) && j.lambda >= 100.0,
+            &|j| j.right_or_equivalent,
+            None,
+            None,
+        ),
         share("credible set, λ < 100", &between(0.0, 100.0), &|j| j.credible, None, None),
         share("credible set, λ 100 to 300", &between(100.0, 300.0), &|j| j.credible, None, None),
         share("credible set, λ 300 and more", &between(300.0, f64::INFINITY), &|j| j.credible, None, None),
@@ -164,7 +229,13 @@ pub fn score(judged: &[Judgement]) -> Score {
             None,
             None,
         ),
-        share("outside the catalogue, flagged, λ < 200", &|j| outside(j) && j.lambda < 200.0, &|j| j.flagged, None, None),
+        share(
+            "outside the catalogue, flagged, λ < 200",
+            &|j| outside(j) && j.lambda < 200.0,
+            &|j| j.flagged,
+            None,
+            None,
+        ),
         share("without an answer", &|_| true, &|j| j.answer.verdict.is_none(), None, None),
     ];
     let mut seconds: Vec<f64> = judged.iter().map(|j| j.seconds).collect();

@@ -20,7 +20,8 @@ impl Nonce {
 
     /// One of 64 hexadecimal digits, or of fewer, which then are its last.
     pub fn parse(text: &str) -> Option<Self> {
-        let digits: Vec<u8> = text.chars().map(|digit| digit.to_digit(16).map(|d| d as u8)).collect::<Option<_>>()?;
+        let digits: Vec<u8> =
+            text.chars().map(|digit| digit.to_digit(16).map(|d| d as u8)).collect::<Option<_>>()?;
         if digits.is_empty() || digits.len() > 64 {
             return None;
         }

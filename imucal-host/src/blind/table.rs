@@ -11,8 +11,11 @@ impl Score {
     /// The table, its lines ended.
     pub fn table(&self) -> String {
         let [healthy, afflicted] = self.trials;
-        let mut text = format!("{healthy} healthy and {afflicted} afflicted recordings; 95 % intervals of Clopper and Pearson.\n\n");
-        let _ = writeln!(text, "{:<58}{:>9}{:>8}  {:<14}{:>8}{:>9}", "", "trials", "", "interval", "must", "aim");
+        let mut text = format!(
+            "{healthy} healthy and {afflicted} afflicted recordings; 95 % intervals of Clopper and Pearson.\n\n"
+        );
+        let _ =
+            writeln!(text, "{:<58}{:>9}{:>8}  {:<14}{:>8}{:>9}", "", "trials", "", "interval", "must", "aim");
         self.shares.iter().for_each(|share| text += &line(share));
         let [_, bound] = self.shares.first().map_or([0.0, 1.0], Share::interval);
         let _ = writeln!(
@@ -51,7 +54,10 @@ impl Score {
             );
         }
         let [median, largest] = self.seconds;
-        let _ = writeln!(text, "\nTime of a diagnosis on one thread: median {median:.1} s, largest {largest:.1} s.");
+        let _ = writeln!(
+            text,
+            "\nTime of a diagnosis on one thread: median {median:.1} s, largest {largest:.1} s."
+        );
         text
     }
 }

@@ -57,7 +57,8 @@ fn nonce(text: &str) -> Result<Nonce, String> {
 }
 
 fn case(text: &str) -> Result<Case, String> {
-    Case::find(text).ok_or_else(|| format!("there is no case `{text}`; expected such as healthy-0012 or afflicted-0003"))
+    Case::find(text)
+        .ok_or_else(|| format!("there is no case `{text}`; expected such as healthy-0012 or afflicted-0003"))
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
@@ -66,7 +67,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     let folder = match &arguments.score {
         Some(path) => {
-            anyhow::ensure!(path.is_dir(), "{}: found no folder, expected one of an earlier run", path.display());
+            anyhow::ensure!(
+                path.is_dir(),
+                "{}: found no folder, expected one of an earlier run",
+                path.display()
+            );
             Folder::open(path, None)?
         }
         None => trials(arguments)?,

@@ -28,10 +28,8 @@ mod tests {
 
     #[test]
     fn the_classes_are_the_contract_s() {
-        let written: Vec<Vec<&str>> = CONTRACT
-            .split(';')
-            .map(|class| class.split('`').skip(1).step_by(2).collect())
-            .collect();
+        let written: Vec<Vec<&str>> =
+            CONTRACT.split(';').map(|class| class.split('`').skip(1).step_by(2).collect()).collect();
         assert_eq!(written, CLASSES.map(<[_]>::to_vec));
     }
 

@@ -8,7 +8,13 @@ use crate::{
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let parameters = amplitudes(&XYZ, of(kind, 5e-6, 5e-4, 4e-7));
-    mechanism(kind, "cross_cubic", Act::Sensor(kind, alter), parameters, "An axis bends with its neighbour's input.")
+    mechanism(
+        kind,
+        "cross_cubic",
+        Act::Sensor(kind, alter),
+        parameters,
+        "An axis bends with its neighbour's input.",
+    )
 }
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {

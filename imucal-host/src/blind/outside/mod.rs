@@ -45,7 +45,13 @@ pub fn find(id: &str) -> Option<&'static Effect> {
     OUTSIDE.iter().find(|effect| effect.id == id)
 }
 
-fn mechanism(kind: SensorKind, name: &str, act: Act, parameters: Vec<Parameter>, cause: &'static str) -> Effect {
+fn mechanism(
+    kind: SensorKind,
+    name: &str,
+    act: Act,
+    parameters: Vec<Parameter>,
+    cause: &'static str,
+) -> Effect {
     let sensors: &'static [SensorKind] = match kind {
         SensorKind::Acc => &[SensorKind::Acc],
         SensorKind::Gyr => &[SensorKind::Gyr],

@@ -13,7 +13,13 @@ use crate::{
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let mut parameters = amplitudes(&XYZ, of(kind, 5e-3, 1e-3, 0.1));
     parameters.push(shape("tau", 8.0));
-    mechanism(kind, "motion_heat", Act::Sensor(kind, alter), parameters, "Drives warm the unit while they work.")
+    mechanism(
+        kind,
+        "motion_heat",
+        Act::Sensor(kind, alter),
+        parameters,
+        "Drives warm the unit while they work.",
+    )
 }
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {

@@ -8,7 +8,13 @@ use crate::{
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let parameters = amplitudes(&XYZ, of(kind, 0.1, 0.01, 2.0));
-    mechanism(kind, "temp_rate", Act::Sensor(kind, alter), parameters, "Gradients in the package while it warms.")
+    mechanism(
+        kind,
+        "temp_rate",
+        Act::Sensor(kind, alter),
+        parameters,
+        "Gradients in the package while it warms.",
+    )
 }
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {

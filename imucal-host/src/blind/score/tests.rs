@@ -111,12 +111,16 @@ fn every_figure_can_be_missed_alone_or_with_those_that_follow_from_it() {
     };
     assert_eq!(spoilt(&[], naming(Verdict::Unknown, &[]), None), ["false alarm on healthy recordings"]);
     // Another of the class: the class is right, the id is not.
-    let fellow = Answer { credible_set: ids(ONE).iter().map(|id| (*id).to_owned()).collect(), ..naming(Verdict::Explained, &["acc.inner_lever_arm"]) };
+    let fellow = Answer {
+        credible_set: ids(ONE).iter().map(|id| (*id).to_owned()).collect(),
+        ..naming(Verdict::Explained, &["acc.inner_lever_arm"])
+    };
     assert_eq!(spoilt(&ONE, fellow, Some(0.9)), EXACT);
     // Nothing is asserted of an effect of λ 400, though it is held possible.
     let silent = Answer { credible_set: vec![ONE[0].0.to_owned()], ..naming(Verdict::None, &[]) };
     assert_eq!(spoilt(&ONE, silent, None), among(RIGHT.to_vec(), &EXACT));
-    let elsewhere = Answer { credible_set: vec!["gyr.warmup".to_owned()], ..naming(Verdict::Explained, &ids(ONE)) };
+    let elsewhere =
+        Answer { credible_set: vec!["gyr.warmup".to_owned()], ..naming(Verdict::Explained, &ids(ONE)) };
     assert_eq!(spoilt(&ONE, elsewhere, Some(0.9)), ["95 % credible set holds the truth, one effect"]);
     let half = naming(Verdict::Explained, &["gyr.warmup"]);
     assert_eq!(spoilt(&TWO, half.clone(), None), ["two effects, exact set of classes"]);
