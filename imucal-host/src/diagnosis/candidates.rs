@@ -12,10 +12,12 @@ pub struct Candidates {
     pub baseline: Vec<&'static Effect>,
     /// Effects that may be added.
     pub effects: Vec<&'static Effect>,
+    /// Effects that the recording cannot show, and why.
+    pub untestable: Vec<(&'static Effect, &'static str)>,
 }
 
 /// Effects against a calibration made elsewhere: one made of the recording itself holds them.
-pub const ELSEWHERE: [&str; 2] = ["mag.hard_iron", "mag.soft_iron"];
+const ELSEWHERE: [&str; 2] = ["mag.hard_iron", "mag.soft_iron"];
 
 /// Terms of each triad in the baseline; the rig's are beside them.
 const TRIAD_TERMS: [&str; 3] = ["bias", "scale", "misalignment"];
@@ -35,14 +37,24 @@ impl Candidates {
             .iter()
             .filter(|effect| !matches!(effect.act, Act::Signal(..) | Act::Data(..)) && reached(effect))
             .partition(|effect| in_baseline(effect));
-        let effects = others
-            .into_iter()
-            .filter(|effect| thermometer || !effect.id.contains(".temp_"))
-            .filter(|effect| term(effect, kinds).is_some() || !named(effect))
-            .filter(|effect| calibrated || !ELSEWHERE.contains(&effect.id.as_str()))
-            .collect();
-        Self { baseline, effects }
+        let mut candidates = Self { baseline, effects: Vec::new(), untestable: Vec::new() };
+        for effect in others.into_iter().filter(|effect| term(effect, kinds).is_some() || !named(effect)) {
+            if !thermometer && effect.id.contains(".temp_") {
+                candidates.untestable.push((effect, "no temperature was recorded"));
+            } else if !calibrated && ELSEWHERE.contains(&effect.id.as_str()) {
+                let why = "it shows against a calibration made elsewhere (--model)";
+                candidates.untestable.push((effect, why));
+            } else {
+                candidates.effects.push(effect);
+            }
+        }
+        candidates
     }
+}
+
+/// An effect that stands in the baseline unless it is taken out.
+pub fn is_term(effect: &Effect) -> bool {
+    term(effect, &SensorKind::ALL).is_some()
 }
 
 /// What a term of the baseline belongs to.

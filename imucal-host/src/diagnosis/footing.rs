@@ -5,15 +5,27 @@
 use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
 
-use super::convention::{self, Finding};
+use super::{
+    convention::{self, Conventions, Finding},
+    revisits,
+};
 use crate::{
     effect::{Act, DataRun, Effect, axis_swap},
-    recording::{Recording, SensorKind, integrity, manifest::Axis, unit::STANDARD_GRAVITY},
+    recording::{
+        Recording, SensorKind, Triple,
+        integrity::{self, Integrity},
+        manifest::Axis,
+        median,
+        unit::STANDARD_GRAVITY,
+    },
     simulator::{Motion, Place, Replay},
 };
 
 /// Recordings are at least this long, s.
 const SHORTEST: f64 = 30.0;
+
+/// Samples closer to a limit than this many standard deviations of their noise are not used.
+const CLIPPED: f64 = 5.0;
 
 /// What a diagnosis stands on.
 #[derive(Debug)]
@@ -43,8 +55,10 @@ impl Footing {
         if let Some(contradiction) = conventions.contradiction {
             return Err(contradiction);
         }
-        let mut usable = SensorKind::ALL
-            .map(|kind| integrity.sensor(kind).map(|sensor| sensor.usable.clone()).unwrap_or_default());
+        let mut usable = SensorKind::ALL.map(|kind| usable_rows(recording, &integrity, &conventions, kind));
+        for usable in &mut usable {
+            usable.iter_mut().zip(replay.known()).for_each(|(usable, known)| *usable &= known);
+        }
         let mut triads = [Triad::identity(); 3];
         if let Some(turn) = conventions.turned.and_then(axis_swap::signed_permutation) {
             triads.iter_mut().for_each(|triad| triad.gain *= turn.transpose());
@@ -65,9 +79,41 @@ impl Footing {
         };
         debug_assert!(recording.sensor(*measured).is_some());
         let mut remarks = conventions.remarks;
+        remarks.extend(revisits::remark(&replay));
         remarks.extend(shortcomings(recording));
         Ok(Self { replay, usable, triads, findings: conventions.findings, remarks })
     }
+}
+
+/// Rows of a sensor that can be used. In a wrong unit every sample may seem to lie beyond the range: then those count
+/// that were measured and are not stuck.
+fn usable_rows(
+    recording: &Recording,
+    integrity: &Integrity,
+    conventions: &Conventions,
+    kind: SensorKind,
+) -> Vec<bool> {
+    let (Some(sensor), Some(triple)) = (integrity.sensor(kind), recording.sensor(kind)) else {
+        return Vec::new();
+    };
+    let id = format!("{kind}.unit_error");
+    if !conventions.findings.iter().any(|finding| finding.effect.id == id) {
+        return sensor.usable.clone();
+    }
+    let mut usable: Vec<bool> =
+        triple.values.iter().map(|value| value.iter().all(|component| component.is_finite())).collect();
+    sensor.stuck.iter().for_each(|rows| usable[rows.clone()].fill(false));
+    usable
+}
+
+/// Noise of a triad's samples, SI unit: the largest of the axes', from neighbouring samples.
+fn noise(triple: &Triple) -> f64 {
+    let of = |axis: usize| {
+        let steps = triple.values.windows(2).map(|pair| (pair[1][axis] - pair[0][axis]).abs());
+        // The median of |x| is 0.674 of its standard deviation; a step has that of a sample, times √2.
+        median(steps.filter(|step| step.is_finite()).collect()).unwrap_or(0.0) / (0.674 * 2.0f64.sqrt())
+    };
+    (0..3).map(of).fold(0.0, f64::max)
 }
 
 /// What the samples of a data effect are of those before it, where that is linear: a column an axis.
@@ -89,12 +135,25 @@ fn leave_out(finding: &Finding, recording: &Recording, kind: SensorKind, usable:
             usable[row] &= triple.values[row] != triple.values[row - 1];
         }
     }
+    if finding.effect.id.ends_with(".saturation")
+        && let (Some(shortfall), Some(full_scale)) =
+            (finding.parameters.first().and_then(|amount| amount.value), triple.full_scale_si())
+    {
+        // Just below the limit noise is clipped on one side.
+        let limit = full_scale / (1.0 + shortfall);
+        let noise = noise(triple);
+        for (usable, value) in usable.iter_mut().zip(&triple.values) {
+            *usable &= value.amax() < limit - CLIPPED * noise;
+        }
+    }
     if finding.effect.id.ends_with(".noise_burst") {
         let time = |name: &str| {
             let amount = finding.parameters.iter().find(|amount| amount.name == name);
             amount.and_then(|amount| amount.value)
         };
-        if let (Some(start), Some(end)) = (time("t_start"), time("t_end")) {
+        if let Some(start) = time("t_start") {
+            // Without an end it goes on to that of the recording.
+            let end = time("t_end").unwrap_or(f64::INFINITY);
             for (usable, time) in usable.iter_mut().zip(&recording.time) {
                 *usable &= !(start..end).contains(time);
             }
@@ -136,10 +195,10 @@ fn replay(recording: &Recording) -> Result<Replay, String> {
     let temperature = recording.temperature.clone().unwrap_or_else(|| vec![25.0; recording.rows()]);
     let replay = Replay::new(&recording.time, gimbal, temperature, axes, place)
         .ok_or("no row has a reading of all three encoders")?;
-    if replay.duration() < SHORTEST {
+    let length = replay.duration() - recording.time.first().copied().unwrap_or(0.0);
+    if length < SHORTEST {
         return Err(format!(
-            "{:.0} s are too short to tell drift from anything else; {SHORTEST:.0} s at least",
-            replay.duration()
+            "{length:.0} s are too short to tell drift from anything else; {SHORTEST:.0} s at least"
         ));
     }
     if !replay.moving().iter().any(|moves| *moves) {

@@ -30,6 +30,8 @@ pub const FAR: [f64; 2] = [4.0, 1.7];
 pub const NEAR: [f64; 1] = [2.0];
 /// Rounds over all standard deviations for each factor.
 const ROUNDS: usize = 4;
+/// Share of drift and scatter that [`Noise::quieter`] leaves.
+const QUIET: f64 = 0.2;
 /// Pieces of which neighbours are compared, s.
 const PIECE: f64 = 0.1;
 
@@ -51,6 +53,19 @@ pub struct SensorNoise {
 pub struct Noise {
     /// Of each sensor.
     pub sensors: [SensorNoise; 3],
+}
+
+impl Noise {
+    /// With smaller drifts and scatter: what an unmodelled effect has put into them comes to light.
+    #[must_use]
+    pub fn quieter(&self) -> Self {
+        let mut quiet = self.clone();
+        for sensor in &mut quiet.sensors {
+            sensor.drift = sensor.drift.map(|sigma| QUIET * sigma);
+            sensor.scatter *= QUIET;
+        }
+        quiet
+    }
 }
 
 /// What weighs the blocks: the scene, and what each sensor is given there.

@@ -2,6 +2,7 @@
 //!
 //! Angle, rate and acceleration of each gimbal are those of a cubic through the readings within [`REACH`] of a row, by
 //! least squares: a reading's noise is averaged, and a movement whose angle is a cubic over that time stays as it is.
+//! Where a wider cubic tells another rate, the gimbal has jerked, and its rate there is not known.
 //! Between rows the nearest row's swing goes on with constant acceleration. A rig whose readings change no more than
 //! their noise would make them stands still: its rates are zero. Not modelled: readings that lag the gimbal.
 
@@ -29,6 +30,8 @@ const WINDOW: f64 = 0.1;
 const CREEP: f64 = 3e-3;
 /// and by more than this many standard deviations of a reading's noise.
 const NOISES: f64 = 8.0;
+/// Two rates further apart than this, rad/s, and than their noise are those of a jerk.
+const JERK: f64 = 1e-3;
 /// At least this many readings to each side.
 const FEWEST: usize = 2;
 
@@ -38,6 +41,7 @@ pub struct Replay {
     time: Vec<f64>,
     swings: Vec<[Swing; 3]>,
     moving: Vec<bool>,
+    known: Vec<bool>,
     temperature: Vec<f64>,
     axes: [Axis; 3],
     place: Place,
@@ -54,17 +58,32 @@ impl Replay {
         place: Place,
     ) -> Option<Self> {
         let angles = unwrapped(encoders)?;
-        let median = (time.last()? - time.first()?) / (time.len().max(2) - 1) as f64;
-        let reach = ((REACH / median).floor() as usize).max(FEWEST);
-        let moving = moving(time, &angles);
+        let interval = (time.last()? - time.first()?) / (time.len().max(2) - 1) as f64;
+        let reach = ((REACH / interval).floor() as usize).max(FEWEST);
+        let noise = noise(&angles);
+        let moving = moving(time, &angles, &noise);
+        let mut known = known(encoders, reach);
         let still = |swing: Swing| Swing::still(swing.angle);
-        let swings = (0..time.len())
-            .map(|row| {
-                let swings = swing(time, &angles, row, reach);
-                if moving[row] { swings } else { swings.map(still) }
-            })
-            .collect();
-        Some(Self { time: time.to_vec(), swings, moving, temperature, axes, place })
+        let mut swings = Vec::with_capacity(time.len());
+        for row in 0..time.len() {
+            let near = swing(time, &angles, row, reach);
+            if !moving[row] {
+                swings.push(near.map(still));
+                continue;
+            }
+            let wide = swing(time, &angles, row, reach + 1);
+            // Noise of a rate is about that of a reading in the time between two.
+            let jerked = (0..3).any(|gimbal| {
+                let apart = (near[gimbal].rate - wide[gimbal].rate).abs();
+                apart > JERK + NOISES * noise[gimbal] / interval
+            });
+            if jerked {
+                let to = (row + reach + 1).min(known.len());
+                known[row.saturating_sub(reach)..to].fill(false);
+            }
+            swings.push(near);
+        }
+        Some(Self { time: time.to_vec(), swings, moving, known, temperature, axes, place })
     }
 
     /// Swings of the gimbals at each row, outermost first.
@@ -75,6 +94,11 @@ impl Replay {
     /// Whether a gimbal moves, row by row.
     pub fn moving(&self) -> &[bool] {
         &self.moving
+    }
+
+    /// Whether a row's swing is known: all readings that tell it were measured, and no gimbal jerked.
+    pub fn known(&self) -> &[bool] {
+        &self.known
     }
 
     fn nearest(&self, time: f64) -> usize {
@@ -134,13 +158,28 @@ fn unwrapped(encoders: &[[f64; 3]]) -> Option<Vec<[f64; 3]>> {
     Some(encoders.iter().map(unwrap).collect())
 }
 
-/// Rows at which a gimbal moves.
-fn moving(time: &[f64], angles: &[[f64; 3]]) -> Vec<bool> {
-    let noise = [0, 1, 2].map(|axis| {
+/// Rows about which all readings were measured.
+fn known(encoders: &[[f64; 3]], reach: usize) -> Vec<bool> {
+    let mut known = vec![true; encoders.len()];
+    for (row, _) in encoders.iter().enumerate().filter(|(_, row)| row.iter().any(|angle| !angle.is_finite()))
+    {
+        let to = (row + 2 * reach + 1).min(known.len());
+        known[row.saturating_sub(2 * reach)..to].fill(false);
+    }
+    known
+}
+
+/// Standard deviation of each encoder's readings, rad.
+fn noise(angles: &[[f64; 3]]) -> [f64; 3] {
+    [0, 1, 2].map(|axis| {
         let bends = angles.windows(3).map(|w| (w[0][axis] - 2.0 * w[1][axis] + w[2][axis]).abs()).collect();
         // The median of |x| is 0.674 of its standard deviation; a bend has that of a reading, times √6.
         median(bends).unwrap_or(0.0) / (0.674 * 6.0f64.sqrt())
-    });
+    })
+}
+
+/// Rows at which a gimbal moves.
+fn moving(time: &[f64], angles: &[[f64; 3]], noise: &[f64; 3]) -> Vec<bool> {
     let (mut before, mut after) = (0, 0);
     (0..time.len())
         .map(|row| {
