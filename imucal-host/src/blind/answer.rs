@@ -155,12 +155,12 @@ pub(super) mod tests {
         seal::Nonce,
     };
 
+    /// Parameters as an answer tells them.
+    pub(in crate::blind) type Told = Vec<(String, Option<f64>)>;
+
     /// An answer that asserts these effects with these parameters.
-    pub(in crate::blind) fn asserting(
-        verdict: Verdict,
-        causes: &[(&str, Vec<(String, Option<f64>)>)],
-    ) -> Answer {
-        let cause = |(effect, parameters): &(&str, Vec<(String, Option<f64>)>)| Asserted {
+    pub(in crate::blind) fn asserting(verdict: Verdict, causes: &[(&str, Told)]) -> Answer {
+        let cause = |(effect, parameters): &(&str, Told)| Asserted {
             effect: (*effect).to_owned(),
             probability: Some(0.99),
             equivalents: Vec::new(),

@@ -329,14 +329,14 @@ mod tests {
     #[test]
     fn sizes_are_those_drawn_and_effects_of_different_classes() {
         let nonce = Nonce::parse("3").unwrap();
-        for index in 0..8 {
+        for (index, wanted) in ROUND.iter().copied().enumerate().take(8) {
             let label = draw(&nonce, Case::Afflicted(index)).unwrap().label;
-            assert_eq!(label.effects.len(), ROUND[index].max(1), "{label:?}");
+            assert_eq!(label.effects.len(), wanted.max(1), "{label:?}");
             for effect in &label.effects {
                 let size = largest(&effect.lambda);
                 assert!((SIZES.0 * 0.6..SIZES.1 * 1.6).contains(&size), "{label:?}");
                 assert!(effect.lambda_beside <= size * (1.0 + 1e-9), "{label:?}");
-                assert_eq!(effect.outside, ROUND[index] == 0, "{label:?}");
+                assert_eq!(effect.outside, wanted == 0, "{label:?}");
             }
         }
         assert!(draw(&nonce, Case::Healthy(0)).unwrap().label.effects.is_empty());

@@ -13,8 +13,11 @@ use crate::{
 const NAMES: [&str; 6] = ["x_c", "y_c", "z_c", "x_s", "y_s", "z_s"];
 const GIMBALS: [&str; 3] = ["outer", "middle", "inner"];
 
+/// Alters the truth of all rows.
+type Alter = fn(&[f64], &mut [Truth]);
+
 pub(super) fn effects() -> Vec<Effect> {
-    let alters: [[fn(&[f64], &mut [Truth]); 3]; 3] = [
+    let alters: [[Alter; 3]; 3] = [
         [alter::<0, 0>, alter::<0, 1>, alter::<0, 2>],
         [alter::<1, 0>, alter::<1, 1>, alter::<1, 2>],
         [alter::<2, 0>, alter::<2, 1>, alter::<2, 2>],
