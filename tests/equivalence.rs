@@ -7,6 +7,7 @@ use imucal_core::record::{Date, TriadRecord};
 use imucal_host::calibrate::{Calibration, Options, calibrate};
 use imucal_host::equivalence::{SampleEquivalence, fits, samples};
 use imucal_host::recording::{Recording, SensorKind, Triple, Unit};
+use imucal_host::simulator::{Programme, Simulation, UnitKind};
 use imucal_host::store::{StoredCalibration, StoredTriad};
 use imucal_tests::{data, simulated};
 use rayon::prelude::*;
@@ -64,12 +65,7 @@ fn on_device(stored: &StoredCalibration, kind: SensorKind) -> TriadRecord {
 }
 
 fn calibrated(recording: &Recording) -> Calibration {
-    calibrate(recording, &field_forms(), &|_| {})
-}
-
-/// The device has the field forms; a gyroscope against an optical reference is fitted on the host alone.
-fn field_forms() -> Options {
-    Options { rig_gyr: None, ..Options::default() }
+    calibrate(recording, &Options::default(), &|_| {})
 }
 
 /// Compares every sensor; gives how many, and how many fits.
@@ -113,6 +109,36 @@ fn every_sensor_of_every_real_recording_is_corrected_and_fitted_alike() {
 fn simulated_recordings_are_corrected_and_fitted_alike() {
     for seed in [5, 6, 7] {
         assert_eq!(compare(&simulated::tumbled(20, seed)), (3, 3), "seed {seed}");
+    }
+}
+
+#[test]
+fn recordings_of_a_rig_are_corrected_and_fitted_alike_by_the_rig_s_models() {
+    for (seed, unit) in [(1, UnitKind::ALL[0]), (2, UnitKind::ALL[1])] {
+        let programme = Programme::MultiPosition;
+        let simulation = Simulation { programme, unit, rate: 50.0, seed, ..Simulation::default() };
+        let recording = simulation.record("rig.csv").expect("a possible recording");
+        assert_eq!(compare(&recording), (3, 3), "seed {seed}");
+        for (acc, gyr, mag) in [("T12", "G21", "X18"), ("I20", "G12", "M15")] {
+            let options = Options {
+                rig_acc: Some(acc),
+                rig_gyr: Some(gyr),
+                rig_mag: Some(mag),
+                multipliers: vec![4.0],
+                ..Options::default()
+            };
+            let calibration = calibrate(&recording, &options, &|_| {});
+            for outcome in &calibration.sensors {
+                let Some(accepted) = outcome.accepted() else { continue };
+                let fit = fits::compare(&recording, outcome).expect("a reference");
+                assert_eq!(fit.parameters.len(), accepted.parameters, "{}", outcome.model);
+                assert!(fit.passes(), "seed {seed}, {}: {fit:#?}", outcome.model);
+                let mut wrong = fit.clone();
+                let last = wrong.parameters.last_mut().expect("some");
+                last.device += (0.25 * last.std).max(2.5 * fits::FLOOR * last.scale);
+                assert!(!wrong.passes(), "{}: {wrong:#?}", outcome.model);
+            }
+        }
     }
 }
 

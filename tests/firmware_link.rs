@@ -114,7 +114,7 @@ fn record_corrector_and_fits_stay_within_their_flash() {
         let flash = correct.flash - empty.flash;
         announce(&format!(
             "size: {core}: decode and apply take {flash} B of flash and {} B of static RAM over an empty image \
-             (budget {budget} B); with encode {} B",
+             (budget {budget} B); with encode and a swarm {} B",
             correct.ram - empty.ram,
             gate.flash - empty.flash,
         ));

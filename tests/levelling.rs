@@ -7,10 +7,7 @@ use imucal_host::{
         ladder::{Rung, rung},
     },
     observe::pose::Poses,
-    recording::{
-        SensorKind,
-        manifest::{Axis, Rig, RigKind},
-    },
+    recording::SensorKind,
 };
 use imucal_tests::{
     rig::{Draw, ZYX, angles, cube, moments, poses, rms},
@@ -171,7 +168,7 @@ fn poses_that_cannot_tell_the_tilt_from_k_keep_the_level_base_with_a_warning() {
     let noisy = fitted("I14", &poses(&draw.triad(DOWN, 0.5), ZYX, &at, SIGMA, &mut draw)).fit;
     assert!(noisy.held.iter().any(|(entry, _)| *entry == 12) || noisy.std(12).is_some_and(|std| std > 0.03));
 
-    let calibration = calibrate(&recorded_at(&at), &Options::default(), &|_| {});
+    let calibration = calibrate(&simulated::on_rig(&at), &Options::default(), &|_| {});
     let acc = calibration.sensor(SensorKind::Acc).expect("recorded");
     assert_eq!(acc.model, "T12");
     assert!(acc.accepted().is_some_and(|fit| fit.rig.as_ref().is_some_and(|rig| rig.tilt.is_none())));
@@ -183,37 +180,10 @@ fn poses_that_cannot_tell_the_tilt_from_k_keep_the_level_base_with_a_warning() {
 fn the_same_poses_with_one_in_general_position_tell_the_tilt() {
     let mut draw = Draw::new(4);
     let at: Vec<_> = cube().iter().take(16).map(angles).chain([angles(&draw.attitude())]).collect();
-    let calibration = calibrate(&recorded_at(&at), &Options::default(), &|_| {});
+    let calibration = calibrate(&simulated::on_rig(&at), &Options::default(), &|_| {});
     assert_eq!(calibration.sensor(SensorKind::Acc).expect("recorded").model, "I14");
 }
 
 fn about(axis: Vector3<f64>, turns: f64) -> Rotation3<f64> {
     Rotation3::new(axis * turns * std::f64::consts::TAU)
-}
-
-/// A recording of a rig on a level base that stands 4 s at each of these angles, 10 s at the first.
-fn recorded_at(at: &[Vector3<f64>]) -> imucal_host::recording::Recording {
-    let gimbals = |t: f64| {
-        let since = (t - 10.0).max(0.0) / 6.0;
-        let from = (since.floor() as usize).min(at.len() - 1);
-        let share = ((since - from as f64) * 3.0).clamp(0.0, 1.0);
-        let (from, to) = (at[from], at[(from + 1).min(at.len() - 1)]);
-        from + (to - from) * (0.5 - 0.5 * (std::f64::consts::PI * share).cos())
-    };
-    let c_t_p = |t: f64| {
-        let angles = gimbals(t);
-        about(Vector3::z(), angles.x / std::f64::consts::TAU)
-            * about(Vector3::y(), angles.y / std::f64::consts::TAU)
-            * about(Vector3::x(), angles.z / std::f64::consts::TAU)
-    };
-    let duration = 10.0 + 6.0 * (at.len() - 1) as f64;
-    let mut recording = simulated::recorded(duration, |t| {
-        let (now, next) = (c_t_p(t), c_t_p(t + 1e-4));
-        let rate = (now.inverse() * next).scaled_axis() / 1e-4;
-        [now.inverse() * DOWN, rate, now.inverse() * Vector3::new(25.3, 2.6, 40.1)]
-    });
-    recording.gimbal = Some(recording.time.iter().map(|t| gimbals(*t).into()).collect());
-    let axes = Some(vec![Axis::Z, Axis::Y, Axis::X]);
-    recording.manifest.rig = Some(Rig { kind: RigKind::FlightMotionSimulator, axes });
-    recording
 }

@@ -2,7 +2,7 @@
 //! entries are held for any order of the rig's axes.
 
 use imucal_core::model::{
-    rig::{Axis, GimbalPose, RigAxes},
+    rig::{Axis, GimbalPose, Pose, RigAxes},
     unified::{Terms, UnifiedParameters},
 };
 use imucal_host::{

@@ -156,8 +156,8 @@ fn six_faces_are_refused_nine_parameters_and_granted_six() {
 
 #[test]
 fn a_recording_without_enough_rests_still_gives_its_magnetometer() {
-    // The gyroscope from rests alone; against the recording's reference attitude it is accepted.
-    let field = Options { rig_gyr: None, ..Options::default() };
+    // Gyroscope and magnetometer by their field forms; against the recording's reference attitude both are accepted.
+    let field = Options { rig_gyr: None, rig_mag: None, ..Options::default() };
     let Some(calibration) = calibrated("broad-01-undisturbed.csv.gz", &field) else { return };
     assert_eq!(refusal(&calibration, SensorKind::Acc).reason(), "too-few-observations");
     assert_eq!(refusal(&calibration, SensorKind::Gyr).reason(), "too-few-observations");

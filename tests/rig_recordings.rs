@@ -122,6 +122,28 @@ fn a_cubic_term_is_found_and_chosen() {
 }
 
 #[test]
+fn a_cubic_term_is_reported_with_what_a_record_leaves_of_it() {
+    let Some(folder) = data::folder() else { return };
+    let recording = Recording::read(&folder.join("blind/open-04.csv.gz")).expect("a good recording");
+    let options = Options {
+        rig_acc: Some("I20"),
+        skip: vec![SensorKind::Gyr, SensorKind::Mag],
+        multipliers: vec![4.0],
+        ..Options::default()
+    };
+    let calibration = calibrate(&recording, &options, &|_| {});
+    let higher = findings(&calibration, SensorKind::Acc).higher_order.as_ref().expect("estimated");
+    let names: Vec<_> = higher.terms.iter().map(|(name, ..)| *name).collect();
+    assert_eq!(names, ["quadratic", "cubic"]);
+    let (_, cubic, std) = &higher.terms[1];
+    assert!(cubic.z > 20.0 * std.z && cubic.x < 4.0 * std.x && cubic.y < 4.0 * std.y, "{cubic} ± {std}");
+    // The cube of gravity at a face, and the gain.
+    assert!((higher.uncorrected / (cubic.z * 9.8f64.powi(3)) - 1.0).abs() < 0.1, "{}", higher.uncorrected);
+    let table = imucal_host::report::table::table(&calibration);
+    assert!(table.contains("NOT stored") && table.contains("for a device acc=I14"), "{table}");
+}
+
+#[test]
 fn recordings_without_an_effect_of_the_ladder_s_are_not_driven_up_it() {
     if data::folder().is_none() {
         return;

@@ -20,6 +20,7 @@ pub mod fit;
 mod gate;
 pub mod replay;
 pub mod scene;
+pub mod search;
 #[cfg(target_os = "none")]
 pub mod stack;
 

@@ -14,6 +14,7 @@ mod containers;
 mod manifests;
 mod motions;
 mod mutations;
+mod rigs;
 mod samples;
 mod times;
 

@@ -1,7 +1,7 @@
 //! Poses on a rig, made directly from the model, and figures of many trials.
 
 use imucal_core::model::{
-    rig::{Axis, GimbalPose, RigAxes},
+    rig::{Axis, GimbalPose, Pose, RigAxes},
     unified::UnifiedParameters,
 };
 use imucal_host::observe::pose::Poses;

@@ -3,9 +3,10 @@
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
+use imucal_host::recording::manifest::{Axis, Rig, RigKind};
 use imucal_host::recording::{Recording, SensorKind};
 use imucal_host::simulator::{SimulatedUnit, Tumble, record};
-use nalgebra::{Unit, UnitQuaternion, Vector3};
+use nalgebra::{Rotation3, Unit, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -15,13 +16,17 @@ pub const RESTS: usize = 14;
 
 /// Tumbled through so many attitudes, at 50 Hz.
 pub fn tumbled(rests: usize, seed: u64) -> Recording {
-    let unit = SimulatedUnit { interval: 0.02, ..SimulatedUnit::mtx() };
-    record("small.csv", &Tumble::new(rests, seed), &unit, seed + 1)
+    record("small.csv", &Tumble::new(rests, seed), &unit(), seed + 1)
 }
 
 /// The small recording.
 pub fn small() -> Recording {
     tumbled(RESTS, 5)
+}
+
+/// The unit of the small recording, and of motions of one's own.
+pub fn unit() -> SimulatedUnit {
+    SimulatedUnit { interval: 0.02, ..SimulatedUnit::mtx() }
 }
 
 /// Writes the small recording as `small.csv` and `small.toml` into a folder.
@@ -42,7 +47,7 @@ pub fn write_small(folder: &Path) -> PathBuf {
 ///
 /// Where the manifest lacks a conversion.
 pub fn recorded(duration: f64, truth: impl Fn(f64) -> [Vector3<f64>; 3]) -> Recording {
-    let (unit, manifest) = (SimulatedUnit::mtx(), small().manifest);
+    let (unit, manifest) = (unit(), small().manifest);
     let mut rng = ChaCha8Rng::seed_from_u64(17);
     let time: Vec<f64> = (0..(duration * 50.0) as usize).map(|row| row as f64 * 0.02).collect();
     let rows: Vec<[Vector3<f64>; 3]> = time.iter().map(|t| truth(*t)).collect();
@@ -79,4 +84,32 @@ pub fn turned_about(axis: Vector3<f64>, start: UnitQuaternion<f64>, angle: f64, 
             to_q * Vector3::new(25.3, 2.6, 40.1),
         ]
     })
+}
+
+/// A recording of a rig, axes z, y, x, on a level base that stands 4 s at each of these angles, 10 s at the first.
+pub fn on_rig(at: &[Vector3<f64>]) -> Recording {
+    let gimbals = |t: f64| {
+        let since = (t - 10.0).max(0.0) / 6.0;
+        let from = (since.floor() as usize).min(at.len() - 1);
+        let share = ((since - from as f64) * 3.0).clamp(0.0, 1.0);
+        let (from, to) = (at[from], at[(from + 1).min(at.len() - 1)]);
+        from + (to - from) * (0.5 - 0.5 * (PI * share).cos())
+    };
+    let c_t_p = |t: f64| {
+        let angles = gimbals(t);
+        Rotation3::new(Vector3::z() * angles.x)
+            * Rotation3::new(Vector3::y() * angles.y)
+            * Rotation3::new(Vector3::x() * angles.z)
+    };
+    let duration = 10.0 + 6.0 * (at.len() - 1) as f64;
+    let mut recording = recorded(duration, |t| {
+        let (now, next) = (c_t_p(t), c_t_p(t + 1e-4));
+        let rate = (now.inverse() * next).scaled_axis() / 1e-4;
+        let down = Vector3::new(0.0, 0.0, -9.7997);
+        [now.inverse() * down, rate, now.inverse() * Vector3::new(25.3, 2.6, 40.1)]
+    });
+    recording.gimbal = Some(recording.time.iter().map(|t| gimbals(*t).into()).collect());
+    let axes = Some(vec![Axis::Z, Axis::Y, Axis::X]);
+    recording.manifest.rig = Some(Rig { kind: RigKind::FlightMotionSimulator, axes });
+    recording
 }

@@ -12,7 +12,7 @@ fn main() -> ! {
 #[cfg(target_os = "none")]
 fn runs() -> bool {
     use core::hint::black_box;
-    use firmware_example::{RECORD, correct};
+    use firmware_example::{RECORD, correct, search};
     use imucal_core::record;
     use nalgebra::Vector3;
 
@@ -25,6 +25,10 @@ fn runs() -> bool {
     let raw = black_box(Vector3::repeat(32_768.0));
     black_box(correct::apply(&corrector, &raw));
     black_box(correct::apply_at(&corrector, &raw, black_box(31.0)));
+
+    if !search::gyroscope(black_box(3)) {
+        return false;
+    }
 
     let mut page = [0xFF; record::MAX_LEN];
     record::decode(black_box(RECORD))

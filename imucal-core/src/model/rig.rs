@@ -1,4 +1,5 @@
-//! The geometry of a three-gimbal rig: from encoder angles to the rotations between its frames.
+//! Poses of a sensor whose attitude is known: the geometry of a three-gimbal rig, from encoder angles to the rotations
+//! between its frames, and attitudes that a reference gives as they are.
 //!
 //! ```text
 //! C_t_p = R_0(outer) · R_1(middle) · R_2(inner)
@@ -13,9 +14,9 @@
 //! Source: recording.md, frames. Not modelled: axes that are not at right angles, wobble, encoder errors: those are
 //! effects, not geometry.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Quaternion, Vector3};
 
-use crate::scalar::Scalar;
+use crate::{rotation::matrix, scalar::Scalar};
 
 /// An axis of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +34,52 @@ pub enum Axis {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RigAxes(pub [Axis; 3]);
+
+/// What a sensor put out at an attitude that is known.
+pub trait Pose<T: Scalar> {
+    /// What beside the pose itself its rotations follow from.
+    type Axes: Copy;
+
+    /// Mean sensor output, nominal SI, sensor axes.
+    fn value(&self) -> &Vector3<T>;
+
+    /// Rotations between base, gimbals and table.
+    fn rotations(&self, axes: &Self::Axes) -> PoseRotations<T>;
+}
+
+/// What a sensor put out at an attitude that an optical reference, or another, gives: 28 bytes in `f32`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReferencePose<T: Scalar> {
+    /// Sensor output, nominal SI, sensor axes.
+    pub value: Vector3<T>,
+    /// Takes components from the table (the body that the reference tracks) to the reference's frame, of unit length.
+    pub attitude: Quaternion<T>,
+}
+
+impl<T: Scalar> ReferencePose<T> {
+    /// The same pose in another precision.
+    pub fn cast<U: Scalar>(&self) -> ReferencePose<U> {
+        let cast = |x: T| U::of(x.wide());
+        ReferencePose {
+            value: self.value.map(cast),
+            attitude: Quaternion::from(self.attitude.coords.map(cast)),
+        }
+    }
+}
+
+impl<T: Scalar> Pose<T> for ReferencePose<T> {
+    type Axes = ();
+
+    fn value(&self) -> &Vector3<T> {
+        &self.value
+    }
+
+    /// There are no gimbals: what they would carry is nothing.
+    fn rotations(&self, (): &()) -> PoseRotations<T> {
+        let none = Matrix3::zeros();
+        PoseRotations { c_p_t: matrix(&self.attitude).transpose(), c_o_t: none, c_m_t: none }
+    }
+}
 
 /// What a sensor put out while the gimbals stood at some angles: 36 bytes in `f32`.
 ///
@@ -62,8 +109,26 @@ impl<T: Scalar> GimbalPose<T> {
         Self { value, sin: angles.map(|a| a.sin()), cos: angles.map(|a| a.cos()) }
     }
 
-    /// Rotations between the rig's frames.
-    pub fn rotations(&self, axes: &RigAxes) -> PoseRotations<T> {
+    /// The encoders' angles (outer, middle, inner), rad, in (−π, π].
+    pub fn angles(&self) -> Vector3<T> {
+        self.sin.zip_map(&self.cos, |sin, cos| sin.atan2(cos))
+    }
+
+    /// The same pose in another precision.
+    pub fn cast<U: Scalar>(&self) -> GimbalPose<U> {
+        let cast = |v: &Vector3<T>| v.map(|x| U::of(x.wide()));
+        GimbalPose { value: cast(&self.value), sin: cast(&self.sin), cos: cast(&self.cos) }
+    }
+}
+
+impl<T: Scalar> Pose<T> for GimbalPose<T> {
+    type Axes = RigAxes;
+
+    fn value(&self) -> &Vector3<T> {
+        &self.value
+    }
+
+    fn rotations(&self, axes: &RigAxes) -> PoseRotations<T> {
         let [outer, middle, inner] = axes.0;
         let r_0 = about(outer, self.sin.x, self.cos.x);
         let r_1 = about(middle, self.sin.y, self.cos.y);

@@ -1,4 +1,4 @@
-//! The unified model of a triad on a rig: one code path for accelerometer and magnetometer, and every rung of their
+//! The unified model of a triad at known attitudes, on a rig or along a reference: one code path for accelerometer and magnetometer, and every rung of their
 //! ladders.
 //!
 //! ```text
@@ -25,7 +25,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use super::{
     Model, RowSink,
     parameterisation::{matrix_by_rows, select, vector},
-    rig::{GimbalPose, PoseRotations, RigAxes},
+    rig::{GimbalPose, Pose, PoseRotations},
 };
 use crate::scalar::Scalar;
 
@@ -224,13 +224,13 @@ impl<const P: usize> Terms<P> {
     }
 }
 
-/// Poses on a rig, and the terms that are estimated from them.
+/// Poses on a rig or along a reference, and the terms that are estimated from them.
 #[derive(Clone, Copy, Debug)]
-pub struct UnifiedModel<'a, T: Scalar, const P: usize> {
+pub struct UnifiedModel<'a, T: Scalar, const P: usize, G: Pose<T> = GimbalPose<T>> {
     /// The poses.
-    pub poses: &'a [GimbalPose<T>],
-    /// The rig's axes.
-    pub axes: RigAxes,
+    pub poses: &'a [G],
+    /// The rig's axes; nothing where a reference gives the attitude.
+    pub axes: G::Axes,
     /// Values of the entries that are not estimated.
     pub base: UnifiedParameters<T>,
     /// Entries that are estimated.
@@ -240,7 +240,7 @@ pub struct UnifiedModel<'a, T: Scalar, const P: usize> {
     pub held: u32,
 }
 
-impl<T: Scalar, const P: usize> UnifiedModel<'_, T, P> {
+impl<T: Scalar, const P: usize, G: Pose<T>> UnifiedModel<'_, T, P, G> {
     /// Derivative of the three outputs by all entries.
     fn jacobian(
         &self,
@@ -293,7 +293,7 @@ impl<T: Scalar, const P: usize> UnifiedModel<'_, T, P> {
 
 type ByAll<T> = SMatrix<T, 3, UNIFIED>;
 
-impl<T: Scalar, const P: usize> Model<T, P> for UnifiedModel<'_, T, P> {
+impl<T: Scalar, const P: usize, G: Pose<T>> Model<T, P> for UnifiedModel<'_, T, P, G> {
     fn rows<S: RowSink<T, P>>(&self, theta: &SVector<T, P>, sink: &mut S) {
         let now = self.terms.parameters(&self.base, theta);
         let tilt = Tilt::new(now.tilt);
@@ -301,7 +301,7 @@ impl<T: Scalar, const P: usize> Model<T, P> for UnifiedModel<'_, T, P> {
             let rotations = pose.rotations(&self.axes);
             if S::JACOBIAN {
                 let (output, by) = self.jacobian(&now, &rotations, &tilt);
-                for ((out, measured), row) in output.iter().zip(pose.value.iter()).zip(by.row_iter()) {
+                for ((out, measured), row) in output.iter().zip(pose.value().iter()).zip(by.row_iter()) {
                     let mut row = select(&self.terms.entries, &row.transpose());
                     for (k, entry) in row.iter_mut().enumerate() {
                         if self.is_held(k) {
@@ -312,7 +312,7 @@ impl<T: Scalar, const P: usize> Model<T, P> for UnifiedModel<'_, T, P> {
                 }
             } else {
                 let output = now.output(&(now.sensitivity * now.sensed(&rotations, &tilt)));
-                for (out, measured) in output.iter().zip(pose.value.iter()) {
+                for (out, measured) in output.iter().zip(pose.value().iter()) {
                     sink.row(*out - *measured, &SVector::zeros());
                 }
             }
@@ -328,7 +328,11 @@ impl<T: Scalar, const P: usize> Model<T, P> for UnifiedModel<'_, T, P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{model::rig::Axis, solver::jacobian_check::largest_jacobian_error};
+    use crate::{
+        model::rig::{Axis, ReferencePose, RigAxes},
+        rotation::quaternion,
+        solver::jacobian_check::largest_jacobian_error,
+    };
     use proptest::prelude::*;
 
     const AXES: RigAxes = RigAxes([Axis::Z, Axis::Y, Axis::X]);
@@ -346,6 +350,24 @@ mod tests {
             let model = UnifiedModel { poses: &poses, axes: AXES, base, terms, held: 0 };
             prop_assert!(largest_jacobian_error(&model, &terms.theta(&base)) < 1e-8);
         }
+    }
+
+    #[test]
+    fn a_reference_s_attitude_is_as_good_as_the_angles_it_follows_from() {
+        let gimbals = GimbalPose::new(Vector3::new(0.1, 0.2, -0.3), &Vector3::new(0.4, -1.1, 2.3));
+        let c_t_p = gimbals.rotations(&AXES).c_p_t.transpose();
+        let pose = ReferencePose { value: gimbals.value, attitude: quaternion(&c_t_p) };
+        let base = UnifiedParameters::nominal(Vector3::new(0.2, 0.1, -1.0));
+        assert!(
+            (base.predict(&pose.rotations(&())) - base.predict(&gimbals.rotations(&AXES))).norm() < 1e-15
+        );
+        // Without gimbals there is nothing that their sources could do.
+        let poses = [pose];
+        let terms = Terms::new(core::array::from_fn::<u8, UNIFIED, _>(|k| k as u8));
+        let model = UnifiedModel { poses: &poses, axes: (), base, terms, held: 0 };
+        let (_, by) = model.jacobian(&base, &pose.rotations(&()), &Tilt::new(base.tilt));
+        assert_eq!(by.fixed_columns::<6>(17).amax(), 0.0);
+        assert!(largest_jacobian_error(&model, &terms.theta(&base)) < 1e-8);
     }
 
     #[test]

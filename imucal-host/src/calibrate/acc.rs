@@ -101,6 +101,7 @@ fn step<const P: usize>(
         squared_sum: 2.0 * fit.report.cost,
         rms: fit.rms(),
         held_out_rms: problem.leave_one_out_rms(&fit),
+        second_half_rms: None,
     }
 }
 
@@ -218,6 +219,7 @@ fn summary<const P: usize>(
         bias_wander: None,
         rig: None,
         alignment: None,
+        search: None,
     }
 }
 

@@ -26,6 +26,8 @@ pub struct Step {
     pub rms: f64,
     /// The same of observations left out in turn.
     pub held_out_rms: Option<f64>,
+    /// The same of the second half of the recording, by a fit to the first: a trajectory that the fit has not seen.
+    pub second_half_rms: Option<f64>,
 }
 
 /// A ladder, climbed.
@@ -98,6 +100,7 @@ mod tests {
             squared_sum,
             rms: (squared_sum / (90 - entries.len()) as f64).sqrt(),
             held_out_rms: Some(held_out),
+            second_half_rms: None,
         }
     }
 

@@ -5,7 +5,7 @@ use imucal_core::{
     coverage::Coverage,
     model::{parameterisation::FULL_GAIN, turn::TurnModel},
     observation::{Rest, Turn},
-    solver::{LevenbergMarquardt, lm::Settings},
+    solver::LevenbergMarquardt,
     triad::Triad,
 };
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
@@ -16,6 +16,7 @@ use super::{
     outcome::{BiasWander, Evidence, FitSummary, KnownTurn, Refused, SensorOutcome},
     outlier::outliers,
     rows::{Residuals, Rows},
+    search::{SWARM_OBSERVATIONS, Search, Searched},
 };
 use crate::{
     observe::turn::{BiasPath, TurnData, compress},
@@ -32,6 +33,8 @@ const LEAST_ANGLE: f64 = 0.26;
 const WANDER: f64 = 1.5;
 /// Largest rms error of a turn, rad (5.7°): beyond it axes are swapped or a unit is wrong.
 const LARGEST_RMS: f64 = 0.1;
+/// How far a swarm looks, each entry of the gain to either side of nominal: as far as a gain is plausible below it.
+const REACH: f64 = 0.5;
 
 /// What the gyroscope is calibrated from.
 #[derive(Clone, Copy, Debug)]
@@ -109,14 +112,20 @@ fn rest_bias(rests: &[Rest<f64>]) -> (Vector3<f64>, Vector3<f64>, BiasWander) {
     (bias, spread / count.sqrt(), BiasWander { spread, expected, interpolated })
 }
 
-fn solve(turns: &[Turn<'_, f64>], start: SVector<f64, 9>) -> LevenbergMarquardt<f64, 9> {
-    let mut solver = LevenbergMarquardt::new(start, Settings::default());
-    solver.run(&TurnModel { turns, form: FULL_GAIN });
-    solver
-}
-
-fn identity() -> SVector<f64, 9> {
-    FULL_GAIN.theta(&Triad::identity())
+/// From the nominal gain; a swarm looks at the shortest turns.
+fn solve(turns: &[Turn<'_, f64>]) -> (LevenbergMarquardt<f64, 9>, Search) {
+    let mut shortest = turns.to_vec();
+    shortest.sort_by_key(|turn| turn.blocks.len());
+    shortest.truncate(SWARM_OBSERVATIONS);
+    let searched = Searched {
+        model: &TurnModel { turns, form: FULL_GAIN },
+        cost: &TurnModel { turns: &shortest, form: FULL_GAIN },
+        start: FULL_GAIN.theta(&Triad::identity()),
+        reach: SVector::repeat(REACH),
+        rms: &|theta| rms(&turn_errors(turns, theta)),
+        limit: LARGEST_RMS,
+    };
+    searched.solve()
 }
 
 /// Chord between the carried and the measured direction of each turn, rad.
@@ -167,7 +176,7 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
     if let Err(refusal) = check_turns(input, &turns) {
         return refuse(refusal, None);
     }
-    let mut solver = solve(&input.with_directions(&turns.data), identity());
+    let (mut solver, mut search) = solve(&input.with_directions(&turns.data));
     let gross = outliers(&turn_errors(&input.with_directions(&turns.data), solver.theta()));
     for (index, size) in gross.iter().rev() {
         let turn = turns.data.remove(*index);
@@ -179,9 +188,9 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
     }
     let known = input.with_directions(&turns.data);
     if !gross.is_empty() {
-        solver = solve(&known, identity());
+        (solver, search) = solve(&known);
     }
-    let summary = summarise(input, &turns, &known, &solver);
+    let summary = summarise(input, &turns, &known, (&solver, search));
     match judge(&solver, &summary) {
         Ok(()) => SensorOutcome {
             kind: SensorKind::Gyr,
@@ -264,7 +273,7 @@ fn summarise(
     input: &GyrInput<'_>,
     turns: &Turns,
     known: &[Turn<'_, f64>],
-    solver: &LevenbergMarquardt<f64, 9>,
+    (solver, search): (&LevenbergMarquardt<f64, 9>, Search),
 ) -> FitSummary {
     let report = solver.report();
     let gain = FULL_GAIN.triad(solver.theta()).gain;
@@ -295,6 +304,7 @@ fn summarise(
         bias_wander: Some(turns.wander),
         rig: None,
         alignment: None,
+        search: Some(search),
     }
 }
 

@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use imucal_core::{model::parameterisation::FULL, observation::Moments};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-use rayon::prelude::*;
 
 use super::{
     gyr_path::{Still, Wander},
     gyr_rig_fit,
+    lag::Lag,
     outcome::BiasWander,
 };
 use crate::{
@@ -21,11 +21,6 @@ use crate::{
     simulator::truth::EARTH_RATE,
 };
 
-/// How far the clocks of sensor and optical reference are looked for apart, s, and the first step of that search.
-const LAG: f64 = 0.048;
-const LAG_STEP: f64 = 0.008;
-/// Halvings of the step: the last is an eighth of a millisecond.
-const LAG_HALVINGS: usize = 6;
 /// How far into a still stretch a motion reaches, s; to its middle where that is nearer.
 const MARGIN: f64 = 1.0;
 /// Fewer motions do not tell a lag beside the gain.
@@ -178,9 +173,6 @@ pub fn on_reference(
 }
 
 /// Motions along an optical reference whose clock is as far from the sensor's as fits best.
-///
-/// On the way, a lag of 4 ms at changes of rate of 1 rad/s is an error of 0.2°, more than an optical system's own. (At
-/// the rests of a rig it is none.)
 pub fn lagging(
     recording: &Recording,
     sensor: &Triple,
@@ -194,27 +186,9 @@ pub fn lagging(
         return plain;
     }
     let rms = |lag: f64| gyr_rig_fit::fit(&at(lag).data, FULL, plain.bias).rms;
-    let least = |lags: Vec<f64>| {
-        let all: Vec<(f64, f64)> = lags.into_par_iter().map(|lag| (rms(lag), lag)).collect();
-        all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
-    };
-    let steps = (LAG / LAG_STEP).round() as i32;
-    let Some(mut best) = least((-steps..=steps).map(|k| f64::from(k) * LAG_STEP).collect()) else {
-        return plain;
-    };
-    if best.1.abs() > LAG - 0.5 * LAG_STEP {
-        let note = format!("no lag within {LAG} s of the reference fits best; none is taken out");
-        return Observations { notes: [plain.notes, vec![note]].concat(), ..plain };
-    }
-    let mut step = LAG_STEP;
-    for _ in 0..LAG_HALVINGS {
-        step *= 0.5;
-        let beside = least(vec![best.1 - step, best.1 + step]).filter(|other| other.0 < best.0);
-        best = beside.unwrap_or(best);
-    }
-    let mut found = at(best.1);
-    let words = if best.1 < 0.0 { "ahead of" } else { "behind" };
-    found.notes.push(format!("the sensor is {:.1} ms {words} the reference; taken out", 1e3 * best.1.abs()));
+    let lag = Lag::of(rms, rms);
+    let mut found = if let Lag::Found(lag) = lag { at(lag) } else { plain };
+    found.notes.push(lag.note());
     found
 }
 

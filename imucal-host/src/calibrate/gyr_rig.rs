@@ -17,10 +17,10 @@ use imucal_core::{
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{
-    Options, compare,
+    Options,
     gyr_motions::{Observations, lagging, on_encoders},
-    gyr_rig_fit::{self, LARGEST_RMS, MotionFit, REACH, Search},
-    outcome::{Calibration, FitSummary, Refused, RigFindings, SensorOutcome},
+    gyr_rig_fit::{self, LARGEST_RMS, MotionFit},
+    outcome::{Calibration, Evidence, FitSummary, Refused, RigFindings, SensorOutcome},
 };
 use crate::{
     noise::Span,
@@ -40,14 +40,14 @@ const LEAST_MOTIONS: usize = 8;
 /// A motion tells something of the gain once it turns by this much, rad (5°).
 const LEAST_ANGLE: f64 = 0.087;
 
-/// Calibrates against attitudes; `None` where the recording has none, or the field form is asked for.
+/// Calibrates against attitudes, and gives what it is calibrated from; `None` where the recording has none, or the field form is asked for.
 pub fn gyroscope(
     recording: &Recording,
     sensor: &Triple,
     usable: &[bool],
     options: &Options,
     calibration: &mut Calibration,
-) -> Option<SensorOutcome> {
+) -> Option<(SensorOutcome, Option<Observations>)> {
     let name = options.rig_gyr?;
     let observations = if recording.gimbal.is_some() {
         match pose::axes_and_encoders(recording) {
@@ -63,7 +63,7 @@ pub fn gyroscope(
             }
         }
     } else {
-        lagging(recording, sensor, usable, &motion::of_reference(recording.reference.as_deref()?))
+        lagging(recording, sensor, usable, &motion::along_reference(recording, &mut calibration.warnings)?)
     };
     if recording.manifest.site.latitude_deg.is_none() {
         calibration.warnings.push(
@@ -72,16 +72,13 @@ pub fn gyroscope(
         );
     }
     if let Err(refusal) = check(&observations, name) {
-        return Some(refused(name, refusal, None));
+        return Some((refused(name, refusal, None), None));
     }
-    if options.compare {
-        calibration.comparisons.extend(comparison(&observations));
-    }
-    Some(outcome(name, sensor, &observations))
+    Some((outcome(name, sensor, &observations), Some(observations)))
 }
 
 /// Motions that turn, and enough of them.
-fn check(observations: &Observations, name: &str) -> Result<(), Refusal> {
+pub(super) fn check(observations: &Observations, name: &str) -> Result<(), Refusal> {
     let need = if name == G21 { 2 * LEAST_MOTIONS } else { LEAST_MOTIONS };
     let telling = observations.data.iter().filter(|d| d.turned().norm() > LEAST_ANGLE).count();
     match telling {
@@ -91,29 +88,13 @@ fn check(observations: &Observations, name: &str) -> Result<(), Refusal> {
     }
 }
 
-fn fit(name: &str, observations: &Observations) -> MotionFit {
+pub(super) fn fit(name: &str, observations: &Observations) -> MotionFit {
     let (data, bias) = (&observations.data, observations.bias);
     if name == G21 {
         gyr_rig_fit::fit(data, FULL_WITH_SENSITIVITY, bias)
     } else {
         gyr_rig_fit::fit(data, FULL, bias)
     }
-}
-
-/// Nominal, bias only, G12 and, where there are motions enough, G21; all over the motions that G12 keeps.
-fn comparison(observations: &Observations) -> Option<compare::Comparison> {
-    let full = fit(G12, observations);
-    let mut steps = Vec::from(gyr_rig_fit::lower_steps(&observations.data, &full.kept, observations.bias));
-    steps.push(full.step(G12, "gain"));
-    if check(observations, G21).is_ok() {
-        let kept = full.kept.iter().map(|k| observations.data[*k].clone()).collect();
-        let same = Observations { data: kept, ..observations.clone() };
-        let with = fit(G21, &same);
-        if with.gross.is_empty() {
-            steps.push(with.step(G21, "g-sensitivity"));
-        }
-    }
-    compare::climb(SensorKind::Gyr, steps)
 }
 
 fn outcome(name: &'static str, sensor: &Triple, observations: &Observations) -> SensorOutcome {
@@ -125,7 +106,10 @@ fn outcome(name: &'static str, sensor: &Triple, observations: &Observations) -> 
             model: name,
             verdict: Ok(()),
             fit: Some(summary),
-            evidence: None,
+            evidence: Some(Evidence::Motions {
+                data: fit.kept.iter().map(|k| observations.data[*k].clone()).collect(),
+                fit: Box::new(fit),
+            }),
         },
         Err(refusal) => refused(name, refusal, Some(summary)),
     }
@@ -179,15 +163,7 @@ fn summarise(fit: &MotionFit, sensor: &Triple, observations: &Observations) -> F
         let from = observations.data[*k].rows.start;
         format!("motion from row {from}: {size:.1} robust standard deviations")
     }));
-    let mut notes = observations.notes.clone();
-    notes.push(match fit.search {
-        Search::Direct => "found by Levenberg–Marquardt from the static bias".into(),
-        Search::Swarm => format!(
-            "found by a particle swarm (gain within ±{}, bias within ±{:.0} °/s), polished by Levenberg–Marquardt",
-            REACH.0,
-            REACH.1.to_degrees()
-        ),
-    });
+    let notes = observations.notes.clone();
     let sensitivity = (fit.entries.len() == 21).then(|| {
         let at = |of: &dyn Fn(usize) -> f64| Matrix3::from_fn(|i, j| of(12 + 3 * i + j));
         (at(&|k| fit.parameters[k]), at(&std))
@@ -217,6 +193,7 @@ fn summarise(fit: &MotionFit, sensor: &Triple, observations: &Observations) -> F
         bias_wander: observations.wander,
         rig: Some(RigFindings { notes, g_sensitivity: sensitivity, ..RigFindings::default() }),
         alignment: None,
+        search: Some(fit.search),
     }
 }
 

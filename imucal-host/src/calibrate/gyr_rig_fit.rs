@@ -5,27 +5,20 @@
 //! motion's length, so that a motion weighs as the inverse square root of it.
 
 use imucal_core::{
-    model::{
-        Cost, Model, Parameterisation, RowSink,
-        attitude::{AttitudeModel, AttitudePass},
-        parameterisation::FULL,
-    },
+    model::{Model, Parameterisation, RowSink, attitude::AttitudeModel, parameterisation::FULL},
     observation::Motion,
-    solver::{
-        LevenbergMarquardt, SolveReport,
-        lm::Settings,
-        swarm::{self, Bounds, Swarm},
-    },
+    scalar::Scalar,
+    solver::{LevenbergMarquardt, SolveReport, lm::Settings},
     triad::Triad,
 };
 use nalgebra::{DMatrix, SMatrix, SVector, Vector3};
-use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
 use super::{
     compare::Step,
     norm_fit::dynamic,
     outlier::outliers,
     rows::{Residuals, Rows, influence},
+    search::{SWARM_OBSERVATIONS, Search, Searched},
 };
 use crate::observe::motion::MotionData;
 
@@ -34,39 +27,30 @@ pub const LARGEST_RMS: f64 = 0.1;
 /// How far a swarm looks: each entry of the gain, of the bias (rad/s; 10 °/s) and of the g-sensitivity (rad/s per
 /// m/s²) to either side of its start.
 pub const REACH: (f64, f64, f64) = (0.2, 0.175, 2e-3);
-/// Particles of a swarm, and the motions it looks at, the shortest: a basin needs no more.
-const PARTICLES: usize = 40;
-const SWARM_MOTIONS: usize = 20;
 /// Rounds of leaving gross outliers out.
 const ROUNDS: usize = 3;
 
-/// How the fit was reached.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Search {
-    /// Levenberg–Marquardt from the static bias.
-    Direct,
-    /// A particle swarm, whose best Levenberg–Marquardt then polished.
-    Swarm,
-}
-
 /// Motions with their weights.
 #[derive(Clone, Copy, Debug)]
-struct Weighted<'a, const P: usize> {
-    motions: &'a [Motion<'a, f64>],
-    weights: &'a [f64],
-    form: Parameterisation<P>,
+pub struct Weighted<'a, const P: usize, T: Scalar = f64> {
+    /// The motions.
+    pub motions: &'a [Motion<'a, T>],
+    /// Factor on each one's residuals.
+    pub weights: &'a [T],
+    /// What is estimated.
+    pub form: Parameterisation<P>,
 }
 
 /// Passes rows on, times a weight.
-struct Scaled<'a, S> {
+struct Scaled<'a, S, T> {
     sink: &'a mut S,
-    weight: f64,
+    weight: T,
 }
 
-impl<const P: usize, S: RowSink<f64, P>> RowSink<f64, P> for Scaled<'_, S> {
+impl<const P: usize, T: Scalar, S: RowSink<T, P>> RowSink<T, P> for Scaled<'_, S, T> {
     const JACOBIAN: bool = S::JACOBIAN;
 
-    fn row(&mut self, residual: f64, jacobian: &SVector<f64, P>) {
+    fn row(&mut self, residual: T, jacobian: &SVector<T, P>) {
         self.sink.row(residual * self.weight, &(jacobian * self.weight));
     }
 }
@@ -78,8 +62,8 @@ impl<'a, const P: usize> Weighted<'a, P> {
     }
 }
 
-impl<const P: usize> Model<f64, P> for Weighted<'_, P> {
-    fn rows<S: RowSink<f64, P>>(&self, theta: &SVector<f64, P>, sink: &mut S) {
+impl<const P: usize, T: Scalar> Model<T, P> for Weighted<'_, P, T> {
+    fn rows<S: RowSink<T, P>>(&self, theta: &SVector<T, P>, sink: &mut S) {
         for (motion, weight) in self.motions.iter().zip(self.weights) {
             let model = AttitudeModel { motions: std::slice::from_ref(motion), form: self.form };
             model.rows(theta, &mut Scaled { sink: &mut *sink, weight: *weight });
@@ -160,12 +144,13 @@ impl MotionFit {
             squared_sum: self.squared_sum,
             rms: self.rms,
             held_out_rms: self.held_out_rms,
+            second_half_rms: None,
         }
     }
 }
 
 /// Weight of each motion: the square root of the mean duration over its own.
-fn weights(data: &[&MotionData]) -> Vec<f64> {
+pub fn weights(data: &[&MotionData]) -> Vec<f64> {
     let mean = data.iter().map(|d| d.duration()).sum::<f64>() / data.len().max(1) as f64;
     data.iter().map(|d| (mean / d.duration()).sqrt()).collect()
 }
@@ -200,7 +185,7 @@ pub fn fit<const P: usize>(data: &[MotionData], form: Parameterisation<P>, bias:
         let motions: Vec<_> = used.iter().map(|d| d.motion()).collect();
         let weights = weights(&used);
         let model = Weighted { motions: &motions, weights: &weights, form };
-        let (solver, search) = solve(&model, &used, start);
+        let (solver, search) = searching(&model, &used, start, |searched| searched.solve());
         let errors = errors(&model, solver.theta());
         let out = outliers(&errors);
         if out.is_empty() || round == ROUNDS {
@@ -224,55 +209,35 @@ pub fn search<const P: usize>(
     let motions: Vec<_> = used.iter().map(|d| d.motion()).collect();
     let weights = weights(&used);
     let model = Weighted { motions: &motions, weights: &weights, form };
-    let best = scout(&model, &used, &form.theta(&Triad { bias, ..Triad::identity() }))?;
-    let mut solver = LevenbergMarquardt::new(best, Settings::default());
-    solver.run(&model);
-    Some(summarise(&model, &solver, Search::Swarm, (0..data.len()).collect(), Vec::new()))
+    let start = form.theta(&Triad { bias, ..Triad::identity() });
+    let (solver, swarm) = searching(&model, &used, start, |searched| searched.swarm())?;
+    let search = Search { direct: (solver.report().termination, f64::NAN), swarm: Some(swarm) };
+    Some(summarise(&model, &solver, search, (0..data.len()).collect(), Vec::new()))
 }
 
-/// Levenberg–Marquardt from the start; where that ends badly, a swarm, then Levenberg–Marquardt from its best.
-fn solve<const P: usize>(
+/// Does something with the search from `start`; a swarm looks at the shortest motions.
+fn searching<const P: usize, R>(
     model: &Weighted<'_, P>,
     used: &[&MotionData],
     start: SVector<f64, P>,
-) -> (LevenbergMarquardt<f64, P>, Search) {
-    let polish = |from| {
-        let mut solver = LevenbergMarquardt::new(from, Settings::default());
-        solver.run(model);
-        let rms = unweighted(&errors(model, solver.theta()), model.weights);
-        (solver, rms)
-    };
-    let (direct, first) = polish(start);
-    if direct.report().termination.was_successful() && first <= LARGEST_RMS {
-        return (direct, Search::Direct);
-    }
-    let Some(best) = scout(model, used, &start) else { return (direct, Search::Direct) };
-    let (polished, second) = polish(best);
-    // NaN of the first is worse than anything.
-    if second < first || first.is_nan() { (polished, Search::Swarm) } else { (direct, Search::Direct) }
-}
-
-/// A swarm's best over the shortest motions; `None` where no particle has a finite cost.
-fn scout<const P: usize>(
-    model: &Weighted<'_, P>,
-    used: &[&MotionData],
-    start: &SVector<f64, P>,
-) -> Option<SVector<f64, P>> {
+    then: impl FnOnce(&Searched<'_, Weighted<'_, P>, AttitudeModel<'_, f64, P>, P>) -> R,
+) -> R {
     let mut shortest = used.to_vec();
     shortest.sort_by(|a, b| a.duration().total_cmp(&b.duration()));
-    let motions: Vec<_> = shortest.iter().take(SWARM_MOTIONS).map(|d| d.motion()).collect();
-    let cost = AttitudeModel { motions: &motions, form: model.form };
+    let motions: Vec<_> = shortest.iter().take(SWARM_OBSERVATIONS).map(|d| d.motion()).collect();
     let reach = SVector::from_fn(|k, _| match model.form.entries()[k] {
         0..9 => REACH.0,
         9..12 => REACH.1,
         _ => REACH.2,
     });
-    let bounds = Bounds::around(start, &reach)?;
-    let mut swarm = Swarm::<f64, PARTICLES, P, AttitudePass<f64>>::new(bounds, swarm::Settings::default());
-    // The same recording gives the same answer.
-    swarm.run(&cost, &mut ChaCha8Rng::seed_from_u64(1));
-    let best = *swarm.best();
-    cost.cost(&best).is_finite().then_some(best)
+    then(&Searched {
+        model,
+        cost: &AttitudeModel { motions: &motions, form: model.form },
+        start,
+        reach,
+        rms: &|theta| unweighted(&errors(model, theta), model.weights),
+        limit: LARGEST_RMS,
+    })
 }
 
 fn summarise<const P: usize>(
@@ -333,45 +298,28 @@ fn held_out<const P: usize, A: Model<f64, P>>(
     Some(rms(held?.into_iter()))
 }
 
-/// Steps of a comparison below the fits: nothing estimated, and the bias alone, over the motions that `kept` names.
-pub fn lower_steps(data: &[MotionData], kept: &[usize], bias: Vector3<f64>) -> [Step; 2] {
-    let used: Vec<&MotionData> = kept.iter().map(|k| &data[*k]).collect();
+/// Sum of weighted squares and rms attitude error, rad, of motions under parameters that are given.
+pub fn score<const P: usize>(
+    data: &[MotionData],
+    form: Parameterisation<P>,
+    theta: &SVector<f64, P>,
+) -> (f64, f64) {
+    let used: Vec<&MotionData> = data.iter().collect();
+    let motions: Vec<_> = used.iter().map(|d| d.motion()).collect();
+    let weights = weights(&used);
+    let errors = errors(&Weighted { motions: &motions, weights: &weights, form }, theta);
+    (errors.iter().map(|e| e * e).sum(), unweighted(&errors, &weights))
+}
+
+/// The bias alone, gain nominal, rad/s, and the held-out rms attitude error, rad.
+pub fn bias_alone(data: &[MotionData], bias: Vector3<f64>) -> (Vector3<f64>, Option<f64>) {
+    let used: Vec<&MotionData> = data.iter().collect();
     let motions: Vec<_> = used.iter().map(|d| d.motion()).collect();
     let weights = weights(&used);
     let model = Weighted { motions: &motions, weights: &weights, form: FULL };
-    let nominal = errors(&model, &FULL.theta(&Triad::identity()));
-    let rms_nominal = unweighted(&nominal, &weights);
     let only = BiasOnly(model);
     let mut solver = LevenbergMarquardt::new(bias, Settings::default());
     solver.run(&only);
-    let errors = lengths(&Residuals::of(&only, solver.theta()));
-    let step = |name, adds, entries: Vec<u8>, squared_sum, rms, held_out_rms| Step {
-        name,
-        adds,
-        free: entries.len(),
-        entries,
-        residuals: 3 * used.len(),
-        squared_sum,
-        rms,
-        held_out_rms,
-    };
-    let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
-    [
-        step(
-            "-",
-            "nothing: as the sheet says",
-            Vec::new(),
-            squares(&nominal),
-            rms_nominal,
-            Some(rms_nominal),
-        ),
-        step(
-            "B3",
-            "bias",
-            vec![9, 10, 11],
-            squares(&errors),
-            unweighted(&errors, &weights),
-            held_out(&only, solver.theta(), used.len(), |k| BiasOnly(model.only(k))),
-        ),
-    ]
+    let held = held_out(&only, solver.theta(), used.len(), |k| BiasOnly(model.only(k)));
+    (Vector3::from(*solver.theta()), held)
 }

@@ -104,15 +104,6 @@ pub fn rung_from(name: &str, poses: &Poses, base: &UnifiedParameters<f64>) -> Op
 impl Rung {
     /// The rung as a comparison takes it.
     pub fn step(&self) -> Step {
-        Step {
-            name: self.name,
-            adds: self.adds,
-            entries: self.fit.entries.clone(),
-            free: self.fit.free(),
-            residuals: self.fit.residuals,
-            squared_sum: self.fit.squared_sum,
-            rms: self.fit.rms,
-            held_out_rms: self.fit.held_out_rms,
-        }
+        self.fit.step(self.name, self.adds)
     }
 }

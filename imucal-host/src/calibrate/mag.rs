@@ -4,9 +4,8 @@ use imucal_core::{
     accept::{Limits, Refusal},
     model::parameterisation::UPPER_TRIANGULAR,
     observation::ShellPoint,
-    triad::Triad,
 };
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, Matrix3, SVector, Vector3};
 use rayon::prelude::*;
 
 use super::{
@@ -83,7 +82,7 @@ fn fit(points: &[ShellPoint<f64>], sensor: &Triple, field: Option<f64>) -> Resul
     summary.coverage = coverage.share;
     summary.nonlinearity = bend;
     if field.is_none() {
-        to_unit_determinant(&mut summary, &problem, &fit.covariance(&inflation), sensor);
+        to_unit_determinant(&mut summary, norm);
     }
     let evidence = Evidence::Shell {
         norm,
@@ -128,11 +127,12 @@ fn summarise(
         bias_wander: None,
         rig: None,
         alignment: None,
+        search: None,
     }
 }
 
 /// Points left out, those in a row as one: a magnet near by takes hundreds.
-fn stretches(left_out: &[(usize, f64)]) -> Vec<String> {
+pub(super) fn stretches(left_out: &[(usize, f64)]) -> Vec<String> {
     left_out
         .chunk_by(|a, b| b.0 == a.0 + 1)
         .map(|stretch| {
@@ -147,33 +147,39 @@ fn stretches(left_out: &[(usize, f64)]) -> Vec<String> {
         .collect()
 }
 
-/// Gauge of a magnetometer alone: gain of determinant 1, so that the field's length is what the cloud shows.
+/// Gauge of a magnetometer in a field of unknown length: gain of determinant 1, so that the field's length is what the
+/// sensor shows. `norm` is that length in the fit's own gauge, nominal SI.
 ///
 /// `A' = A / d`, d = det(A)^⅓; errors follow by `dA' = (dA − A · ⅓ tr(A⁻¹ dA)) / d`.
-fn to_unit_determinant(
-    summary: &mut FitSummary,
-    problem: &NormProblem<'_, 9>,
-    covariance: &SMatrix<f64, 9, 9>,
-    sensor: &Triple,
-) {
+pub(super) fn to_unit_determinant(summary: &mut FitSummary, norm: f64) {
     let gain = summary.triad.gain;
     let d = gain.determinant().cbrt();
     let Some(inverse) = gain.try_inverse() else { return };
-    let jacobian = SMatrix::<f64, 9, 9>::from_columns(&std::array::from_fn::<_, 9, _>(|k| {
-        let unit = SVector::<f64, 9>::from_fn(|row, _| f64::from(u8::from(row == k)));
-        let by = problem.form.triad(&unit);
-        let moved = (by.gain - gain * ((inverse * by.gain).trace() / 3.0)) / d;
-        problem.form.theta(&Triad { gain: moved, bias: by.bias })
-    }));
-    let covariance = jacobian * covariance * jacobian.transpose();
-    let std = problem.form.triad(&covariance.diagonal().map(f64::sqrt));
-    summary.covariance = dynamic(&covariance);
+    let entries = summary.covariance_of.clone();
+    let place = |entry: u8| (usize::from(entry) / 3, usize::from(entry) % 3);
+    let jacobian = DMatrix::from_fn(entries.len(), entries.len(), |row, column| {
+        let same = f64::from(u8::from(row == column));
+        if entries[row] > 8 || entries[column] > 8 {
+            return same;
+        }
+        let ((i, j), (k, l)) = (place(entries[row]), place(entries[column]));
+        // tr(A⁻¹ dA) of a unit entry (k, l) is that of the inverse at (l, k).
+        (same - gain[(i, j)] * inverse[(l, k)] / 3.0) / d
+    });
+    summary.covariance = &jacobian * &summary.covariance * jacobian.transpose();
+    for (k, entry) in entries.iter().enumerate() {
+        let std = summary.covariance[(k, k)].max(0.0).sqrt();
+        match entry {
+            0..9 => summary.gain_std[place(*entry)] = std,
+            _ => summary.bias_std[usize::from(*entry) - 9] = std,
+        }
+    }
+    let per_unit = summary.nominal.per_unit.abs();
     summary.triad.gain = gain / d;
-    (summary.gain_std, summary.bias_std) = (std.gain, std.bias);
-    summary.field_norm = Some(problem.norm / d * sensor.nominal.per_unit.abs());
-    summary.unit_out = sensor.unit;
-    summary.rms *= sensor.nominal.per_unit.abs();
-    summary.held_out_rms = summary.held_out_rms.map(|rms| rms * sensor.nominal.per_unit.abs());
+    summary.field_norm = Some(norm / d * per_unit);
+    summary.unit_out = summary.unit_in;
+    summary.rms *= per_unit;
+    summary.held_out_rms = summary.held_out_rms.map(|rms| rms * per_unit);
 }
 
 fn advice(refusal: &Refusal) -> String {

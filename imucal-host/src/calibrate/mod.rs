@@ -17,18 +17,23 @@ pub mod acc;
 pub mod alignment;
 pub mod compare;
 pub mod gyr;
+pub mod gyr_ladder;
 pub mod gyr_motions;
 pub mod gyr_path;
 pub mod gyr_rig;
 pub mod gyr_rig_fit;
 pub mod ladder;
+pub mod lag;
 pub mod mag;
+pub mod mag_reference;
 pub mod norm_fit;
 pub mod outcome;
 pub mod outlier;
+pub mod reference_fit;
 pub mod rig;
 pub mod rig_fit;
 pub mod rows;
+pub mod search;
 pub mod segmentation;
 pub mod serial;
 
@@ -49,7 +54,7 @@ pub struct Options {
     pub rig_acc: Option<&'static str>,
     /// The gyroscope's model of [`gyr_rig::MODELS`] where the recording has attitudes; `None` for the field form.
     pub rig_gyr: Option<&'static str>,
-    /// The magnetometer's rung of [`ladder::MAGNETOMETER`]; `None` for the field form.
+    /// The magnetometer's rung of [`ladder::MAGNETOMETER`] where the recording has attitudes; `None` for the field form.
     pub rig_mag: Option<&'static str>,
     /// Climb the ladders and say which rung to use.
     pub compare: bool,
@@ -88,7 +93,8 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         progress("fitting the magnetometer");
         let field = recording.manifest.site.field_ned_ut.map(|f| Vector3::from(f).norm());
         let usable = usable(&integrity, SensorKind::Mag, recording.rows());
-        let on_rig = rig::magnetometer(recording, mag, &usable, options, &mut calibration);
+        let on_rig = rig::magnetometer(recording, mag, &usable, options, &mut calibration)
+            .or_else(|| mag_reference::magnetometer(recording, mag, &usable, options, &mut calibration));
         let outcome = on_rig.unwrap_or_else(|| {
             let mut outcome = mag::calibrate(mag, &usable, field);
             if outcome.verdict.is_ok()
@@ -162,12 +168,20 @@ fn inertial(
     calibration: &mut Calibration,
 ) {
     let wanted = recording.gyr.as_ref().filter(|_| !options.skip.contains(&SensorKind::Gyr));
-    let gyr_on_rig = wanted.and_then(|gyr| {
-        progress("fitting the gyroscope");
-        let usable = usable(integrity, SensorKind::Gyr, recording.rows());
-        gyr_rig::gyroscope(recording, gyr, &usable, options, calibration)
-    });
+    let (gyr_on_rig, motions) = wanted
+        .and_then(|gyr| {
+            progress("fitting the gyroscope");
+            let usable = usable(integrity, SensorKind::Gyr, recording.rows());
+            gyr_rig::gyroscope(recording, gyr, &usable, options, calibration)
+        })
+        .unzip();
+    let motions = motions.flatten().filter(|_| options.compare);
+    let compare_gyr = |calibration: &mut Calibration, field: FieldForm<'_>| {
+        let comparison = motions.as_ref().and_then(|motions| gyr_ladder::comparison(motions, field));
+        calibration.comparisons.extend(comparison);
+    };
     let Some(acc) = &recording.acc else {
+        compare_gyr(calibration, &|_| None);
         let without = || wanted.map(|_| gyr::without_accelerometer(Refusal::NoRest));
         calibration.sensors.extend(gyr_on_rig.or_else(without));
         return;
@@ -197,6 +211,7 @@ fn inertial(
     );
     let cuts = segmentation::cuts(&detector, &options.multipliers, gravity);
     let Some(chosen) = segmentation::choose(&cuts) else {
+        compare_gyr(calibration, &|_| None);
         calibration.sensors.extend(gyr_on_rig);
         return;
     };
@@ -221,10 +236,15 @@ fn inertial(
             segmentation::comparable(&cuts).filter_map(|cut| Some(cut.fit?.0.gain.diagonal())).collect();
         fit.gain_spread = Some(outcome::gain_spread(gains.iter().copied()));
     }
+    let usable = self::usable(integrity, SensorKind::Gyr, recording.rows());
+    compare_gyr(calibration, &|until| {
+        let (gyr, acc) = (wanted?, acc_outcome.accepted()?);
+        let shared = GyrShared { recording, gyr, usable: &usable, interval };
+        shared.before(until.unwrap_or(usize::MAX), chosen, &acc.triad, &result.used)
+    });
     let gyr_outcome = gyr_on_rig.or_else(|| {
         let gyr = wanted?;
         progress("fitting the gyroscope");
-        let usable = self::usable(integrity, SensorKind::Gyr, recording.rows());
         let shared = GyrShared { recording, gyr, usable: &usable, interval };
         Some(match (&acc_outcome.verdict, acc_outcome.fit.as_ref()) {
             (Ok(()), Some(fit)) => shared.outcome(chosen, &cuts, &fit.triad, &result.used, &mut trials),
@@ -253,6 +273,9 @@ fn never_moved(rests: &[std::ops::Range<usize>], rows: usize) -> bool {
     matches!(rests, [only] if only.len() as f64 > ALL * rows as f64)
 }
 
+/// Gives a gyroscope's field form of the rests before a row, or of all.
+type FieldForm<'a> = &'a dyn Fn(Option<usize>) -> Option<Triad<f64>>;
+
 /// What all of a gyroscope's fits share.
 struct GyrShared<'a> {
     recording: &'a Recording,
@@ -273,6 +296,15 @@ impl GyrShared<'_> {
             used,
             acc,
         }
+    }
+
+    /// The field form of the rests that end before a row.
+    fn before(&self, row: usize, cut: &Cut, acc: &Triad<f64>, used: &[usize]) -> Option<Triad<f64>> {
+        let count = cut.rows.partition_point(|rest| rest.end <= row);
+        let used: Vec<usize> = used.iter().copied().filter(|k| *k < count).collect();
+        let whole = self.input(cut, acc, &used);
+        let input = gyr::GyrInput { rows: &cut.rows[..count], rests: &cut.rests[..count], ..whole };
+        gyr::calibrate(&input).accepted().map(|fit| fit.triad)
     }
 
     fn outcome(

@@ -158,7 +158,7 @@ impl<const P: usize> NormProblem<'_, P> {
     pub fn inflation(&self, fit: &NormFit<P>) -> SVector<f64, P> {
         match fit.solver.factor().covariance(1.0) {
             Some(unscaled) if self.serial => {
-                serial::inflation(&Rows::of(&self.model(&fit.points), fit.solver.theta()), &unscaled)
+                serial::inflation(&Rows::of(&self.model(&fit.points), fit.solver.theta()), &unscaled, 1)
             }
             _ => SVector::repeat(1.0),
         }

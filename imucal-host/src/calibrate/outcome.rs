@@ -1,11 +1,15 @@
 //! What a calibration came to: for each sensor a fit with its figures, accepted or refused with a reason.
 
-use imucal_core::{accept::Refusal, observation::ShellPoint, solver::Termination, triad::Triad};
+use imucal_core::{
+    accept::Refusal, model::rig::ReferencePose, observation::ShellPoint, solver::Termination, triad::Triad,
+};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use super::{alignment::Alignment, compare::Comparison};
+use super::{
+    alignment::Alignment, compare::Comparison, gyr_rig_fit::MotionFit, rig_fit::RigFit, search::Search,
+};
 use crate::{
-    observe::turn::TurnData,
+    observe::{motion::MotionData, pose::Poses, turn::TurnData},
     recording::{Nominal, SensorKind, Unit},
 };
 
@@ -61,6 +65,17 @@ pub enum Evidence {
     },
     /// Turns of a gyroscope.
     Turns(Vec<KnownTurn>),
+    /// Motions of a gyroscope between known attitudes.
+    Motions {
+        /// Motions used.
+        data: Vec<MotionData>,
+        /// The fit, its covariance over all entries.
+        fit: Box<MotionFit>,
+    },
+    /// Poses on a rig and their fit.
+    Gimbals(Poses, Box<RigFit>),
+    /// Samples along a reference and their fit.
+    Reference(Vec<ReferencePose<f64>>, Box<RigFit>),
 }
 
 /// A turn and the directions at its ends, calibrated axes.
@@ -134,6 +149,8 @@ pub struct FitSummary {
     pub rig: Option<RigFindings>,
     /// Rotation of a magnetometer into the accelerometer's axes, where the rests told it.
     pub alignment: Option<Alignment>,
+    /// How a gyroscope's fit was reached.
+    pub search: Option<Search>,
 }
 
 /// What a fit on a rig found of the machine: reported, and never stored in a sensor's record.
@@ -149,8 +166,19 @@ pub struct RigFindings {
     pub not_told: Vec<String>,
     /// How a fit against attitudes was made, in words.
     pub notes: Vec<String>,
+    /// Terms beyond gain and bias, where they were estimated.
+    pub higher_order: Option<HigherOrder>,
     /// The gyroscope's g-sensitivity, table axes in, raw rad/s per m/s², with standard errors, where it was estimated.
     pub g_sensitivity: Option<(Matrix3<f64>, Matrix3<f64>)>,
+}
+
+/// Terms that a record has no room for.
+#[derive(Clone, Debug)]
+pub struct HigherOrder {
+    /// Name, value on each axis and standard errors; 1/SI, cubic ones 1/SI².
+    pub terms: Vec<(&'static str, Vector3<f64>, Vector3<f64>)>,
+    /// Most that gain and bias alone leave of them at a pose, calibrated unit.
+    pub uncorrected: f64,
 }
 
 /// How a bias moved from rest to rest.

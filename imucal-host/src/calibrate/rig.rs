@@ -3,14 +3,16 @@
 use imucal_core::{
     accept::{self, Limits, Refusal},
     coverage::Coverage,
-    model::unified::UnifiedParameters,
+    model::{rig::Pose, unified::UnifiedParameters},
 };
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::{
     Options, compare,
     ladder::{self, Rung},
-    outcome::{Calibration, FitSummary, Refused, RigFindings, SensorOutcome, entry_name},
+    outcome::{
+        Calibration, Evidence, FitSummary, HigherOrder, Refused, RigFindings, SensorOutcome, entry_name,
+    },
     rig_fit::RigFit,
 };
 use crate::{
@@ -152,20 +154,30 @@ fn poses(
     calibration: &mut Calibration,
 ) -> Option<Poses> {
     recording.gimbal.as_ref()?;
-    match pose::poses(recording, sensor, usable) {
-        Ok(poses) => Some(poses),
-        Err(why) => {
-            let warning = format!("the rig is not used: {why}");
-            if !calibration.warnings.contains(&warning) {
-                calibration.warnings.push(warning);
-            }
-            None
+    let found = pose::poses(recording, sensor, usable);
+    let warning = match &found {
+        Err(why) => Some(format!("the rig is not used: {why}")),
+        Ok(poses) => {
+            let (locked, all) = (poses.in_gimbal_lock(), poses.poses.len());
+            (2 * locked > all).then(|| {
+                format!(
+                    "{locked} of {all} poses are in gimbal lock: outer and inner gimbal turn about one axis there, and \
+                     two angles tell what one does; turn the middle gimbal away from it"
+                )
+            })
         }
-    }
+    };
+    calibration.warnings.extend(warning.filter(|warning| !calibration.warnings.contains(warning)));
+    found.ok()
 }
 
 fn too_few(kind: SensorKind, name: &'static str, poses: &Poses) -> SensorOutcome {
     refused(kind, name, Refusal::TooFewObservations { have: poses.poses.len(), need: LEAST_POSES }, None)
+}
+
+/// What the affine part of a rung is judged by.
+pub(super) fn limits() -> Limits {
+    Limits { observations: LEAST_POSES, directions: LEAST_POSES, ..Limits::for_norm(12, LEAST_POSES) }
 }
 
 /// The outcome of one rung.
@@ -174,15 +186,23 @@ fn outcome(kind: SensorKind, rung: &Rung, poses: &Poses, sensor: &Triple, norm: 
         let directions = poses.poses.iter().map(|pose| triad.correct(&pose.value).normalize());
         let coverage = Coverage::of(directions);
         let unit_out = Unit::of(kind)[0];
-        (summarise(rung, sensor, unit_out, triad, covariance, coverage.share), coverage)
+        let mut summary = summarise(&rung.fit, sensor, unit_out, triad, covariance, coverage.share);
+        if let Some(rig) = &mut summary.rig {
+            rig.higher_order = higher_order(&rung.fit, poses);
+        }
+        (summary, coverage)
     });
     let Some((summary, coverage)) = summary else {
         return refused(kind, rung.name, Refusal::NotFinite, None);
     };
     match judge(&rung.fit, &summary, &coverage, norm) {
-        Ok(()) => {
-            SensorOutcome { kind, model: rung.name, verdict: Ok(()), fit: Some(summary), evidence: None }
-        }
+        Ok(()) => SensorOutcome {
+            kind,
+            model: rung.name,
+            verdict: Ok(()),
+            fit: Some(summary),
+            evidence: Some(Evidence::Gimbals(poses.clone(), Box::new(rung.fit.clone()))),
+        },
         Err(refusal) => refused(kind, rung.name, refusal, Some(summary)),
     }
 }
@@ -216,8 +236,7 @@ fn refused(
 }
 
 fn judge(fit: &RigFit, summary: &FitSummary, coverage: &Coverage<f64>, norm: f64) -> Result<(), Refusal> {
-    let limits =
-        Limits { observations: LEAST_POSES, directions: LEAST_POSES, ..Limits::for_norm(12, LEAST_POSES) };
+    let limits = limits();
     accept::check_observations(coverage, fit.free(), &limits)?;
     if fit.residuals <= fit.free() {
         let need = fit.free() / 3 + 1;
@@ -227,15 +246,15 @@ fn judge(fit: &RigFit, summary: &FitSummary, coverage: &Coverage<f64>, norm: f64
     accept::check_plausibility(&summary.triad, true, fit.rms / norm, &limits)
 }
 
-fn summarise(
-    rung: &Rung,
+/// The figures of a fit; `triad` and `covariance` are [`RigFit::triad`]'s.
+pub(super) fn summarise(
+    fit: &RigFit,
     sensor: &Triple,
     unit_out: Unit,
     triad: imucal_core::triad::Triad<f64>,
     covariance: DMatrix<f64>,
     coverage: f64,
 ) -> FitSummary {
-    let fit = &rung.fit;
     let std = |k: usize| covariance[(k, k)].sqrt();
     FitSummary {
         triad,
@@ -262,6 +281,7 @@ fn summarise(
         bias_wander: None,
         rig: Some(findings(fit)),
         alignment: None,
+        search: None,
     }
 }
 
@@ -285,6 +305,24 @@ fn findings(fit: &RigFit) -> RigFindings {
             .collect(),
         ..RigFindings::default()
     }
+}
+
+/// Quadratic, cubic and cross terms, and what a device leaves of them; `None` where none is estimated.
+fn higher_order(fit: &RigFit, poses: &Poses) -> Option<HigherOrder> {
+    let now = &fit.parameters;
+    let all =
+        [("quadratic", 23, now.quadratic), ("cubic", 26, now.cubic), ("cross-axis", 29, now.cross_product)];
+    let std = |from: u8| Vector3::from_fn(|k, _| fit.std(from + k as u8).unwrap_or(0.0));
+    let estimated = all.into_iter().filter(|(_, from, _)| fit.entries.contains(from));
+    let terms: Vec<_> = estimated.map(|(name, from, value)| (name, value, std(from))).collect();
+    let gain = now.sensitivity.try_inverse().filter(|_| !terms.is_empty())?;
+    let none = Vector3::zeros();
+    let affine = UnifiedParameters { quadratic: none, cubic: none, cross_product: none, ..*now };
+    let left = poses.poses.iter().map(|pose| {
+        let at = pose.rotations(&poses.axes);
+        (gain * (now.predict(&at) - affine.predict(&at))).norm()
+    });
+    Some(HigherOrder { terms, uncorrected: left.fold(0.0, f64::max) })
 }
 
 /// Name of an entry of the unified model.

@@ -1,13 +1,19 @@
 //! A fit of the unified model to poses on a rig: gauge, standard errors, held-out residuals.
 
 use imucal_core::{
-    model::unified::{Terms, UnifiedModel, UnifiedParameters},
+    model::{
+        rig::{GimbalPose, Pose},
+        unified::{Terms, UnifiedModel, UnifiedParameters},
+    },
     solver::{LevenbergMarquardt, SolveReport, gauge::Gauge, lm::Settings},
     triad::Triad,
 };
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
 
-use super::rows::{Residuals, Rows, influence};
+use super::{
+    compare::Step,
+    rows::{Residuals, Rows, influence},
+};
 use crate::{
     noise::{self, Noise},
     observe::pose::Poses,
@@ -40,9 +46,32 @@ pub struct RigFit {
     pub residuals: usize,
 }
 
+/// Where a fit ended, and what the poses told of it.
+pub(super) struct Solved<'a, const P: usize, G: Pose<f64>> {
+    /// The model, with what is held.
+    pub model: UnifiedModel<'a, f64, P, G>,
+    /// The solver at its end.
+    pub solver: LevenbergMarquardt<f64, P>,
+    /// What the poses do not tell.
+    pub gauge: Gauge<f64, P>,
+}
+
 /// Fits `terms` from `base`.
 pub fn fit<const P: usize>(poses: &Poses, base: &UnifiedParameters<f64>, terms: Terms<P>) -> RigFit {
-    let free = UnifiedModel { poses: &poses.poses, axes: poses.axes, base: *base, terms, held: 0 };
+    let outer = Vector3::ith(poses.axes.0[0] as usize, 1.0);
+    summarise(poses, &solve(&poses.poses, poses.axes, base, terms, Some(outer)))
+}
+
+/// Solves for `terms` from `base`, holds what the poses do not tell, and keeps a field that is known at its length.
+/// `outer` is the rig's outer axis.
+pub(super) fn solve<'a, const P: usize, G: Pose<f64>>(
+    poses: &'a [G],
+    axes: G::Axes,
+    base: &UnifiedParameters<f64>,
+    terms: Terms<P>,
+    outer: Option<Vector3<f64>>,
+) -> Solved<'a, P, G> {
+    let free = UnifiedModel { poses, axes, base: *base, terms, held: 0 };
     let mut solver = LevenbergMarquardt::new(terms.theta(base), Settings::default());
     solver.run(&free);
     let gauge = Gauge::of(solver.factor().r(), TOLERANCE, |k| terms.class(k));
@@ -57,15 +86,15 @@ pub fn fit<const P: usize>(poses: &Poses, base: &UnifiedParameters<f64>, terms: 
         solver.run(&model);
     }
     let found = terms.parameters(base, solver.theta());
-    let Some(field) = of_known_length(poses, base, &found, &terms, &gauge) else {
-        return summarise(poses, &model, &solver, &gauge);
+    let Some(field) = of_known_length(outer, base, &found, &terms, &gauge) else {
+        return Solved { model, solver, gauge };
     };
     // Held anew where the field has its length: K and sources are then those of the field that is known.
     let model = UnifiedModel { base: UnifiedParameters { vector_n: field, ..*base }, ..model };
     let start = terms.theta(&UnifiedParameters { vector_n: field, ..found });
     solver = LevenbergMarquardt::new(start, Settings::default());
     solver.run(&model);
-    summarise(poses, &model, &solver, &gauge)
+    Solved { model, solver, gauge }
 }
 
 /// The field that is known, where what was found of it allows; `None` where nothing of it is held.
@@ -75,7 +104,7 @@ pub fn fit<const P: usize>(poses: &Poses, base: &UnifiedParameters<f64>, terms: 
 /// K and the sources with them: by 8e-4 for half a degree at a declination of 5°. So the field keeps its length, and
 /// where its direction is told but in part, that part by a heading of the base.
 fn of_known_length<const P: usize>(
-    poses: &Poses,
+    outer: Option<Vector3<f64>>,
     base: &UnifiedParameters<f64>,
     found: &UnifiedParameters<f64>,
     terms: &Terms<P>,
@@ -85,10 +114,7 @@ fn of_known_length<const P: usize>(
     let (known, now) = (base.vector_n, found.vector_n);
     let field = match (0..P).filter(of_field).count() {
         1 => now * (known.norm() / now.norm()),
-        2 => {
-            let outer = Vector3::ith(poses.axes.0[0] as usize, 1.0);
-            headed(&known, &outer.cross(&now))?
-        }
+        2 => headed(&known, &outer?.cross(&now))?,
         _ => return None,
     };
     field.iter().all(|x| x.is_finite()).then_some(field)
@@ -110,38 +136,40 @@ fn headed(known: &Vector3<f64>, normal: &Vector3<f64>) -> Option<Vector3<f64>> {
     Some(field)
 }
 
-fn summarise<const P: usize>(
-    poses: &Poses,
-    model: &UnifiedModel<'_, f64, P>,
-    solver: &LevenbergMarquardt<f64, P>,
-    gauge: &Gauge<f64, P>,
-) -> RigFit {
-    let entries = model.terms.entries();
+impl<const P: usize, G: Pose<f64>> Solved<'_, P, G> {
+    /// The fit, with these standard errors (zero where held) and this residual of what was left out.
+    pub fn fit(&self, mut covariance: DMatrix<f64>, held_out_rms: Option<f64>) -> RigFit {
+        let Self { model, solver, gauge } = self;
+        let entries = model.terms.entries();
+        let held: Vec<usize> = (0..P).filter(|k| gauge.is_held(*k)).collect();
+        for k in &held {
+            covariance.column_mut(*k).fill(0.0);
+            covariance.row_mut(*k).fill(0.0);
+        }
+        let like = |k: &usize| (entries[*k], gauge.like[*k].map(|like| entries[usize::from(like)]));
+        RigFit {
+            parameters: model.terms.parameters(&model.base, solver.theta()),
+            entries: entries.to_vec(),
+            held: held.iter().map(like).collect(),
+            report: solver.report(),
+            covariance,
+            rms: solver.variance().map_or(f64::NAN, f64::sqrt),
+            held_out_rms,
+            squared_sum: 2.0 * solver.report().cost,
+            residuals: 3 * model.poses.len(),
+        }
+    }
+}
+
+fn summarise<const P: usize>(poses: &Poses, solved: &Solved<'_, P, GimbalPose<f64>>) -> RigFit {
+    let Solved { model, solver, gauge } = solved;
     let held: Vec<usize> = (0..P).filter(|k| gauge.is_held(*k)).collect();
     let rows = Rows::of(model, solver.theta());
     let covariance = covariance(poses, &rows, &held).unwrap_or_else(|| {
-        let mut white = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
-        for k in &held {
-            white.column_mut(*k).fill(0.0);
-            white.row_mut(*k).fill(0.0);
-        }
+        let white = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
         DMatrix::from_column_slice(P, P, white.as_slice())
     });
-    let parameters = model.terms.parameters(&model.base, solver.theta());
-    RigFit {
-        parameters,
-        entries: entries.to_vec(),
-        held: held
-            .iter()
-            .map(|k| (entries[*k], gauge.like[*k].map(|like| entries[usize::from(like)])))
-            .collect(),
-        report: solver.report(),
-        covariance,
-        rms: solver.variance().map_or(f64::NAN, f64::sqrt),
-        held_out_rms: held_out(model, solver.theta()),
-        squared_sum: 2.0 * solver.report().cost,
-        residuals: 3 * model.poses.len(),
-    }
+    solved.fit(covariance, held_out(model, solver.theta()))
 }
 
 /// Covariance A V Aᵀ of least squares, A = (JᵀJ)⁻¹Jᵀ, for noise that drifts; zero where held. `None` where the rows do
@@ -181,6 +209,21 @@ fn held_out<const P: usize>(model: &UnifiedModel<'_, f64, P>, theta: &SVector<f6
 }
 
 impl RigFit {
+    /// The fit as a rung of a comparison.
+    pub fn step(&self, name: &'static str, adds: &'static str) -> Step {
+        Step {
+            name,
+            adds,
+            entries: self.entries.clone(),
+            free: self.free(),
+            residuals: self.residuals,
+            squared_sum: self.squared_sum,
+            rms: self.rms,
+            held_out_rms: self.held_out_rms,
+            second_half_rms: None,
+        }
+    }
+
     /// Parameters that were estimated and not held.
     pub fn free(&self) -> usize {
         self.entries.len() - self.held.len()
@@ -193,9 +236,10 @@ impl RigFit {
     }
 
     /// Gain and bias of the triad, nominal SI in, table axes out, and their covariance in the order gain by rows,
-    /// bias. By `dG = −G dK G`.
+    /// bias. By `dG = −G dK G`; where one component of the field e is held so that |e| is, also by `dG = −G (e·de)/|e|²`.
     pub fn triad(&self) -> Option<(Triad<f64>, DMatrix<f64>)> {
         let gain = self.parameters.sensitivity.try_inverse()?;
+        let length_held = self.held.iter().filter(|(entry, _)| (14..17).contains(entry)).count() == 1;
         let mut jacobian = DMatrix::zeros(12, self.entries.len());
         for (column, entry) in self.entries.iter().enumerate() {
             match usize::from(*entry) {
@@ -204,6 +248,10 @@ impl RigFit {
                     jacobian.set_column(column, &pad(&by));
                 }
                 k @ 9..12 => jacobian[(k, column)] = 1.0,
+                k @ 14..17 if length_held => {
+                    let field = self.parameters.vector_n;
+                    jacobian.set_column(column, &pad(&(gain * (-field[k - 14] / field.norm_squared()))));
+                }
                 _ => {}
             }
         }

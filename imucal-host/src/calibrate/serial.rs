@@ -12,10 +12,17 @@ use super::rows::Rows;
 /// Fewer blocks say nothing of their spread.
 const LEAST_BLOCKS: usize = 20;
 
-/// Factor on each parameter's standard error, at least 1. `unscaled` is (JᵀJ)⁻¹; rows are in time order.
-pub fn inflation<const P: usize>(rows: &Rows<P>, unscaled: &SMatrix<f64, P, P>) -> SVector<f64, P> {
-    let influence = rows.residuals.iter().zip(&rows.jacobian).map(|(r, j)| unscaled * j * *r).collect();
-    blocked_ratio(influence).map(|ratio| ratio.max(1.0).sqrt())
+/// Factor on each parameter's standard error, at least 1. `unscaled` is (JᵀJ)⁻¹; rows are in time order, `each` of them
+/// an observation: the axes of a vector are no neighbours in time.
+pub fn inflation<const P: usize>(
+    rows: &Rows<P>,
+    unscaled: &SMatrix<f64, P, P>,
+    each: usize,
+) -> SVector<f64, P> {
+    let influence: Vec<SVector<f64, P>> =
+        rows.residuals.iter().zip(&rows.jacobian).map(|(r, j)| unscaled * j * *r).collect();
+    blocked_ratio(influence.chunks_exact(each).map(|of_one| of_one.iter().sum()).collect())
+        .map(|ratio| ratio.max(1.0).sqrt())
 }
 
 /// Variance of each series' sum over that of an independent series of the same spread. All share one length of
@@ -27,7 +34,9 @@ fn blocked_ratio<const P: usize>(mut sums: Vec<SVector<f64, P>>) -> SVector<f64,
         sums = sums.chunks_exact(2).map(|pair| pair[0] + pair[1]).collect();
         let blocks = sums.len() as f64;
         // The sums add up to nothing at the optimum, which takes one of their degrees of freedom.
-        let wider = squares(&sums).component_div(&single) * (blocks / (blocks - 1.0));
+        let freedom = blocks / (blocks - 1.0);
+        // What is held is influenced by nothing.
+        let wider = squares(&sums).zip_map(&single, |b, s| if s > 0.0 { b / s * freedom } else { 1.0 });
         if !wider.iter().all(|w| w.is_finite()) {
             break;
         }

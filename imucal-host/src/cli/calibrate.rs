@@ -19,7 +19,7 @@ pub(super) struct Arguments {
     /// The recording: NAME.csv, NAME.csv.gz (or NAME.parquet), with NAME.toml beside it
     recording: PathBuf,
     /// Models, e.g. acc=T9,gyr=K9,mag=E9; acc=T6 fits six parameters from six faces; on a rig acc=I14 (T12, I17, I20,
-    /// I23), gyr=G12 (G21) and mag=X18 (M12, M15, X21). A sensor named here must be accepted for the program to end with 0
+    /// I23), gyr=G12 (G21) and mag=X21 (M12, M15, X18); along an optical reference gyr=G12 (G21) and mag=M15 (M12). A sensor named here must be accepted for the program to end with 0
     #[arg(long, value_delimiter = ',', value_parser = model)]
     model: Vec<(SensorKind, ModelChoice)>,
     /// Write the calibration for people
@@ -132,13 +132,15 @@ fn check_rig(recording: &Recording, models: &[(SensorKind, ModelChoice)]) -> any
     for (kind, choice) in models {
         let ModelChoice::Rig(name) = choice else { continue };
         let file = &recording.name;
-        if *kind == SensorKind::Gyr && recording.gimbal.is_none() && recording.reference.is_some() {
-            continue;
-        }
-        if let Err(why) = pose::axes_and_encoders(recording) {
-            anyhow::bail!(
-                "{file}: --model {kind}={name} needs a rig: {why}; leave it out for the field form"
-            );
+        let along_reference = recording.gimbal.is_none() && recording.reference.is_some();
+        match (kind, *name) {
+            (SensorKind::Gyr, _) | (SensorKind::Mag, "M15") if along_reference => continue,
+            (SensorKind::Mag, "X18" | "X21") if along_reference => anyhow::bail!(
+                "{file}: --model mag={name} has hard iron on gimbals, and a reference attitude has no gimbals; \
+                 use mag=M15, or mag=M12 where the reference's frame is north, east, down"
+            ),
+            (SensorKind::Mag, _) if along_reference => {}
+            _ => on_gimbals(recording, *kind, name)?,
         }
         if *kind == SensorKind::Mag && recording.manifest.site.field_ned_ut.is_none() {
             anyhow::bail!(
@@ -148,6 +150,14 @@ fn check_rig(recording: &Recording, models: &[(SensorKind, ModelChoice)]) -> any
         }
     }
     Ok(())
+}
+
+/// The recording has the encoders of a rig.
+fn on_gimbals(recording: &Recording, kind: SensorKind, name: &str) -> anyhow::Result<()> {
+    pose::axes_and_encoders(recording).map(|_| ()).map_err(|why| {
+        let file = &recording.name;
+        anyhow::anyhow!("{file}: --model {kind}={name} needs a rig: {why}; leave it out for the field form")
+    })
 }
 
 /// Each sensor has one model.

@@ -7,7 +7,7 @@ use clap::Args;
 use super::{Ending, load, output::say, progress::Progress, read, refuse, warn};
 use crate::{
     apply,
-    calibrate::{AccModel, Options, calibrate},
+    calibrate::{AccModel, Options, calibrate, gyr_rig, ladder},
     equivalence::{FitEquivalence, SampleEquivalence, fits, samples},
     recording::{Recording, SensorKind},
     report::table::words,
@@ -56,17 +56,31 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     Ok(if passed { Ending::Done } else { Ending::Refused })
 }
 
-/// Fits again whatever the recording and the calibration share.
+/// Fits again whatever the recording and the calibration share, by the models that the calibration names.
 fn refit(recording: &Recording, stored: &StoredCalibration) -> Vec<FitEquivalence> {
-    let acc = stored.acc.as_ref().is_some_and(|t| t.model == AccModel::T6.name());
-    let options = Options { acc: if acc { AccModel::T6 } else { AccModel::T9 }, ..Options::default() };
-    let calibration = calibrate(recording, &options, &|_| {});
+    let calibration = calibrate(recording, &options(stored), &|_| {});
     calibration
         .sensors
         .iter()
         .filter(|outcome| stored.triad(outcome.kind).is_some())
         .filter_map(|outcome| fits::compare(recording, outcome))
         .collect()
+}
+
+/// The models of a stored calibration; a name that stands on no ladder is that of a field form.
+fn options(stored: &StoredCalibration) -> Options {
+    let rung = |kind: SensorKind, ladder: &[(&'static str, &str)]| {
+        let model = stored.triad(kind).map(|triad| triad.model.clone())?;
+        ladder.iter().find(|(name, _)| *name == model).map(|(name, _)| *name)
+    };
+    let six = stored.triad(SensorKind::Acc).is_some_and(|triad| triad.model == AccModel::T6.name());
+    Options {
+        acc: if six { AccModel::T6 } else { AccModel::T9 },
+        rig_acc: rung(SensorKind::Acc, &ladder::ACCELEROMETER),
+        rig_gyr: rung(SensorKind::Gyr, &gyr_rig::MODELS),
+        rig_mag: rung(SensorKind::Mag, &ladder::MAGNETOMETER),
+        ..Options::default()
+    }
 }
 
 fn print_samples(s: &SampleEquivalence) -> anyhow::Result<()> {

@@ -41,8 +41,36 @@ const RETAINED: f64 = 1e-4;
 pub struct Driver {
     /// Its name in the report.
     pub name: String,
-    /// What the functions are, and their values.
-    pub functions: Vec<(String, Vec<f64>)>,
+    /// Its functions.
+    pub functions: Vec<Function>,
+}
+
+/// A function of the block.
+#[derive(Clone, Debug)]
+pub struct Function {
+    /// What it is.
+    pub detail: String,
+    /// Its values.
+    pub values: Vec<f64>,
+    /// The one axis of a sensor that may follow it; `None` for any.
+    pub of: Option<(SensorKind, usize)>,
+}
+
+impl Function {
+    fn new(detail: impl Into<String>, values: Vec<f64>) -> Self {
+        Self { detail: detail.into(), values, of: None }
+    }
+}
+
+impl Driver {
+    /// Places of its columns for a sensor: function and axis.
+    fn columns(&self, kind: SensorKind) -> Vec<(usize, usize)> {
+        let axes = (0..self.functions.len()).flat_map(|function| (0..3).map(move |axis| (function, axis)));
+        let wanted = |(function, axis): &(usize, usize)| {
+            self.functions[*function].of.is_none_or(|of| of == (kind, *axis))
+        };
+        axes.filter(wanted).collect()
+    }
 }
 
 /// How a sensor's residual follows a driver.
@@ -60,8 +88,8 @@ pub struct Following {
     pub p_value: f64,
 }
 
-/// The drivers of a scene: those that vary in it.
-pub fn drivers(scene: &Scene<'_>) -> Vec<Driver> {
+/// The drivers of a scene: those that vary in it. `given` is what each sensor puts out, block by block.
+pub fn drivers(scene: &Scene<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Driver> {
     let swings: Vec<[Swing; 3]> =
         scene.blocks.iter().map(|b| scene.swings[(b.rows.start + b.rows.end) / 2]).collect();
     let mut drivers = Vec::new();
@@ -69,10 +97,10 @@ pub fn drivers(scene: &Scene<'_>) -> Vec<Driver> {
         let mut functions = Vec::new();
         for (order, harmonic) in HARMONICS.iter().enumerate() {
             let angle = |s: &[Swing; 3]| (order + 1) as f64 * s[gimbal].angle;
+            let detail = format!("{harmonic} harmonic");
             functions
-                .push((format!("{harmonic} harmonic"), swings.iter().map(|s| libm::cos(angle(s))).collect()));
-            functions
-                .push((format!("{harmonic} harmonic"), swings.iter().map(|s| libm::sin(angle(s))).collect()));
+                .push(Function::new(detail.clone(), swings.iter().map(|s| libm::cos(angle(s))).collect()));
+            functions.push(Function::new(detail, swings.iter().map(|s| libm::sin(angle(s))).collect()));
         }
         drivers.push(Driver { name: format!("gimbal_{name}"), functions });
     }
@@ -89,30 +117,35 @@ pub fn drivers(scene: &Scene<'_>) -> Vec<Driver> {
     let duration = scene.duration().max(1.0);
     let wave = |order: usize| {
         let values = scene.blocks.iter().map(|b| libm::cos(PI * order as f64 * b.time / duration)).collect();
-        (format!("{order} half-waves"), values)
+        Function::new(format!("{order} half-waves"), values)
     };
     drivers.push(Driver { name: "time".into(), functions: (1..=WAVES).map(wave).collect() });
     if let Some(temperature) = temperature(scene) {
         let square = temperature.iter().map(|t| t * t).collect();
         let rate = rates(scene, &temperature);
-        let functions = vec![("linear".to_owned(), temperature), ("quadratic".to_owned(), square)];
+        let functions = vec![Function::new("linear", temperature), Function::new("quadratic", square)];
         drivers.push(Driver { name: "temperature".into(), functions });
-        drivers.push(Driver { name: "temperature_rate".into(), functions: vec![("linear".into(), rate)] });
+        drivers
+            .push(Driver { name: "temperature_rate".into(), functions: vec![Function::new("linear", rate)] });
     }
     drivers.push(approach(&swings));
+    drivers.push(input(given));
     drivers.retain_mut(|driver| {
-        driver.functions.retain_mut(|(_, values)| standardise(values));
+        driver.functions.retain_mut(|function| standardise(&mut function.values));
         !driver.functions.is_empty()
     });
     drivers
 }
 
-fn per_gimbal(name: &str, swings: &[[Swing; 3]], of: &[(&str, &dyn Fn(&Swing) -> f64)]) -> Driver {
+/// A function of a gimbal's swing, and what it is.
+type OfSwing<'a> = (&'a str, &'a dyn Fn(&Swing) -> f64);
+
+fn per_gimbal(name: &str, swings: &[[Swing; 3]], of: &[OfSwing<'_>]) -> Driver {
     let mut functions = Vec::new();
     for (gimbal, which) in ["outer", "middle", "inner"].iter().enumerate() {
         for (detail, value) in of {
             let values = swings.iter().map(|s| value(&s[gimbal])).collect();
-            functions.push((format!("{which} gimbal, {detail}"), values));
+            functions.push(Function::new(format!("{which} gimbal, {detail}"), values));
         }
     }
     Driver { name: name.into(), functions }
@@ -131,9 +164,31 @@ fn approach(swings: &[[Swing; 3]]) -> Driver {
                 last
             })
             .collect();
-        (format!("{which} gimbal"), values)
+        Function::new(format!("{which} gimbal"), values)
     });
     Driver { name: "direction_of_approach".into(), functions: functions.collect() }
+}
+
+/// What each axis itself senses, by the Legendre polynomials of degree two to six: none of the affine part.
+fn input(given: &[Vec<Vector3<f64>>; 3]) -> Driver {
+    let mut functions = Vec::new();
+    for (kind, axis) in SensorKind::ALL.into_iter().flat_map(|kind| (0..3).map(move |axis| (kind, axis))) {
+        let sensed: Vec<f64> = given[kind as usize].iter().map(|value| value[axis]).collect();
+        let largest = sensed.iter().fold(f64::MIN_POSITIVE, |most, value| most.max(value.abs()));
+        let (mut before, mut here) = (vec![1.0; sensed.len()], sensed);
+        here.iter_mut().for_each(|value| *value /= largest);
+        let x = here.clone();
+        for degree in 1..6 {
+            let n = f64::from(degree);
+            let next: Vec<f64> = (0..x.len())
+                .map(|k| ((2.0 * n + 1.0) * x[k] * here[k] - n * before[k]) / (n + 1.0))
+                .collect();
+            (before, here) = (here, next.clone());
+            let detail = format!("degree {}", degree + 1);
+            functions.push(Function { detail, values: next, of: Some((kind, axis)) });
+        }
+    }
+    Driver { name: "input".into(), functions }
 }
 
 fn temperature(scene: &Scene<'_>) -> Option<Vec<f64>> {
@@ -187,7 +242,7 @@ pub fn following(
         let projected = projected(linear, &design, fitted, noise)?;
         let mut at = 0;
         for driver in drivers {
-            let count = 3 * driver.functions.len();
+            let count = driver.columns(*kind).len();
             let places: Vec<usize> = (at..at + count).collect();
             at += count;
             found.push(follow(*kind, driver, &projected, &places)?);
@@ -247,8 +302,8 @@ fn with_drivers(
     let fitted = linear.fitted(set);
     let means: Vec<Means> = drivers
         .iter()
-        .flat_map(|driver| &driver.functions)
-        .flat_map(|(_, values)| (0..3).map(move |axis| on(kind, axis, values)))
+        .flat_map(|driver| driver.columns(kind).into_iter().map(move |at| (driver, at)))
+        .map(|(driver, (function, axis))| on(kind, axis, &driver.functions[function].values))
         .collect();
     let columns = fitted.iter().map(|id| linear.design.columns[*id]).collect();
     (linear.design.extended(&fitted, columns, &means), fitted.len())
@@ -278,11 +333,11 @@ fn follow(kind: SensorKind, driver: &Driver, projected: &Projected, places: &[us
     let single =
         |place: &usize| projected.score[*place].powi(2) / projected.information[(*place, *place)].max(1e-12);
     let most = places.iter().max_by(|a, b| single(a).total_cmp(&single(b)))?;
-    let (function, axis) = ((most - places[0]) / 3, (most - places[0]) % 3);
+    let (function, axis) = *driver.columns(kind).get(most - places[0])?;
     Some(Following {
         kind,
         driver: driver.name.clone(),
-        detail: format!("{} axis, {}", ["x", "y", "z"][axis], driver.functions[function].0),
+        detail: format!("{} axis, {}", ["x", "y", "z"][axis], driver.functions[function].detail),
         size: (statistic - dimensions as f64).max(0.0),
         p_value,
     })

@@ -131,8 +131,8 @@ fn response(effect: &Effect, values: &[f64]) -> Option<Matrix3<f64>> {
 fn leave_out(finding: &Finding, recording: &Recording, kind: SensorKind, usable: &mut [bool]) {
     let Some(triple) = recording.sensor(kind) else { return };
     if finding.effect.id.ends_with(".stuck_samples") {
-        for row in 1..usable.len() {
-            usable[row] &= triple.values[row] != triple.values[row - 1];
+        for (usable, pair) in usable.iter_mut().skip(1).zip(triple.values.windows(2)) {
+            *usable &= pair[0] != pair[1];
         }
     }
     if finding.effect.id.ends_with(".saturation")

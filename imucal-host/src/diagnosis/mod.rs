@@ -111,7 +111,7 @@ fn untestable(recording: &Recording, why: String) -> Diagnosis {
 
 fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&str)) -> Option<Diagnosis> {
     let (linear, best) = (&explained.linear, &explained.best);
-    let drivers = driver::drivers(linear.scene);
+    let drivers = driver::drivers(linear.scene, &linear.weighing.given);
     let before = driver::following(linear, &[], &best.noise, &drivers)?;
     let after = driver::following_anew(linear, &best.set, &best.noise, &drivers)?;
     progress("drivers tested");
@@ -205,3 +205,6 @@ fn places(following: &[Following], explained: f64) -> Vec<Driven> {
     places.sort_by(|a, b| b.share.total_cmp(&a.share));
     places
 }
+
+#[cfg(test)]
+mod tests;

@@ -73,7 +73,7 @@ pub struct Weighing<'s> {
     scene: &'s Scene<'s>,
     times: Vec<f64>,
     /// Mean output of each block, by sensor: scatter turns it.
-    given: [Vec<Vector3<f64>>; 3],
+    pub given: [Vec<Vector3<f64>>; 3],
 }
 
 impl<'s> Weighing<'s> {

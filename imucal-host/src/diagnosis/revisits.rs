@@ -66,10 +66,11 @@ mod tests {
 
     #[test]
     fn a_movement_that_ends_before_it_comes_back_is_remarked() {
-        struct Half<M>(M);
-        impl<M: Motion> Motion for Half<M> {
+        /// Its first 20 s: two rests.
+        struct Beginning<M>(M);
+        impl<M: Motion> Motion for Beginning<M> {
             fn duration(&self) -> f64 {
-                30.0
+                20.0
             }
             fn truth(&self, time: f64, rig: &dyn Fn(&mut crate::effect::Machine)) -> crate::effect::Truth {
                 self.0.truth(time, rig)
@@ -86,6 +87,6 @@ mod tests {
         }
         let axes = crate::simulator::Simulation::default().axes;
         let schedule = Programme::MultiPosition.schedule(axes, 1, None, Place::ankara()).unwrap();
-        assert!(remark(&Half(schedule)).unwrap().contains("hold some attitudes twice"));
+        assert!(remark(&Beginning(schedule)).unwrap().contains("hold some attitudes twice"));
     }
 }

@@ -4,21 +4,26 @@ use imucal_core::{
     model::{
         Parameterisation,
         norm::NormModel,
-        parameterisation::{DIAGONAL, FULL_GAIN, UPPER_TRIANGULAR},
+        parameterisation::{DIAGONAL, FULL, FULL_GAIN, FULL_WITH_SENSITIVITY, UPPER_TRIANGULAR},
         turn::TurnModel,
     },
     observation::{Durations, ShellPoint, Turn},
     solver::{LevenbergMarquardt, Termination},
     triad::Triad,
 };
-use nalgebra::Vector3;
+use nalgebra::{SVector, Vector3};
 
 use super::{
+    known_attitudes,
     reference::{self, SampledTurn},
     ulp,
 };
 use crate::{
-    calibrate::outcome::{Evidence, FitSummary, KnownTurn, SensorOutcome, entry_name},
+    calibrate::{
+        gyr_rig_fit::{self, MotionFit, Weighted},
+        outcome::{Evidence, FitSummary, KnownTurn, SensorOutcome, entry_name},
+    },
+    observe::motion::MotionData,
     recording::{Recording, SensorKind},
 };
 
@@ -80,6 +85,12 @@ pub fn compare(recording: &Recording, outcome: &SensorOutcome) -> Option<FitEqui
             shell(outcome.kind, points, *norm, (triad, std), DIAGONAL)
         }
         Evidence::Turns(turns) => gyroscope(recording, turns, summary),
+        Evidence::Motions { data, fit } => match fit.entries.len() {
+            12 => attitude(data, fit, FULL),
+            _ => attitude(data, fit, FULL_WITH_SENSITIVITY),
+        },
+        Evidence::Gimbals(poses, fit) => known_attitudes::on_gimbals(outcome.kind, poses, fit),
+        Evidence::Reference(poses, fit) => known_attitudes::along_reference(outcome.kind, poses, fit),
     }
 }
 
@@ -150,7 +161,33 @@ fn gyroscope(recording: &Recording, turns: &[KnownTurn], summary: &FitSummary) -
     Some(FitEquivalence { kind: SensorKind::Gyr, termination: report.termination, parameters })
 }
 
-fn differences(
+fn attitude<const P: usize>(
+    data: &[MotionData],
+    fit: &MotionFit,
+    form: Parameterisation<P>,
+) -> Option<FitEquivalence> {
+    let all: Vec<&MotionData> = data.iter().collect();
+    let weights = gyr_rig_fit::weights(&all);
+    let start: Vec<f64> = fit.parameters.iter().map(|p| 1.02 * p).collect();
+    let narrow: Vec<_> = data.iter().map(MotionData::narrow).collect();
+    let motions: Vec<_> = narrow.iter().map(|motion| motion.motion()).collect();
+    let narrow_weights: Vec<f32> = weights.iter().map(|w| *w as f32).collect();
+    let model = Weighted { motions: &motions, weights: &narrow_weights, form };
+    let from = SVector::<f64, P>::from_column_slice(&start).cast::<f32>();
+    let mut solver = LevenbergMarquardt::new(from, Default::default());
+    let report = solver.run(&model);
+    let reference = reference::fit_motions(data, &weights, &start)?;
+    let std: Vec<f64> = fit.covariance.diagonal().iter().map(|v| v.sqrt()).collect();
+    let device = solver.theta().iter().map(|x| f64::from(*x));
+    let mut parameters = differences(form.entries(), device, &reference, &std, &[1.0; P]);
+    for (k, parameter) in parameters.iter_mut().enumerate().skip(12) {
+        let axis = |k: usize| ["x", "y", "z"][k % 3];
+        parameter.name = format!("g_{}{}", axis((k - 12) / 3), axis(k));
+    }
+    Some(FitEquivalence { kind: SensorKind::Gyr, termination: report.termination, parameters })
+}
+
+pub(super) fn differences(
     entries: &[u8],
     device: impl Iterator<Item = f64>,
     reference: &[f64],

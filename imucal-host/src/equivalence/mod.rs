@@ -4,6 +4,7 @@
 //! the same observations? The reference shares no code with the core's models.
 
 pub mod fits;
+mod known_attitudes;
 pub mod reference;
 pub mod samples;
 

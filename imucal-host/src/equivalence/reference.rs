@@ -4,9 +4,9 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use crate::observe::turn::BiasPath;
+use crate::observe::{motion::MotionData, turn::BiasPath};
 
 /// Rounds of Gauss–Newton at the most.
 const ROUNDS: usize = 60;
@@ -89,6 +89,65 @@ pub fn fit_turns(
                 [r.x, r.y, r.z]
             })
             .collect()
+    })
+}
+
+/// Fits a gyroscope's gain by rows, bias and, where `start` has 21 entries, g-sensitivity to motions between known
+/// attitudes, sample by sample; residuals are weighted.
+pub fn fit_motions(motions: &[MotionData], weights: &[f64], start: &[f64]) -> Option<Vec<f64>> {
+    gauss_newton(start, |theta| {
+        let by_rows = |from: usize| Matrix3::from_row_slice(&theta[from..from + 9]);
+        let (gain, bias) = (by_rows(0), Vector3::new(theta[9], theta[10], theta[11]));
+        let sensitivity = if theta.len() > 12 { by_rows(12) } else { Matrix3::zeros() };
+        let errors = motions.iter().zip(weights).flat_map(|(motion, weight)| {
+            let [before, after] = motion.ends().map(UnitQuaternion::from_quaternion);
+            let carried = motion.samples.iter().fold(before, |attitude, (rate, held, block)| {
+                let (earth, force) = motion.beside(*block);
+                let rate = gain * (rate - bias - sensitivity * force) - earth;
+                attitude * UnitQuaternion::from_scaled_axis(rate * *held)
+            });
+            let r = (after.inverse() * carried).scaled_axis() * *weight;
+            [r.x, r.y, r.z]
+        });
+        errors.collect()
+    })
+}
+
+/// A pose with its rotations.
+#[derive(Clone, Debug)]
+pub struct KnownPose {
+    /// Output, nominal SI.
+    pub output: [f64; 3],
+    /// From base, outer and middle gimbal to the table.
+    pub c_p_t: Matrix3<f64>,
+    /// See `c_p_t`.
+    pub c_o_t: Matrix3<f64>,
+    /// See `c_p_t`.
+    pub c_m_t: Matrix3<f64>,
+}
+
+/// Fits the `free` ones of the unified model's 32 entries, the others as in `start`; returns the free ones.
+pub fn fit_poses(poses: &[KnownPose], start: &[f64; 32], free: &[u8]) -> Option<Vec<f64>> {
+    let from: Vec<f64> = free.iter().map(|entry| start[usize::from(*entry)]).collect();
+    gauss_newton(&from, |theta| {
+        let mut p = *start;
+        free.iter().zip(theta).for_each(|(entry, value)| p[usize::from(*entry)] = *value);
+        poses.iter().flat_map(|pose| unified(&p, pose)).collect()
+    })
+}
+
+/// Output of the unified model less the measured one: models.md 1 with tilt, sources, and terms of higher order.
+fn unified(p: &[f64; 32], pose: &KnownPose) -> [f64; 3] {
+    let three = |from: usize| Vector3::new(p[from], p[from + 1], p[from + 2]);
+    // From n to p, so that gravity is (g sin β, −g cos β sin α, −g cos β cos α).
+    let tilt = Rotation3::from_axis_angle(&Vector3::x_axis(), -p[12])
+        * Rotation3::from_axis_angle(&Vector3::y_axis(), -p[13]);
+    let sensed = pose.c_p_t * (tilt * three(14)) + pose.c_o_t * three(17) + pose.c_m_t * three(20);
+    let y = Matrix3::from_row_slice(&p[..9]) * sensed;
+    let product = [y.y * y.z, y.z * y.x, y.x * y.y];
+    [0, 1, 2].map(|k| {
+        y[k] + p[23 + k] * y[k].powi(2) + p[26 + k] * y[k].powi(3) + p[29 + k] * product[k] + p[9 + k]
+            - pose.output[k]
     })
 }
 

@@ -6,14 +6,14 @@
 use std::ops::Range;
 
 use imucal_core::{
-    model::rig::{GimbalPose, RigAxes},
+    model::rig::{GimbalPose, Pose, RigAxes},
     observation::{Block, BlockBuilder, Compared, Durations, Motion},
     rotation::{exp, log, matrix, quaternion, quaternion_log},
 };
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
 use super::turn::TurnGap;
-use crate::noise::Span;
+use crate::{noise::Span, recording::Recording};
 
 /// A block lasts about this long, s: five samples at 100 Hz.
 const BLOCK: f64 = 0.05;
@@ -34,6 +34,25 @@ pub fn of_encoders(gimbal: &[[f64; 3]], axes: &RigAxes) -> Attitudes {
 pub fn of_angles(angles: &Vector3<f64>, axes: &RigAxes) -> Option<Matrix3<f64>> {
     let pose = GimbalPose::new(Vector3::zeros(), angles);
     angles.iter().all(|angle| angle.is_finite()).then(|| pose.rotations(axes).c_p_t.transpose())
+}
+
+/// Attitudes along a recording's reference, where no rig's encoders are there to prefer; what is wrong with a reference
+/// that gives none is said once.
+pub fn along_reference(recording: &Recording, warnings: &mut Vec<String>) -> Option<Attitudes> {
+    let reference = recording.reference.as_deref().filter(|_| recording.gimbal.is_none())?;
+    let attitudes = of_reference(reference);
+    if attitudes.iter().any(Option::is_some) {
+        return Some(attitudes);
+    }
+    let warning = format!(
+        "the reference attitude is not used: none of {} rows holds a unit quaternion in ref_qw, ref_qx, ref_qy, \
+         ref_qz; export it again, or leave these columns out",
+        reference.len()
+    );
+    if !warnings.contains(&warning) {
+        warnings.push(warning);
+    }
+    None
 }
 
 /// Attitudes of reference quaternions, w first; a row that holds no rotation is left out.
@@ -88,6 +107,8 @@ pub struct MotionData {
     pub rows: Range<usize>,
     /// When, s.
     pub span: Span,
+    /// Each sample's rate less the wander, rad/s, how long it is held, s, and the block it is in.
+    pub samples: Vec<(Vector3<f64>, f64, usize)>,
     blocks: Vec<Block<f64>>,
     durations: Vec<f64>,
     earth: Vec<Vector3<f64>>,
@@ -116,9 +137,63 @@ impl MotionData {
         }
     }
 
+    /// Attitudes before and after, `C_t_p`.
+    pub fn ends(&self) -> [Quaternion<f64>; 2] {
+        [self.start, self.end[0]]
+    }
+
+    /// Earth's rotation, rad/s, and specific force, m/s², over a block, table axes.
+    pub fn beside(&self, block: usize) -> (Vector3<f64>, Vector3<f64>) {
+        let at = |all: &[Vector3<f64>]| all.get(block).copied().unwrap_or_default();
+        (at(&self.earth), at(&self.force))
+    }
+
+    /// The motion as a device holds it.
+    pub fn narrow(&self) -> NarrowMotion {
+        let narrow = |all: &[Vector3<f64>]| all.iter().map(|v| v.cast()).collect();
+        NarrowMotion {
+            blocks: self
+                .blocks
+                .iter()
+                .map(|b| Block { s0: b.s0.cast(), s1: b.s1.cast(), c: b.c.cast() })
+                .collect(),
+            durations: self.durations.iter().map(|d| *d as f32).collect(),
+            earth: narrow(&self.earth),
+            force: narrow(&self.force),
+            ends: self.ends().map(|q| q.cast()),
+            after: self.after,
+        }
+    }
+
     /// Rotation vector from the attitude before to the one after, table axes, rad, the shorter way round.
     pub fn turned(&self) -> Vector3<f64> {
         quaternion_log(&(self.start.conjugate() * self.end[0]))
+    }
+}
+
+/// A motion in single precision.
+#[derive(Clone, Debug)]
+pub struct NarrowMotion {
+    blocks: Vec<Block<f32>>,
+    durations: Vec<f32>,
+    earth: Vec<Vector3<f32>>,
+    force: Vec<Vector3<f32>>,
+    ends: [Quaternion<f32>; 2],
+    after: [u32; 1],
+}
+
+impl NarrowMotion {
+    /// The motion as the model takes it.
+    pub fn motion(&self) -> Motion<'_, f32> {
+        Motion {
+            blocks: &self.blocks,
+            durations: Durations::Each(&self.durations),
+            earth: &self.earth,
+            force: &self.force,
+            start: self.ends[0],
+            references: &self.ends[1..],
+            compared: Compared::After(&self.after),
+        }
     }
 }
 
@@ -146,6 +221,7 @@ impl MotionInput<'_> {
         let mut data = MotionData {
             span: self.time[rows.start]..self.time[rows.end - 1],
             rows: rows.clone(),
+            samples: Vec::with_capacity(rows.len()),
             blocks: Vec::new(),
             durations: Vec::new(),
             earth: Vec::new(),
@@ -159,7 +235,9 @@ impl MotionInput<'_> {
         for k in rows.clone() {
             let from = if k == rows.start { self.time[k] } else { self.time[k - 1] };
             let to = if k + 1 == rows.end { self.time[k] } else { self.time[k + 1] };
-            builder.push(&(self.rates[k] - wander(self.time[k])), 0.5 * (to - from));
+            let (rate, held) = (self.rates[k] - wander(self.time[k]), 0.5 * (to - from));
+            builder.push(&rate, held);
+            data.samples.push((rate, held, data.blocks.len()));
             if builder.count() < size && k + 1 < rows.end {
                 continue;
             }

@@ -1,13 +1,15 @@
-//! Poses on a rig: rests during which the encoders stood still.
+//! Poses: on a rig, rests during which the encoders stood still; along a reference, samples whose attitude it gives.
 
 use std::ops::Range;
 
 use imucal_core::{
-    model::rig::{Axis, GimbalPose, RigAxes},
+    model::rig::{Axis, GimbalPose, Pose, ReferencePose, RigAxes},
     observation::Moments,
+    rotation::quaternion,
 };
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
+use super::cloud::cloud;
 use crate::{
     noise::{Span, white},
     recording::{
@@ -18,6 +20,9 @@ use crate::{
 
 /// Encoders that move more than this during a rest belong to no pose, rad (0.1°).
 const STILL: f64 = 1.7e-3;
+
+/// Outer and inner axis are one within this angle, rad (1°).
+const LOCKED: f64 = 0.0175;
 
 /// A pose lasts at least this long, s.
 const SHORTEST: f64 = 0.75;
@@ -49,12 +54,18 @@ pub enum NoPoses {
         /// Largest angle, rad as the file claims.
         largest: f64,
     },
+    /// Encoder columns without a reading.
+    #[error(
+        "no row holds all three encoder angles, expected them in gimbal_outer, gimbal_middle and gimbal_inner; export \
+         them again, or leave these columns out"
+    )]
+    Missing,
     /// Two neighbouring axes are the same: the rig cannot turn about a third.
     #[error("the manifest's [rig] axes repeat a neighbour, which no three-gimbal rig does")]
     RepeatedAxis,
 }
 
-/// Poses of one sensor and the rests they come from.
+/// Poses of one sensor.
 #[derive(Clone, Debug)]
 pub struct Poses {
     /// Mean output and encoder angles.
@@ -65,6 +76,20 @@ pub struct Poses {
     pub spans: Vec<Span>,
     /// White noise within them, nominal unit²·s, where they are long enough to tell.
     pub density: Option<Vector3<f64>>,
+}
+
+/// The distinct usable samples of a sensor at which the table's attitude `C_t_p` is known, and their rows.
+pub fn along_reference(
+    values: &[Vector3<f64>],
+    usable: &[bool],
+    attitudes: &[Option<Matrix3<f64>>],
+) -> (Vec<ReferencePose<f64>>, Vec<usize>) {
+    let cloud = cloud(values, usable);
+    let known = cloud.points.iter().zip(&cloud.rows).filter_map(|(point, row)| {
+        let attitude = quaternion(attitudes.get(*row)?.as_ref()?);
+        Some((ReferencePose { value: point.value, attitude }, *row))
+    });
+    known.unzip()
 }
 
 /// The rig's axes, of three gimbals.
@@ -92,6 +117,9 @@ pub fn rig_axes(rig: Option<&Rig>) -> Result<RigAxes, NoPoses> {
 pub fn axes_and_encoders(recording: &Recording) -> Result<(RigAxes, &[[f64; 3]]), NoPoses> {
     let gimbal = recording.gimbal.as_deref().ok_or(NoPoses::NoEncoders)?;
     let axes = rig_axes(recording.manifest.rig.as_ref())?;
+    if !gimbal.iter().any(|angles| angles.iter().all(|angle| angle.is_finite())) {
+        return Err(NoPoses::Missing);
+    }
     let largest = gimbal.iter().flatten().filter(|a| a.is_finite()).fold(0.0f64, |most, a| most.max(a.abs()));
     if largest > LARGEST {
         return Err(NoPoses::Degrees { largest });
@@ -144,6 +172,18 @@ pub fn poses(recording: &Recording, sensor: &Triple, usable: &[bool]) -> Result<
         }
     }
     Ok(Poses { poses, axes, spans, density })
+}
+
+impl Poses {
+    /// Poses in which the outer and the inner gimbal turn about one axis.
+    pub fn in_gimbal_lock(&self) -> usize {
+        let axis = |axis: Axis| Vector3::ith(axis as usize, 1.0);
+        let [outer, _, inner] = self.axes.0.map(axis);
+        let locked = |pose: &&GimbalPose<f64>| {
+            (pose.rotations(&self.axes).c_o_t * outer).cross(&inner).norm() < LOCKED
+        };
+        self.poses.iter().filter(locked).count()
+    }
 }
 
 /// Mean encoder angles of a stretch, through the wrap at ±π; `None` where none is measured.

@@ -353,7 +353,7 @@ mod tests {
         let first = |verdict| {
             let mut diagnosis = diagnosis(verdict);
             diagnosis.remarks = vec!["there is no rig".into(), "and no revisit".into()];
-            page(&diagnosis)
+            page(&diagnosis).split_whitespace().collect::<Vec<_>>().join(" ")
         };
         assert!(first(Verdict::None).contains("no gap beyond the noise"));
         assert!(first(Verdict::Unknown).contains("no effect of the catalogue explains it"));

@@ -8,7 +8,8 @@ use crate::{
         Calibration, FitSummary, SegmentationReport, SensorOutcome,
         alignment::Alignment,
         compare::Comparison,
-        outcome::{RigFindings, entry_name},
+        outcome::{HigherOrder, RigFindings, entry_name},
+        search::Search,
     },
     recording::SensorKind,
     store::FORMAT,
@@ -101,6 +102,7 @@ fn fit_value(kind: SensorKind, fit: &FitSummary) -> Value {
         "gain_spread_over_thresholds": fit.gain_spread,
         "bias_interpolated": fit.bias_wander.map(|w| w.interpolated),
         "alignment": fit.alignment.as_ref().map(alignment),
+        "search": fit.search.as_ref().map(search),
         "rig": rig,
     })
 }
@@ -119,6 +121,27 @@ fn alignment(found: &Alignment) -> Value {
     })
 }
 
+/// How a gyroscope's fit was reached.
+fn search(found: &Search) -> Value {
+    let swarm = found.swarm.map(|swarm| {
+        json!({
+            "termination": swarm.termination.name(),
+            "converged": swarm.termination.was_successful(),
+            "iterations": swarm.iterations,
+            "evaluations": swarm.evaluations,
+            "spread": swarm.spread,
+            "parameters_at_bound": swarm.at_bound,
+            "rms": swarm.rms,
+            "kept": swarm.kept,
+        })
+    });
+    json!({
+        "direct": {"termination": found.direct.0.name(), "rms": found.direct.1},
+        "swarm": swarm,
+        "note": found.note(),
+    })
+}
+
 /// What belongs to the machine; null where it was not estimated.
 fn rig(kind: SensorKind, found: Option<&RigFindings>) -> Value {
     let not_told = found.map(|rig| &rig.not_told);
@@ -130,6 +153,7 @@ fn rig(kind: SensorKind, found: Option<&RigFindings>) -> Value {
                 "tilt_y": tilt.map(|(tilt, _)| tilt[1]),
                 "tilt_std": tilt.map(|(_, std)| std),
                 "not_told": not_told,
+                "higher_order": found.and_then(|rig| rig.higher_order.as_ref()).map(higher_order),
             })
         }
         SensorKind::Gyr => found.map_or(Value::Null, |rig| {
@@ -149,9 +173,20 @@ fn rig(kind: SensorKind, found: Option<&RigFindings>) -> Value {
                 "middle_hard_iron_std": sources.map(|[_, middle]| vector(&middle.1)),
                 "field_n": found.and_then(|rig| rig.field_n).as_ref().map(vector),
                 "not_told": not_told,
+                "notes": found.map(|rig| &rig.notes),
             })
         }
     }
+}
+
+/// Terms that are estimated and not stored.
+fn higher_order(found: &HigherOrder) -> Value {
+    let terms: serde_json::Map<String, Value> = found
+        .terms
+        .iter()
+        .map(|(name, value, std)| ((*name).to_owned(), json!({"value": vector(value), "std": vector(std)})))
+        .collect();
+    json!({"terms": terms, "stored": false, "uncorrected": found.uncorrected})
 }
 
 fn comparison(comparison: &Comparison) -> Value {
@@ -165,6 +200,7 @@ fn comparison(comparison: &Comparison) -> Value {
                 "parameters": step.free,
                 "rms": step.rms,
                 "held_out_rms": step.held_out_rms,
+                "second_half_rms": step.second_half_rms,
                 "p_value": p_value,
             })
         })

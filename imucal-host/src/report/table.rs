@@ -63,18 +63,19 @@ fn write_comparison(text: &mut String, comparison: &Comparison) -> fmt::Result {
     writeln!(text, "{}: models compared", words(comparison.kind))?;
     writeln!(
         text,
-        "  {:<5} {:<52} {:>10} {:>10} {:>10} {:>9}",
-        "model", "adds", "parameters", "rms", "held out", "chance"
+        "  {:<5} {:<52} {:>10} {:>10} {:>10} {:>10} {:>9}",
+        "model", "adds", "parameters", "rms", "held out", "2nd half", "chance"
     )?;
     for (step, p_value) in &comparison.rungs {
         writeln!(
             text,
-            "  {:<5} {:<52} {:>10} {:>10} {:>10} {:>9}",
+            "  {:<5} {:<52} {:>10} {:>10} {:>10} {:>10} {:>9}",
             step.name,
             step.adds,
             step.free,
             plain(step.rms),
             step.held_out_rms.map_or_else(|| "-".into(), plain),
+            step.second_half_rms.map_or_else(|| "-".into(), plain),
             p_value.map_or_else(|| "-".into(), |p| format!("{p:.1e}"))
         )?;
     }
@@ -187,6 +188,9 @@ fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {
     if let Some(rig) = &fit.rig {
         write_rig(text, rig)?;
     }
+    if let Some(search) = &fit.search {
+        writeln!(text, "  {}", search.note())?;
+    }
     for left in &fit.left_out {
         writeln!(text, "  left out: {left}")?;
     }
@@ -210,6 +214,18 @@ fn write_rig(text: &mut String, rig: &RigFindings) -> fmt::Result {
                 (0..3).map(|k| measure(value[(row, k)] * per_g, std[(row, k)] * per_g)).collect();
             writeln!(text, "     {}", parts.join(", "))?;
         }
+    }
+    if let Some(higher) = &rig.higher_order {
+        for (name, value, std) in &higher.terms {
+            let parts: Vec<String> = (0..3).map(|k| measure(value[k], std[k])).collect();
+            writeln!(text, "  {name} terms of x, y, z in SI: {}", parts.join(", "))?;
+        }
+        writeln!(
+            text,
+            "  NOT stored, since TOML and record hold gain and bias alone: a device leaves up to {} of these terms; for a \
+             device acc=I14, whose gain and bias take up what they can of them",
+            plain(higher.uncorrected)
+        )?;
     }
     for note in &rig.notes {
         writeln!(text, "  {note}")?;

@@ -1,6 +1,6 @@
 //! A recorded movement: what the encoders of a rig said, as a source of truth.
 //!
-//! Angle, rate and acceleration of each gimbal are those of a cubic through the readings within [`REACH`] of a row, by
+//! Angle, rate and acceleration of each gimbal are those of a cubic through the readings within some hundredths of a second of a row, by
 //! least squares: a reading's noise is averaged, and a movement whose angle is a cubic over that time stays as it is.
 //! Where a wider cubic tells another rate, the gimbal has jerked, and its rate there is not known.
 //! Between rows the nearest row's swing goes on with constant acceleration. A rig whose readings change no more than

@@ -139,11 +139,19 @@ fn a_reference_whose_clock_is_early_is_found_so_and_costs_nothing() {
 #[test]
 fn a_comparison_finds_that_the_gain_matters_and_climbs_no_further_without_cause() {
     let (recording, ..) = simulated(Programme::Full, 6);
-    let calibration = calibrated(&recording, &Options { compare: true, ..Options::default() });
+    let options = Options { compare: true, multipliers: vec![4.0], ..Options::default() };
+    let calibration = calibrate(&recording, &options, &|_| ());
     let found = calibration.comparisons.iter().find(|c| c.kind == SensorKind::Gyr).unwrap();
     let names: Vec<_> = found.rungs.iter().map(|(step, _)| step.name).collect();
-    assert_eq!(names, ["-", "B3", G12, G21]);
+    assert_eq!(names, ["-", "B3", "K9", G12, G21]);
     assert_eq!(found.chosen, G12, "{}", found.why);
+    let second: Vec<f64> = found.rungs.iter().filter_map(|(step, _)| step.second_half_rms).collect();
+    println!("{second:?}");
+    let [nominal, bias, field, full, with_force] = second[..] else { panic!("{second:?}") };
+    // Of a sound sensor gravity's direction tells as much as attitudes do, to within the second half's own noise; what
+    // is not there to be found does not help.
+    assert!(nominal > bias && bias > 5.0 * field && (field / full - 1.0).abs() < 0.15, "{second:?}");
+    assert!(with_force > 0.95 * full, "{second:?}");
 }
 
 #[test]
@@ -156,6 +164,6 @@ fn a_start_far_off_is_left_to_the_swarm_which_ends_where_the_static_bias_does() 
     let found = on_encoders(&recording, sensor, &usable, gimbal, &attitudes, &axes);
     let near = gyr_rig_fit::fit(&found.data, FULL, found.bias);
     let far = gyr_rig_fit::search(&found.data, FULL, found.bias + Vector3::new(0.12, -0.1, 0.15)).unwrap();
-    assert_eq!((near.search, far.search), (Search::Direct, Search::Swarm));
+    assert!(near.search.swarm.is_none() && far.search.swarm.is_some_and(|swarm| swarm.kept));
     assert!((near.triad.gain - far.triad.gain).norm() < 1e-5, "{} {}", near.triad.gain, far.triad.gain);
 }

@@ -4,10 +4,13 @@
 //! d_k = y_{k−2} − 4 y_{k−1} + 6 y_k − 4 y_{k+1} + y_{k+2}      variance 70 σ² in white noise
 //! ```
 //!
-//! Fourth differences leave nothing of a movement. Their mean squares over windows of a second, each axis by its own
-//! median, are compared in logarithms, at rest and in motion apart; how much they scatter is told from neighbouring
-//! windows. Of all stretches of windows the one is taken whose mean stands highest above that of the rest, and all
-//! stretches are counted in its probability. Its ends are then moved to the rows where the likelihood is greatest.
+//! Fourth differences leave nothing of a movement. Their mean squares over windows of a second, without the largest
+//! quarter lest a jump count as noise, each axis by its own median, are compared in logarithms; how much they scatter is
+//! told from neighbouring windows. Where a movement makes noise of its own, only the windows at rest are asked. Of all stretches of windows the one is taken whose mean stands highest above that of the others,
+//! and all stretches are counted in its probability. Its ends are then moved to the rows where the likelihood is
+//! greatest.
+
+use std::ops::Range;
 
 use nalgebra::Vector3;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -18,11 +21,16 @@ use crate::recording::{Triple, integrity::SensorIntegrity, median};
 const WEIGHTS: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 /// Neighbouring differences are alike: so many of them count as one. 1 + 2 Σ ρ², with ρ = −56, 28, −8 and 1 of 70.
 const ALIKE: f64 = 2.6265;
+/// Standard deviation of the place of a change, in rows, times what a row tells of it (Hinkley 1970: √26 of two means a
+/// standard deviation apart, each row telling half a nat).
+const CHANGE: f64 = 2.55;
 /// Length of a window, s, and the rows it has at least.
 const WINDOW: f64 = 1.0;
 const ROWS: usize = 20;
 /// Fewer windows say nothing.
 const WINDOWS: usize = 20;
+/// A movement makes no noise of its own where it is no more than this many times that of a rest, as mean squares.
+const SAME: f64 = 1.25;
 /// A gimbal turns above this rate, rad/s.
 const STILL: f64 = 3e-3;
 
@@ -34,7 +42,7 @@ struct Bend {
 
 /// A second of a recording.
 struct Window {
-    bends: std::ops::Range<usize>,
+    bends: Range<usize>,
     moves: bool,
     /// ln of the mean square by its usual value, in standard deviations.
     level: f64,
@@ -54,14 +62,23 @@ pub(super) fn check(
     };
     let bends = bends(time, triple, &fresh, interval);
     let mut windows = windows(time, &bends, interval, moves);
-    for state in [false, true] {
-        normalise(&bends, &mut windows, state);
-    }
+    let usual = [false, true].map(|state| normalise(&bends, &mut windows, state));
     windows.retain(|window| window.level.is_finite());
+    if let [Some(rest), Some(motion)] = usual
+        && rest.iter().zip(motion.iter()).any(|(rest, motion)| *motion > SAME * rest)
+        && windows.iter().filter(|window| !window.moves).count() >= WINDOWS
+    {
+        windows.retain(|window| !window.moves);
+    }
     let Some(stretch) = scan(&windows) else { return };
     let (from, to) = (windows[stretch.from].bends.start, windows[stretch.to - 1].bends.end);
     let Some(burst) = Levels::of(&bends, from, to) else { return };
-    let (from, to) = burst.ends(&bends, from, to, (1.5 * WINDOW / interval) as usize);
+    // It began after the window before, and ended before the one behind.
+    let before = stretch.from.checked_sub(1).map_or(0, |at| windows[at].bends.start);
+    let behind = windows.get(stretch.to).map_or(bends.len(), |window| window.bends.end);
+    let first = before..windows[stretch.from].bends.end;
+    let last = windows[stretch.to - 1].bends.start..behind;
+    let (from, to) = burst.ends(&bends, first, last);
     let Some(burst) = Levels::of(&bends, from, to) else { return };
     let excess = burst.ratio.sqrt() - 1.0;
     let kind = sensor.sensor;
@@ -73,7 +90,7 @@ pub(super) fn check(
     let at = |bend: usize| bends.get(bend).and_then(|bend| time.get(bend.row)).copied();
     // A burst that lasts to the end of the recording has not ended.
     let end = if to < bends.len() { at(to) } else { None };
-    let instant = Some(interval * (2.0 + ALIKE / burst.information()));
+    let instant = Some(interval * (2.0 + CHANGE * ALIKE / burst.information()));
     let values = [(Some(excess), Some(burst.excess_std())), (at(from), instant), (end, end.and(instant))];
     found.findings.extend(Finding::new(&format!("{kind}.noise_burst"), &values, stretch.p_value));
 }
@@ -115,17 +132,13 @@ fn windows(time: &[f64], bends: &[Bend], interval: f64, moves: &dyn Fn(usize) ->
     windows
 }
 
-/// Levels of the windows of one state, by their scatter.
-fn normalise(bends: &[Bend], windows: &mut [Window], moves: bool) {
-    let mean = |window: &Window| {
-        let part = &bends[window.bends.clone()];
-        part.iter().map(|bend| bend.square).sum::<Vector3<f64>>() / part.len() as f64
-    };
+/// Levels of the windows of one state, by their scatter; gives their usual mean squares, `None` of too few windows.
+fn normalise(bends: &[Bend], windows: &mut [Window], moves: bool) -> Option<Vector3<f64>> {
     let mut own: Vec<&mut Window> = windows.iter_mut().filter(|window| window.moves == moves).collect();
     if own.len() < WINDOWS / 4 {
-        return;
+        return None;
     }
-    let means: Vec<Vector3<f64>> = own.iter().map(|window| mean(window)).collect();
+    let means: Vec<Vector3<f64>> = own.iter().map(|window| trimmed(&bends[window.bends.clone()])).collect();
     let usual = [0, 1, 2].map(|axis| median(means.iter().map(|mean| mean[axis]).collect()).unwrap_or(0.0));
     let level = |mean: &Vector3<f64>| {
         let shares = usual
@@ -145,6 +158,17 @@ fn normalise(bends: &[Bend], windows: &mut [Window], moves: bool) {
     for (window, level) in own.iter_mut().zip(levels) {
         window.level = level / scatter;
     }
+    Some(Vector3::from(usual))
+}
+
+/// Mean squares without the largest quarter.
+fn trimmed(bends: &[Bend]) -> Vector3<f64> {
+    Vector3::from_fn(|axis, _| {
+        let mut squares: Vec<f64> = bends.iter().map(|bend| bend.square[axis]).collect();
+        squares.sort_unstable_by(f64::total_cmp);
+        let kept = squares.len() - squares.len() / 4;
+        squares.iter().take(kept).sum::<f64>() / kept as f64
+    })
 }
 
 /// A stretch of windows.
@@ -226,9 +250,9 @@ impl Levels {
         axes.map(|(square, outside)| self.ratio.ln() - square / outside * (1.0 - 1.0 / self.ratio)).sum()
     }
 
-    /// Ends at the rows within `reach` where the likelihood is greatest.
-    fn ends(&self, bends: &[Bend], from: usize, to: usize, reach: usize) -> (usize, usize) {
-        let middle = (from + to) / 2;
+    /// Ends at the rows of these ranges where the likelihood is greatest.
+    fn ends(&self, bends: &[Bend], first: Range<usize>, last: Range<usize>) -> (usize, usize) {
+        let middle = (first.end + last.start) / 2;
         let best = |low: usize, high: usize, sign: f64| {
             let (mut sum, mut least, mut place) = (0.0, 0.0, low);
             for (at, bend) in bends.iter().enumerate().take(high).skip(low) {
@@ -240,8 +264,8 @@ impl Levels {
             }
             place
         };
-        let from = best(from.saturating_sub(reach), (from + reach).min(middle), -1.0);
-        let to = best(to.saturating_sub(reach).max(middle), (to + reach).min(bends.len()), 1.0);
+        let from = best(first.start, first.end.min(middle), -1.0);
+        let to = best(last.start.max(middle), last.end, 1.0);
         (from, to)
     }
 }

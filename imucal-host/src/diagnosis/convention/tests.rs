@@ -189,3 +189,11 @@ fn a_magnetometer_that_follows_another_heading_says_which() {
         "{found:?}"
     );
 }
+
+#[test]
+fn a_jump_of_a_bias_is_no_noise() {
+    for kind in SensorKind::ALL {
+        let (found, _) = with(&format!("{kind}.bias_step"), 30.0, UnitKind::Gx2, Programme::Full, 9);
+        assert!(found.findings.is_empty(), "{found:?}");
+    }
+}
