@@ -27,6 +27,8 @@ pub mod equivalence;
 
 pub mod diagnosis;
 
+pub mod blind;
+
 pub mod report;
 
 pub mod study;

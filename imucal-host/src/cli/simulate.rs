@@ -5,15 +5,18 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use serde_json::json;
-use sha2::{Digest, Sha256};
 
 use super::{Ending, output};
 use crate::{
-    effect::{self, Act, CATALOGUE, Effect},
+    blind::{
+        case::{Omission, omission},
+        seal::{Nonce, digest},
+    },
+    effect::{self, CATALOGUE, Effect},
     recording::{AtomicFile, Manifest, manifest::Axis, spelling::nearest},
     report,
     simulator::{
-        Programme, Simulation, UnitKind,
+        Conditions, Programme, Simulation, UnitKind,
         random::{Purpose, Random},
     },
 };
@@ -32,7 +35,7 @@ pub(super) struct Arguments {
     /// The unit: mtx or 3dm-gx2
     #[arg(long, value_name = "UNIT", default_value = "mtx", value_parser = unit)]
     unit: UnitKind,
-    /// What the rig does: multi-position, rates, sinusoids, gyroscope, thermal or full
+    /// What the rig does: multi-position, rates, sinusoids, gyroscope, thermal, full or mixed
     #[arg(long, value_name = "NAME", default_value = "full", value_parser = programme)]
     programme: Programme,
     /// An effect beyond the baseline, e.g. acc.lever_arm or mag.bias_step=3: its size in multiples of its usual one.
@@ -124,6 +127,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         seed: arguments.seed,
         unit_seed: None,
         noise: !arguments.no_noise,
+        conditions: Conditions::default(),
         counts: !arguments.si,
         doses: Vec::new(),
     };
@@ -174,19 +178,14 @@ fn draw(simulation: &mut Simulation) -> anyhow::Result<()> {
 }
 
 fn is_drawn(effect: &Effect) -> bool {
-    let baseline = matches!(effect.act, Act::Triad(..))
-        || ["rig.level_tilt", "rig.heading", "acc.gravity_error", "mag.hard_iron", "mag.soft_iron"]
-            .contains(&effect.id.as_str());
-    !baseline && !effect.id.ends_with(".axis_swap") && !effect.id.ends_with(".unit_error")
+    !matches!(omission(effect), Some(Omission::Baseline | Omission::Convention))
 }
 
 fn sealed(mut simulation: Simulation, out: &Path) -> anyhow::Result<Ending> {
     let label_path = label_beside(out)?;
-    let mut nonce = [0u8; 32];
-    getrandom::fill(&mut nonce).context("the system gave no random numbers")?;
+    let nonce = Nonce::fresh().context("the system gave no random numbers")?;
     // Not the nonce itself, and one way: the recording says nothing of its label.
-    let seed = Sha256::new().chain_update(b"imucal sealed seed").chain_update(nonce).finalize();
-    simulation.seed = seed.iter().take(8).fold(0, |seed, byte| seed << 8 | u64::from(*byte));
+    simulation.seed = nonce.seed("imucal sealed seed");
     draw(&mut simulation)?;
     let effects: Vec<_> = simulation
         .doses
@@ -199,7 +198,7 @@ fn sealed(mut simulation: Simulation, out: &Path) -> anyhow::Result<Ending> {
         .collect();
     let label = json!({
         "format": "imucal-label/1",
-        "salt": hex(&nonce),
+        "salt": nonce.hex(),
         "seed": simulation.seed,
         "unit": simulation.unit.name(),
         "programme": simulation.programme.name(),
@@ -209,7 +208,7 @@ fn sealed(mut simulation: Simulation, out: &Path) -> anyhow::Result<Ending> {
     write(&simulation, out)?;
     AtomicFile::write_whole(&label_path, text.as_bytes())
         .with_context(|| format!("{}: cannot be written; check the folder", label_path.display()))?;
-    println!("{}: SHA-256 {}", label_path.display(), hex(&Sha256::digest(text.as_bytes())));
+    println!("{}: SHA-256 {}", label_path.display(), digest(&text));
     Ok(Ending::Done)
 }
 
@@ -218,10 +217,6 @@ fn label_beside(out: &Path) -> anyhow::Result<PathBuf> {
     let manifest = Manifest::path_beside(out)
         .with_context(|| format!("{}: expected a name that ends in .csv or .csv.gz", out.display()))?;
     Ok(manifest.with_extension("label.json"))
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

@@ -20,6 +20,7 @@ mod bandwidth;
 mod bias;
 mod bias_drift;
 mod bias_step;
+pub mod class;
 mod cross_axis_product;
 mod earth_rate;
 mod eddy_current;

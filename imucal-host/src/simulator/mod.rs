@@ -5,6 +5,7 @@
 
 pub mod chain;
 pub mod climate;
+pub mod conditions;
 pub mod course;
 pub mod dose;
 mod error;
@@ -18,6 +19,7 @@ pub mod truth;
 pub mod tumble;
 pub mod unit;
 
+pub use conditions::{Conditions, NoiseLevel};
 pub use dose::Dose;
 pub use error::SimulationError;
 pub use programme::Programme;
@@ -26,4 +28,4 @@ pub use replay::Replay;
 pub use run::Simulation;
 pub use truth::{Motion, Place};
 pub use tumble::Tumble;
-pub use unit::UnitKind;
+pub use unit::{DriftKind, UnitKind};
