@@ -86,7 +86,7 @@ fn a_term_taken_out_of_the_baseline_is_named() {
     let Some(folder) = data::folder() else { return };
     let recording = Recording::read(&folder.join("blind/open-01.csv.gz")).expect("a good recording");
     for term in ["acc.misalignment", "gyr.scale", "mag.bias"] {
-        let options = Options { without: vec![term.to_owned()], ..Options::default() };
+        let options = Options { without: vec![term.to_owned()], ..Default::default() };
         let diagnosis = diagnose(&recording, &options, &|_| ());
         assert_eq!(names(&diagnosis), [term]);
         assert!(diagnosis.gap_closed_total.expect("a cause") > 0.99);

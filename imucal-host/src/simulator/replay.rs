@@ -3,8 +3,8 @@
 //! Angle, rate and acceleration of each gimbal are those of a cubic through the readings within some hundredths of a second of a row, by
 //! least squares: a reading's noise is averaged, and a movement whose angle is a cubic over that time stays as it is.
 //! Where a wider cubic tells another rate, the gimbal has jerked, and its rate there is not known.
-//! Between rows the nearest row's swing goes on with constant acceleration. A rig whose readings change no more than
-//! their noise would make them stands still: its rates are zero. Not modelled: readings that lag the gimbal.
+//! Between rows the nearest row's swing goes on with constant acceleration. Where readings change no more than
+//! their noise would make them, the cubic goes through those of a fifth of a second. Not modelled: readings that lag the gimbal.
 
 use std::f64::consts::TAU;
 
@@ -63,14 +63,15 @@ impl Replay {
         let noise = noise(&angles);
         let moving = moving(time, &angles, &noise);
         let mut known = known(encoders, reach);
-        let still = |swing: Swing| Swing::still(swing.angle);
+        // What hardly moves does so slowly: more readings tell its rate.
+        let patient = ((WINDOW / interval).round() as usize).max(reach);
         let mut swings = Vec::with_capacity(time.len());
         for row in 0..time.len() {
-            let near = swing(time, &angles, row, reach);
             if !moving[row] {
-                swings.push(near.map(still));
+                swings.push(swing(time, &angles, row, patient));
                 continue;
             }
+            let near = swing(time, &angles, row, reach);
             let wide = swing(time, &angles, row, reach + 1);
             // Noise of a rate is about that of a reading in the time between two.
             let jerked = (0..3).any(|gimbal| {
@@ -261,7 +262,7 @@ mod tests {
         let replay = Replay::new(&time, &encoders, vec![25.0; 600], axes, Place::ankara()).unwrap();
         assert!(replay.moving()[..285].iter().all(|moves| !moves));
         assert!(replay.moving()[300..].iter().all(|moves| *moves));
-        assert_eq!(replay.swings()[100][0].rate, 0.0);
+        assert!(replay.swings()[100][0].rate.abs() < 1e-3);
     }
 
     #[test]
