@@ -10,8 +10,10 @@ use nalgebra::{DMatrix, SymmetricEigen, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
+    block::Block,
     evidence::Projected,
     noise::Noise,
+    orientation,
     scene::{Means, Scene},
     search::Linear,
 };
@@ -57,8 +59,35 @@ pub struct Following {
 
 /// The drivers of a scene: those that vary in it.
 pub fn drivers(scene: &Scene<'_>) -> Vec<Driver> {
-    let swings: Vec<[Swing; 3]> =
-        scene.blocks.iter().map(|b| scene.swings[(b.rows.start + b.rows.end) / 2]).collect();
+    let mut drivers = match scene.swings {
+        Some(swings) => {
+            let middle = |b: &Block| swings.get((b.rows.start + b.rows.end) / 2).copied().unwrap_or_default();
+            of_gimbals(&scene.blocks.iter().map(middle).collect::<Vec<_>>())
+        }
+        None => orientation::drivers(&scene.plain(), &scene.kinds),
+    };
+    let duration = scene.duration().max(1.0);
+    let wave = |order: usize| {
+        let values = scene.blocks.iter().map(|b| libm::cos(PI * order as f64 * b.time / duration)).collect();
+        (format!("{order} half-waves"), values)
+    };
+    drivers.push(Driver { name: "time".into(), functions: (1..=WAVES).map(wave).collect() });
+    if let Some(temperature) = temperature(scene) {
+        let square = temperature.iter().map(|t| t * t).collect();
+        let rate = rates(scene, &temperature);
+        let functions = vec![("linear".to_owned(), temperature), ("quadratic".to_owned(), square)];
+        drivers.push(Driver { name: "temperature".into(), functions });
+        drivers.push(Driver { name: "temperature_rate".into(), functions: vec![("linear".into(), rate)] });
+    }
+    drivers.retain_mut(|driver| {
+        driver.functions.retain_mut(|(_, values)| standardise(values));
+        !driver.functions.is_empty()
+    });
+    drivers
+}
+
+/// Angles, rates, accelerations and directions of approach of a rig's gimbals, block by block.
+fn of_gimbals(swings: &[[Swing; 3]]) -> Vec<Driver> {
     let mut drivers = Vec::new();
     for (gimbal, name) in ["outer", "middle", "inner"].iter().enumerate() {
         let mut functions = Vec::new();
@@ -73,32 +102,15 @@ pub fn drivers(scene: &Scene<'_>) -> Vec<Driver> {
     }
     drivers.push(per_gimbal(
         "rate",
-        &swings,
+        swings,
         &[
             ("odd in the rate", &|s| s.rate),
             ("even in the rate", &|s| s.rate.abs()),
             ("cubic in the rate", &|s| s.rate * s.rate * s.rate),
         ],
     ));
-    drivers.push(per_gimbal("angular_acceleration", &swings, &[("linear", &|s| s.acceleration)]));
-    let duration = scene.duration().max(1.0);
-    let wave = |order: usize| {
-        let values = scene.blocks.iter().map(|b| libm::cos(PI * order as f64 * b.time / duration)).collect();
-        (format!("{order} half-waves"), values)
-    };
-    drivers.push(Driver { name: "time".into(), functions: (1..=WAVES).map(wave).collect() });
-    if let Some(temperature) = temperature(scene) {
-        let square = temperature.iter().map(|t| t * t).collect();
-        let rate = rates(scene, &temperature);
-        let functions = vec![("linear".to_owned(), temperature), ("quadratic".to_owned(), square)];
-        drivers.push(Driver { name: "temperature".into(), functions });
-        drivers.push(Driver { name: "temperature_rate".into(), functions: vec![("linear".into(), rate)] });
-    }
-    drivers.push(approach(&swings));
-    drivers.retain_mut(|driver| {
-        driver.functions.retain_mut(|(_, values)| standardise(values));
-        !driver.functions.is_empty()
-    });
+    drivers.push(per_gimbal("angular_acceleration", swings, &[("linear", &|s| s.acceleration)]));
+    drivers.push(approach(swings));
     drivers
 }
 

@@ -30,6 +30,8 @@ pub const FAR: [f64; 2] = [4.0, 1.7];
 pub const NEAR: [f64; 1] = [2.0];
 /// Rounds over all standard deviations for each factor.
 const ROUNDS: usize = 4;
+/// Lengths of groups of moving blocks that are compared where no rig guides the sensor.
+const SWAY: [usize; 5] = [1, 2, 4, 8, 16];
 /// Pieces of which neighbours are compared, s.
 const PIECE: f64 = 0.1;
 
@@ -104,25 +106,43 @@ impl<'s> Weighing<'s> {
         squares.map(|squares| trimmed_mean(squares).sqrt().max(f64::MIN_POSITIVE))
     }
 
-    /// From second differences of the residuals of neighbouring moving blocks, by their median; at least as at rest.
+    /// From second differences of the residuals of neighbouring moving blocks; at least as at rest. What a hand adds is
+    /// no white noise: where no rig guides the sensor, groups of blocks count as well, and that which scatters most.
     fn moving(&self, kind: SensorKind, residual: &Means, resting: &[f64; 3]) -> [f64; 3] {
         let Some(values) = &residual[kind as usize] else { return [1.0; 3] };
+        let guided = self.scene.swings.is_some();
+        let bends = |length: usize| self.bends(kind, values, length);
+        let most: Vec<[f64; 3]> = match guided {
+            // The median of a χ² of one degree is 0.455.
+            true => vec![bends(1).map(|b| crate::recording::median(b).unwrap_or(0.0) / 0.455)],
+            false => SWAY.iter().map(|length| bends(*length).map(trimmed_mean)).collect(),
+        };
+        std::array::from_fn(|axis| {
+            let square = most.iter().map(|squares| squares[axis]).fold(0.0, f64::max);
+            square.sqrt().max(resting[axis])
+        })
+    }
+
+    /// Squared second differences of neighbouring groups of moving blocks, as variances of one sample.
+    fn bends(&self, kind: SensorKind, values: &[Vector3<f64>], length: usize) -> [Vec<f64>; 3] {
         let counts = &self.scene.counts[kind as usize];
         let mut squares: [Vec<f64>; 3] = Default::default();
-        for at in 1..values.len().saturating_sub(1) {
-            let whole =
-                |k: usize| self.scene.blocks[k].rest.is_none() && counts[k] > 0 && counts[k] == counts[at];
-            if (at - 1..=at + 1).all(whole) {
-                let bend = values[at - 1] - 2.0 * values[at] + values[at + 1];
-                let n = counts[at] as f64;
-                squares.iter_mut().zip(bend.iter()).for_each(|(s, bend)| s.push(bend * bend * n / 6.0));
+        for from in (0..(values.len() + 1).saturating_sub(3 * length)).step_by(length) {
+            let whole = |k: usize| {
+                self.scene.blocks[k].rest.is_none() && counts[k] > 0 && counts[k] == counts[from]
+            };
+            if !(from..from + 3 * length).all(whole) {
+                continue;
             }
+            let mean = |group: usize| {
+                let first = from + group * length;
+                values[first..first + length].iter().sum::<Vector3<f64>>() / length as f64
+            };
+            let bend = mean(0) - 2.0 * mean(1) + mean(2);
+            let n = (counts[from] * length) as f64;
+            squares.iter_mut().zip(bend.iter()).for_each(|(s, bend)| s.push(bend * bend * n / 6.0));
         }
-        std::array::from_fn(|axis| {
-            // The median of a χ² of one degree is 0.455.
-            let median = crate::recording::median(squares[axis].clone()).unwrap_or(0.0) / 0.455;
-            median.sqrt().max(resting[axis])
-        })
+        squares
     }
 
     /// Σ⁻¹ of each channel of a design.

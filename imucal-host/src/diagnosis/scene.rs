@@ -11,7 +11,7 @@ use crate::{
     effect::{Act, Effect, Input, Role, Swing, Truth},
     recording::{Recording, SensorKind},
     simulator::{
-        Dose, Motion, Replay,
+        Dose, Recorded,
         chain::{Chain, inputs},
     },
 };
@@ -70,11 +70,11 @@ pub struct Scene<'a> {
     pub blocks: Vec<Block>,
     /// Sensors that are there.
     pub kinds: Vec<SensorKind>,
-    /// Swings of the gimbals at each row.
-    pub swings: &'a [[Swing; 3]],
+    /// Swings of the gimbals at each row; `None` without gimbals.
+    pub swings: Option<&'a [[Swing; 3]]>,
     /// Usable rows of each block, by sensor.
     pub counts: [Vec<usize>; 3],
-    motion: &'a Replay,
+    motion: &'a dyn Recorded,
     /// Rows of each sensor that are used, by [`SensorKind::ALL`].
     pub usable: [Vec<bool>; 3],
     /// The triads that the simulator starts from, by [`SensorKind::ALL`].
@@ -89,12 +89,15 @@ impl<'a> Scene<'a> {
     /// Beside `recording`, the rows of each sensor that are to be used, a movement, and the triads that the simulator starts from, by [`SensorKind::ALL`].
     pub fn new(
         recording: &'a Recording,
-        usable: [Vec<bool>; 3],
-        motion: &'a Replay,
+        mut usable: [Vec<bool>; 3],
+        motion: &'a dyn Recorded,
         triads: [Triad<f64>; 3],
     ) -> Self {
         let interval = recording.median_interval().unwrap_or(0.01);
         let blocks = cut(&recording.time, motion.moving(), interval);
+        for usable in &mut usable {
+            usable.iter_mut().enumerate().for_each(|(row, usable)| *usable &= motion.is_known(row));
+        }
         let counts = usable.each_ref().map(|usable| {
             let count = |block: &Block| usable.get(block.rows.clone()).unwrap_or_default();
             blocks.iter().map(|block| count(block).iter().filter(|usable| **usable).count()).collect()
@@ -125,6 +128,11 @@ impl<'a> Scene<'a> {
 
     fn truth(&self, doses: &[Dose], nodes: &Nodes) -> Vec<Truth> {
         Chain::new(doses).truth(self.motion, &nodes.times)
+    }
+
+    /// The truth in the middle of each block, without any effect.
+    pub fn plain(&self) -> Vec<Truth> {
+        self.truth(&[], &self.coarse)
     }
 
     /// Recorded less simulated, block by block. `None` where a triad is singular.

@@ -11,7 +11,7 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::{
     gimbal::direction,
-    truth::{Motion, Place, on_rig},
+    truth::{Motion, Place, Recorded, on_rig},
 };
 use crate::{
     effect::{Machine, Swing, Truth},
@@ -66,25 +66,6 @@ impl Replay {
             .collect();
         Some(Self { time: time.to_vec(), swings, moving, temperature, axes, place })
     }
-
-    /// Swings of the gimbals at each row, outermost first.
-    pub fn swings(&self) -> &[[Swing; 3]] {
-        &self.swings
-    }
-
-    /// Whether a gimbal moves, row by row.
-    pub fn moving(&self) -> &[bool] {
-        &self.moving
-    }
-
-    fn nearest(&self, time: f64) -> usize {
-        let after = self.time.partition_point(|t| *t < time).min(self.time.len().saturating_sub(1));
-        let before = after.saturating_sub(1);
-        match (self.time.get(before), self.time.get(after)) {
-            (Some(b), Some(a)) if time - b < a - time => before,
-            _ => after,
-        }
-    }
 }
 
 impl Motion for Replay {
@@ -93,7 +74,7 @@ impl Motion for Replay {
     }
 
     fn truth(&self, time: f64, rig: &dyn Fn(&mut Machine)) -> Truth {
-        let row = self.nearest(time);
+        let row = nearest(&self.time, time);
         let since = time - self.time.get(row).copied().unwrap_or(time);
         let mut machine = Machine::exact(self.axes.map(direction));
         machine.gimbals = self.swings.get(row).copied().unwrap_or_default().map(|swing| Swing {
@@ -106,7 +87,7 @@ impl Motion for Replay {
     }
 
     fn encoders(&self, time: f64) -> Option<[f64; 3]> {
-        self.swings.get(self.nearest(time)).map(|swings| swings.map(|swing| swing.angle))
+        self.swings.get(nearest(&self.time, time)).map(|swings| swings.map(|swing| swing.angle))
     }
 
     fn rig(&self) -> Rig {
@@ -115,6 +96,31 @@ impl Motion for Replay {
 
     fn place(&self) -> Place {
         self.place
+    }
+}
+
+impl Recorded for Replay {
+    fn moving(&self) -> &[bool] {
+        &self.moving
+    }
+
+    /// A missing reading is that of the row before it.
+    fn is_known(&self, _: usize) -> bool {
+        true
+    }
+
+    fn swings(&self) -> Option<&[[Swing; 3]]> {
+        Some(&self.swings)
+    }
+}
+
+/// The row nearest to a time, s.
+pub fn nearest(times: &[f64], time: f64) -> usize {
+    let after = times.partition_point(|t| *t < time).min(times.len().saturating_sub(1));
+    let before = after.saturating_sub(1);
+    match (times.get(before), times.get(after)) {
+        (Some(b), Some(a)) if time - b < a - time => before,
+        _ => after,
     }
 }
 
@@ -222,7 +228,7 @@ mod tests {
         let replay = Replay::new(&time, &encoders, vec![25.0; 600], axes, Place::ankara()).unwrap();
         assert!(replay.moving()[..285].iter().all(|moves| !moves));
         assert!(replay.moving()[300..].iter().all(|moves| *moves));
-        assert_eq!(replay.swings()[100][0].rate, 0.0);
+        assert_eq!(replay.swings().unwrap()[100][0].rate, 0.0);
     }
 
     #[test]
