@@ -25,7 +25,7 @@ fn structure(value: &Value, path: &str, lines: &mut Vec<String>) {
 }
 
 /// What the contract allows at each path.
-const CONTRACT: [&str; 52] = [
+const CONTRACT: [&str; 53] = [
     ".absent: list",
     ".absent[].effect: text",
     ".absent[].minimum_detectable: number",
@@ -37,6 +37,7 @@ const CONTRACT: [&str; 52] = [
     ".causes[].gap_closed: null",
     ".causes[].gap_closed: number",
     ".causes[].gap_closed_ci95: list",
+    ".causes[].gap_closed_ci95: null",
     ".causes[].gap_closed_ci95[]: null",
     ".causes[].gap_closed_ci95[]: number",
     ".causes[].material: boolean",

@@ -12,10 +12,12 @@ pub struct Candidates {
     pub baseline: Vec<&'static Effect>,
     /// Effects that may be added.
     pub effects: Vec<&'static Effect>,
+    /// Effects that the recording cannot show, and why.
+    pub untestable: Vec<(&'static Effect, &'static str)>,
 }
 
 /// Effects against a calibration made elsewhere: one made of the recording itself holds them.
-pub const ELSEWHERE: [&str; 2] = ["mag.hard_iron", "mag.soft_iron"];
+const ELSEWHERE: [&str; 2] = ["mag.hard_iron", "mag.soft_iron"];
 
 /// Terms of each triad in the baseline; the rig's are beside them.
 const TRIAD_TERMS: [&str; 3] = ["bias", "scale", "misalignment"];
@@ -62,16 +64,24 @@ impl Candidates {
         };
         baseline.extend(NUISANCES.iter().filter(|effect| reached(effect) && is_free(effect)));
         let elsewhere = calibrated(SensorKind::Mag);
-        let effects = others
-            .into_iter()
-            .filter(|effect| setting.thermometer || !effect.id.contains(".temp_"))
-            .filter(|effect| term(effect, kinds).is_some() || !named(effect))
-            .filter(|effect| elsewhere || !ELSEWHERE.contains(&effect.id.as_str()))
-            // The same by another name: what is fixed to the sensor is iron.
-            .filter(|effect| !elsewhere || !is_triad_term(effect, &[SensorKind::Mag]))
-            .filter(|effect| setting.gimbals || !needs_gimbals(effect, kinds))
-            .collect();
-        Self { baseline, effects }
+        let mut candidates = Self { baseline, effects: Vec::new(), untestable: Vec::new() };
+        for effect in others.into_iter().filter(|effect| term(effect, kinds).is_some() || !named(effect)) {
+            // What is fixed to a calibrated sensor is iron, and the triad's terms would be the same by another name.
+            if elsewhere && is_triad_term(effect, &[SensorKind::Mag]) {
+                continue;
+            }
+            if !setting.thermometer && effect.id.contains(".temp_") {
+                candidates.untestable.push((effect, "no temperature was recorded"));
+            } else if !elsewhere && ELSEWHERE.contains(&effect.id.as_str()) {
+                let why = "it shows against a calibration made elsewhere (--model)";
+                candidates.untestable.push((effect, why));
+            } else if !setting.gimbals && needs_gimbals(effect, kinds) {
+                candidates.untestable.push((effect, "no gimbals turn the sensor"));
+            } else {
+                candidates.effects.push(effect);
+            }
+        }
+        candidates
     }
 }
 
@@ -83,6 +93,11 @@ fn needs_gimbals(effect: &Effect, kinds: &[SensorKind]) -> bool {
 
 fn is_triad_term(effect: &Effect, kinds: &[SensorKind]) -> bool {
     matches!(term(effect, kinds), Some(Term::Triad))
+}
+
+/// An effect that stands in the baseline unless it is taken out.
+pub fn is_term(effect: &Effect) -> bool {
+    term(effect, &SensorKind::ALL).is_some() || NUISANCES.iter().any(|term| std::ptr::eq(term, effect))
 }
 
 /// What a term of the baseline belongs to.

@@ -6,8 +6,9 @@ use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    convention::{self, Finding},
+    convention::{self, Conventions, Finding},
     model::Model,
+    revisits,
 };
 use crate::{
     effect::{Act, DataRun, Effect, axis_swap},
@@ -56,8 +57,10 @@ impl Footing {
         if let Some(contradiction) = conventions.contradiction {
             return Err(contradiction);
         }
-        let mut usable = SensorKind::ALL
-            .map(|kind| integrity.sensor(kind).map(|sensor| sensor.usable.clone()).unwrap_or_default());
+        let mut usable = SensorKind::ALL.map(|kind| usable_rows(recording, &integrity, &conventions, kind));
+        for usable in &mut usable {
+            usable.iter_mut().zip(movement.known()).for_each(|(usable, known)| *usable &= known);
+        }
         let mut triads = model.triads;
         if let Some(turn) = conventions.turned.and_then(axis_swap::signed_permutation) {
             triads.iter_mut().for_each(|triad| triad.gain = turn.tr_mul(&triad.gain));
@@ -79,10 +82,32 @@ impl Footing {
         debug_assert!(recording.sensor(*measured).is_some());
         let mut remarks = conventions.remarks;
         remarks.extend(model.remark);
+        remarks.extend(revisits::remark(&*movement));
         remarks.extend(shortcomings(recording));
         let findings = conventions.findings;
         Ok(Self { movement, usable, triads, calibrated: model.calibrated, findings, remarks })
     }
+}
+
+/// Rows of a sensor that can be used. In a wrong unit every sample may seem to lie beyond the range: then those count
+/// that were measured and are not stuck.
+fn usable_rows(
+    recording: &Recording,
+    integrity: &Integrity,
+    conventions: &Conventions,
+    kind: SensorKind,
+) -> Vec<bool> {
+    let (Some(sensor), Some(triple)) = (integrity.sensor(kind), recording.sensor(kind)) else {
+        return Vec::new();
+    };
+    let id = format!("{kind}.unit_error");
+    if !conventions.findings.iter().any(|finding| finding.effect.id == id) {
+        return sensor.usable.clone();
+    }
+    let mut usable: Vec<bool> =
+        triple.values.iter().map(|value| value.iter().all(|component| component.is_finite())).collect();
+    sensor.stuck.iter().for_each(|rows| usable[rows.clone()].fill(false));
+    usable
 }
 
 /// What the samples of a data effect are of those before it, where that is linear: a column an axis.
@@ -109,7 +134,9 @@ fn leave_out(finding: &Finding, recording: &Recording, kind: SensorKind, usable:
             let amount = finding.parameters.iter().find(|amount| amount.name == name);
             amount.and_then(|amount| amount.value)
         };
-        if let (Some(start), Some(end)) = (time("t_start"), time("t_end")) {
+        if let Some(start) = time("t_start") {
+            // Without an end it goes on to that of the recording.
+            let end = time("t_end").unwrap_or(f64::INFINITY);
             for (usable, time) in usable.iter_mut().zip(&recording.time) {
                 *usable &= !(start..end).contains(time);
             }
@@ -169,10 +196,10 @@ fn movement(
                 .into());
         }
     };
-    if movement.duration() < SHORTEST {
+    let length = movement.duration() - recording.time.first().copied().unwrap_or(0.0);
+    if length < SHORTEST {
         return Err(format!(
-            "{:.0} s are too short to tell drift from anything else; {SHORTEST:.0} s at least",
-            movement.duration()
+            "{length:.0} s are too short to tell drift from anything else; {SHORTEST:.0} s at least"
         ));
     }
     if !movement.moving().iter().any(|moves| *moves) {

@@ -16,6 +16,7 @@ pub mod model;
 pub mod noise;
 pub mod orientation;
 pub mod refit;
+pub mod revisits;
 pub mod scene;
 pub mod search;
 pub mod shape;
@@ -122,7 +123,7 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
     let (linear, best) = (&explained.linear, &explained.best);
     let drivers = driver::drivers(linear.scene);
     let before = driver::following(linear, &[], &best.noise, &drivers)?;
-    let after = driver::following(linear, &best.set, &best.noise, &drivers)?;
+    let after = driver::following_anew(linear, &best.set, &best.noise, &drivers)?;
     progress("drivers tested");
     let left = after.iter().find(|f| is_followed(f, after.len()));
     let closed = gap::closed(linear, &best.set, &best.noise, left.map_or(0.0, |f| f.size))?;

@@ -32,6 +32,8 @@ pub const NEAR: [f64; 1] = [2.0];
 const ROUNDS: usize = 4;
 /// Lengths of groups of moving blocks that are compared where no rig guides the sensor.
 const SWAY: [usize; 5] = [1, 2, 4, 8, 16];
+/// Share of drift and scatter that [`Noise::quieter`] leaves.
+const QUIET: f64 = 0.2;
 /// Pieces of which neighbours are compared, s.
 const PIECE: f64 = 0.1;
 
@@ -53,6 +55,19 @@ pub struct SensorNoise {
 pub struct Noise {
     /// Of each sensor.
     pub sensors: [SensorNoise; 3],
+}
+
+impl Noise {
+    /// With smaller drifts and scatter: what an unmodelled effect has put into them comes to light.
+    #[must_use]
+    pub fn quieter(&self) -> Self {
+        let mut quiet = self.clone();
+        for sensor in &mut quiet.sensors {
+            sensor.drift = sensor.drift.map(|sigma| QUIET * sigma);
+            sensor.scatter *= QUIET;
+        }
+        quiet
+    }
 }
 
 /// What weighs the blocks: the scene, and what each sensor is given there.
@@ -80,27 +95,30 @@ impl<'s> Weighing<'s> {
         Noise { sensors }
     }
 
-    /// From the differences of neighbouring pieces of a rest; all pieces of a block have one length.
+    /// From the differences of neighbouring pieces of a rest.
     fn resting(&self, kind: SensorKind) -> [f64; 3] {
         let Some(triple) = self.scene.recording.sensor(kind) else { return [1.0; 3] };
         let interval = self.scene.recording.median_interval().unwrap_or(PIECE);
         let length = ((PIECE / interval).round() as usize).max(1);
         let mut squares: [Vec<f64>; 3] = Default::default();
         let usable = &self.scene.usable[kind as usize];
-        let whole =
-            |block: &&Block| block.rest.is_some() && usable[block.rows.clone()].iter().all(|row| *row);
-        for block in self.scene.blocks.iter().filter(whole) {
-            let pieces: Vec<Vector3<f64>> = triple.values[block.rows.clone()]
+        for block in self.scene.blocks.iter().filter(|block| block.rest.is_some()) {
+            // A sensor may be slower than the recording: then some rows hold nothing of it.
+            let rows: Vec<usize> = block.rows.clone().collect();
+            let pieces: Vec<(Vector3<f64>, f64)> = rows
                 .chunks_exact(length)
-                .map(|rows| rows.iter().sum::<Vector3<f64>>() / length as f64)
+                .filter_map(|rows| {
+                    let measured = rows.iter().filter(|row| usable[**row]);
+                    let (sum, count) =
+                        measured.fold((Vector3::zeros(), 0.0), |(s, n), row| (s + triple.values[*row], n + 1.0));
+                    (count > 0.0).then(|| (sum / count, count))
+                })
                 .collect();
             for pair in pieces.windows(2) {
-                let step = pair[1] - pair[0];
-                for (squares, step) in
-                    squares.iter_mut().zip(step.iter()).filter(|(_, step)| step.is_finite())
-                {
-                    squares.push(0.5 * step * step * length as f64);
-                }
+                let ((before, m), (after, n)) = (pair[0], pair[1]);
+                let step = after - before;
+                let samples = 1.0 / (1.0 / m + 1.0 / n);
+                squares.iter_mut().zip(step.iter()).for_each(|(s, step)| s.push(step * step * samples));
             }
         }
         squares.map(|squares| trimmed_mean(squares).sqrt().max(f64::MIN_POSITIVE))
@@ -126,21 +144,26 @@ impl<'s> Weighing<'s> {
     /// Squared second differences of neighbouring groups of moving blocks, as variances of one sample.
     fn bends(&self, kind: SensorKind, values: &[Vector3<f64>], length: usize) -> [Vec<f64>; 3] {
         let counts = &self.scene.counts[kind as usize];
+        let guided = self.scene.swings.is_some();
         let mut squares: [Vec<f64>; 3] = Default::default();
         for from in (0..(values.len() + 1).saturating_sub(3 * length)).step_by(length) {
-            let whole = |k: usize| {
-                self.scene.blocks[k].rest.is_none() && counts[k] > 0 && counts[k] == counts[from]
-            };
+            // On a rig a block with fewer rows is one that it has just left or reached.
+            let full = |k: usize| if guided { counts[k] == counts[from] } else { 2 * counts[k] > counts[from] };
+            let whole = |k: usize| self.scene.blocks[k].rest.is_none() && counts[k] > 0 && full(k);
             if !(from..from + 3 * length).all(whole) {
                 continue;
             }
-            let mean = |group: usize| {
-                let first = from + group * length;
-                values[first..first + length].iter().sum::<Vector3<f64>>() / length as f64
+            let group = |which: usize| {
+                let blocks = from + which * length..from + (which + 1) * length;
+                blocks.fold((Vector3::zeros(), 0.0), |(sum, count), k| {
+                    let n = counts[k] as f64;
+                    (sum + values[k] * n, count + n)
+                })
             };
-            let bend = mean(0) - 2.0 * mean(1) + mean(2);
-            let n = (counts[from] * length) as f64;
-            squares.iter_mut().zip(bend.iter()).for_each(|(s, bend)| s.push(bend * bend * n / 6.0));
+            let [(a, l), (b, m), (c, n)] = [0, 1, 2].map(group);
+            let bend = a / l - 2.0 * b / m + c / n;
+            let share = 1.0 / l + 4.0 / m + 1.0 / n;
+            squares.iter_mut().zip(bend.iter()).for_each(|(s, bend)| s.push(bend * bend / share));
         }
         squares
     }

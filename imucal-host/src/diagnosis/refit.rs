@@ -2,10 +2,11 @@
 //!
 //! Gauss–Newton: the residual at full rate, its derivative from the nodes. Steps that make it worse are halved.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::{
+    candidates,
     design::{Column, Design},
     noise::{Noise, Weighing},
     scene::{Means, Reference, Scene, amplitudes},
@@ -16,6 +17,11 @@ use crate::{effect::Effect, simulator::Dose};
 const STEPS: usize = 6;
 /// A step is small enough when no parameter moves by more than this share of its standard error.
 const SETTLED: f64 = 0.05;
+
+/// Prior standard deviation of a term of the baseline, in usual sizes.
+const FREE: f64 = 1e4;
+/// Of an effect.
+const LARGE: f64 = 100.0;
 
 /// Effects with fitted amplitudes and what they leave.
 #[derive(Clone, Debug)]
@@ -61,21 +67,27 @@ pub fn refit(scene: &Scene<'_>, doses: Vec<Dose>, noise: Option<&Noise>) -> Opti
         let whitenings = weighing.whitenings(&design, &noise);
         let all: Vec<usize> = (0..columns.len()).collect();
         let normal = design.normal(&whitenings, &all);
-        // Directions that the data do not show stay where they are.
-        let loosened = &normal.information + nalgebra::DMatrix::identity(columns.len(), columns.len()) * 1e-8;
-        let covariance = loosened.cholesky()?.inverse();
-        let step = &covariance * &normal.score;
+        // Directions that the data do not show stay near zero.
+        let (precision, at) = prior(&fit.doses, &columns);
+        let held = &normal.information + DMatrix::from_diagonal(&precision);
+        let covariance = held.cholesky()?.inverse();
+        let step = &covariance * (&normal.score - precision.component_mul(&at));
         let variances = covariance.diagonal();
         let moved = step.iter().zip(variances.iter()).map(|(s, v)| s.abs() / v.sqrt());
         let largest = moved.fold(0.0f64, f64::max);
-        let energy =
-            |residual: &Means| Design::new(scene, Vec::new(), &[], residual).normal(&whitenings, &[]).energy;
+        let energy = |fit: &Fit| {
+            let (precision, at) = prior(&fit.doses, &columns);
+            let left = Design::new(scene, Vec::new(), &[], &fit.residual).normal(&whitenings, &[]).energy;
+            left + at.component_mul(&at).dot(&precision)
+        };
+        let before = energy(&fit);
         let mut factor = 1.0;
         let better = loop {
             let doses = moved_by(&fit.doses, &columns, &(&step * factor));
             let residual = scene.residual(&doses)?;
-            if energy(&residual) <= normal.energy + 1e-9 {
-                break Some(Fit { doses, residual });
+            let tried = Fit { doses, residual };
+            if energy(&tried) <= before + 1e-9 {
+                break Some(tried);
             }
             factor *= 0.5;
             if factor < 0.05 {
@@ -89,6 +101,21 @@ pub fn refit(scene: &Scene<'_>, doses: Vec<Dose>, noise: Option<&Noise>) -> Opti
         }
     }
     Some(fit)
+}
+
+/// Precision of each column's prior, and where the column stands, in usual sizes. A term of the baseline may be of any
+/// size; an effect is not many times its usual one, so that what the data do not show stays small.
+fn prior(doses: &[Dose], columns: &[Column]) -> (DVector<f64>, DVector<f64>) {
+    let precision = columns.iter().map(|column| {
+        let loose = if candidates::is_term(column.effect) { FREE } else { LARGE };
+        1.0 / (loose * loose)
+    });
+    let at = columns.iter().map(|column| {
+        let dose = doses.iter().find(|dose| column.is_of(dose.effect));
+        dose.map_or(0.0, |dose| dose.values[column.parameter])
+            / column.effect.parameters[column.parameter].prior_scale
+    });
+    (DVector::from_iterator(columns.len(), precision), DVector::from_iterator(columns.len(), at))
 }
 
 /// Doses with their amplitudes moved by usual sizes, within what can be.

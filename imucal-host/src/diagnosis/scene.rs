@@ -89,15 +89,12 @@ impl<'a> Scene<'a> {
     /// Beside `recording`, the rows of each sensor that are to be used, a movement, and the triads that the simulator starts from, by [`SensorKind::ALL`].
     pub fn new(
         recording: &'a Recording,
-        mut usable: [Vec<bool>; 3],
+        usable: [Vec<bool>; 3],
         motion: &'a dyn Recorded,
         triads: [Triad<f64>; 3],
     ) -> Self {
         let interval = recording.median_interval().unwrap_or(0.01);
         let blocks = cut(&recording.time, motion.moving(), interval);
-        for usable in &mut usable {
-            usable.iter_mut().enumerate().for_each(|(row, usable)| *usable &= motion.is_known(row));
-        }
         let counts = usable.each_ref().map(|usable| {
             let count = |block: &Block| usable.get(block.rows.clone()).unwrap_or_default();
             blocks.iter().map(|block| count(block).iter().filter(|usable| **usable).count()).collect()

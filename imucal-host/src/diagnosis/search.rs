@@ -204,7 +204,7 @@ impl<'s> Linear<'s> {
 
     /// The best set with one effect more, judged with its own noise.
     fn added(&self, from: &Judged) -> Option<Option<Judged>> {
-        let quiet = quieter(&from.noise);
+        let quiet = from.noise.quieter();
         let mut shortlist: Vec<&'static Effect> = Vec::new();
         for noise in [&from.noise, &quiet] {
             let (own, ranked) = self.ranked(&from.set, noise)?;
@@ -275,16 +275,6 @@ fn log_evidence(
         ..normal.clone()
     };
     Some(projected.log_bayes_factor(&parts) - 0.5 * super::noise::restricted(&alone))
-}
-
-/// A noise whose drifts are smaller: what an unmodelled effect has put into them comes to light.
-fn quieter(noise: &Noise) -> Noise {
-    let mut quiet = noise.clone();
-    for sensor in &mut quiet.sensors {
-        sensor.drift = sensor.drift.map(|sigma| 0.2 * sigma);
-        sensor.scatter *= 0.2;
-    }
-    quiet
 }
 
 /// Searches. `None` where the simulator fails.

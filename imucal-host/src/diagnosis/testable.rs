@@ -1,14 +1,13 @@
 //! Which effects would have been seen, and which this recording cannot show.
 
 use super::{
-    candidates::ELSEWHERE,
     driver::score_test,
     evidence::Projected,
     finding::{Absent, NotTestable},
     noise::Noise,
     search::Linear,
 };
-use crate::{effect::Effect, recording::SensorKind};
+use crate::effect::Effect;
 
 /// A signature of this whitened squared size is found in four of five recordings.
 const SEEN: f64 = 25.0;
@@ -26,14 +25,12 @@ pub fn testable(
     let fitted = linear.fitted(set);
     let others: Vec<usize> = every.into_iter().filter(|id| !fitted.contains(id)).collect();
     let projected = Projected::new(&normal, &fitted, &others)?;
-    let (mut absent, mut untold) = (Vec::new(), Vec::new());
-    if linear.scene.kinds.contains(&SensorKind::Mag) {
-        let offered = |id: &&&str| !linear.candidates.effects.iter().any(|effect| effect.id == ***id);
-        untold.extend(ELSEWHERE.iter().filter(offered).map(|id| NotTestable {
-            effect: (*id).to_owned(),
-            because: "it shows against a calibration made elsewhere (--model)".to_owned(),
-        }));
-    }
+    let mut absent = Vec::new();
+    let told = |(effect, why): &(&'static Effect, &str)| NotTestable {
+        effect: effect.id.clone(),
+        because: (*why).to_owned(),
+    };
+    let mut untold: Vec<NotTestable> = linear.candidates.untestable.iter().map(told).collect();
     for effect in &linear.candidates.effects {
         if set.iter().any(|own| std::ptr::eq(*own, *effect)) {
             continue;

@@ -38,6 +38,7 @@ pub struct Replay {
     time: Vec<f64>,
     swings: Vec<[Swing; 3]>,
     moving: Vec<bool>,
+    known: Vec<bool>,
     temperature: Vec<f64>,
     axes: [Axis; 3],
     place: Place,
@@ -57,6 +58,7 @@ impl Replay {
         let median = (time.last()? - time.first()?) / (time.len().max(2) - 1) as f64;
         let reach = ((REACH / median).floor() as usize).max(FEWEST);
         let moving = moving(time, &angles);
+        let known = known(encoders, reach);
         let still = |swing: Swing| Swing::still(swing.angle);
         let swings = (0..time.len())
             .map(|row| {
@@ -64,7 +66,7 @@ impl Replay {
                 if moving[row] { swings } else { swings.map(still) }
             })
             .collect();
-        Some(Self { time: time.to_vec(), swings, moving, temperature, axes, place })
+        Some(Self { time: time.to_vec(), swings, moving, known, temperature, axes, place })
     }
 }
 
@@ -104,9 +106,9 @@ impl Recorded for Replay {
         &self.moving
     }
 
-    /// A missing reading is that of the row before it.
-    fn is_known(&self, _: usize) -> bool {
-        true
+    /// All readings that a row's swing is told from were measured.
+    fn known(&self) -> &[bool] {
+        &self.known
     }
 
     fn swings(&self) -> Option<&[[Swing; 3]]> {
@@ -138,6 +140,17 @@ fn unwrapped(encoders: &[[f64; 3]]) -> Option<Vec<[f64; 3]>> {
         last
     };
     Some(encoders.iter().map(unwrap).collect())
+}
+
+/// Rows about which all readings were measured.
+fn known(encoders: &[[f64; 3]], reach: usize) -> Vec<bool> {
+    let mut known = vec![true; encoders.len()];
+    for (row, _) in encoders.iter().enumerate().filter(|(_, row)| row.iter().any(|angle| !angle.is_finite()))
+    {
+        let to = (row + 2 * reach + 1).min(known.len());
+        known[row.saturating_sub(2 * reach)..to].fill(false);
+    }
+    known
 }
 
 /// Rows at which a gimbal moves.

@@ -132,8 +132,8 @@ impl Recorded for Tracked {
         &self.moving
     }
 
-    fn is_known(&self, row: usize) -> bool {
-        self.known.get(row).copied().unwrap_or(false)
+    fn known(&self) -> &[bool] {
+        &self.known
     }
 
     fn swings(&self) -> Option<&[[Swing; 3]]> {
@@ -237,7 +237,7 @@ mod tests {
     #[test]
     fn rows_without_an_attitude_are_bridged_and_not_known() {
         let (tumble, tracked) = tracked(1100..1105);
-        assert!(!tracked.is_known(1102) && !tracked.is_known(1097) && tracked.is_known(1200));
+        assert!(!tracked.known()[1102] && !tracked.known()[1097] && tracked.known()[1200]);
         let (here, there) = (tracked.truth(11.02, &|_| ()), tumble.truth(11.02, &|_| ()));
         assert!((here.f_t - there.f_t).norm() < 0.05);
     }

@@ -61,8 +61,8 @@ pub trait Recorded: Motion + Sync {
     /// Whether it moves, row by row.
     fn moving(&self) -> &[bool];
 
-    /// Whether the recording tells the attitude at a row.
-    fn is_known(&self, row: usize) -> bool;
+    /// Whether the recording tells the attitude, row by row.
+    fn known(&self) -> &[bool];
 
     /// Swings of the gimbals at each row, outermost first; `None` without gimbals.
     fn swings(&self) -> Option<&[[Swing; 3]]>;

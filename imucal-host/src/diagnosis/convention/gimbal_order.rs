@@ -130,10 +130,12 @@ pub(super) fn remark(
         });
     }
     lost.first()?;
-    let axes: [Axis; 3] = motion.rig().axes?.try_into().ok()?;
-    let best = best(recording, integrity, motion, &axes, rows, truth, &compared);
+    let axes: Option<[Axis; 3]> = motion.rig().axes.and_then(|axes| axes.try_into().ok());
+    let best = axes.and_then(|axes| {
+        best(recording, integrity, motion, &axes, rows, truth, &compared).map(|best| (axes, best))
+    });
     Some(match best {
-        Some((reading, left)) => format!(
+        Some((axes, (reading, left))) => format!(
             "{complaint}; {:.1} % would if the encoders were read so: {}",
             100.0 * left,
             reading.words(&axes)

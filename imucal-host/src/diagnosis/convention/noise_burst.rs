@@ -245,3 +245,23 @@ impl Levels {
         (from, to)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulator::random::{Purpose, Random};
+
+    #[test]
+    fn in_even_noise_a_small_probability_is_no_more_frequent_than_it_says() {
+        let mut random = Random::new(8, Purpose::Noise);
+        let runs = 400;
+        let alarms = (0..runs).filter(|_| {
+            let level = |_| Window { bends: 0..1, moves: false, level: random.normal() };
+            let windows: Vec<Window> = (0..150).map(level).collect();
+            scan(&windows).unwrap().p_value < 0.05
+        });
+        // 20 are expected at most; 30 would be 2.3 standard deviations more.
+        let count = alarms.count();
+        assert!(count < 30, "{count} of {runs}");
+    }
+}

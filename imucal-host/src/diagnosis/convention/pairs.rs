@@ -14,7 +14,9 @@ const ROUNDS: usize = 3;
 const FAR: f64 = 6.0;
 /// Directions in which the input varies less than this share of the largest do not count.
 const FLAT: f64 = 1e-6;
-/// A triad with fewer rows says nothing.
+/// Samples this many times full scale are in another unit.
+const BEYOND: f64 = 1.05;
+/// A triad with fewer rows says nothing, nor do fewer samples beyond full scale.
 const FEWEST: usize = 20;
 
 /// Second moments of samples and inputs about their means.
@@ -59,10 +61,10 @@ impl Pairs {
         let samples = &recording.sensor(kind)?.values;
         let sensor = integrity.sensor(kind)?;
         let measured = |row: usize| samples[row].iter().all(|component| component.is_finite());
-        // In a wrong unit whatever is measured may lie beyond full scale.
-        let usable = rows.iter().filter(|row| sensor.usable[**row]).count();
-        let lost = 2 * usable < rows.iter().filter(|row| measured(**row)).count();
-        let taken = |row: usize| if lost { measured(row) } else { sensor.usable[row] };
+        // Nothing lies beyond full scale, but in a wrong unit: then what seems clipped is not.
+        let most = recording.sensor(kind)?.full_scale_si().map_or(f64::INFINITY, |scale| BEYOND * scale);
+        let beyond = samples.iter().filter(|sample| sample.amax() > most).count() > FEWEST;
+        let taken = |row: usize| if beyond { measured(row) } else { sensor.usable[row] };
         let rows = rows.iter().zip(truth).filter(|(row, _)| taken(**row));
         let rows: Vec<_> = rows.map(|(row, truth)| (samples[*row], given(kind, truth))).collect();
         let pairs = Self { rows };

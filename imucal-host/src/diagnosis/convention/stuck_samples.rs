@@ -13,15 +13,14 @@ const PIECE: usize = 100;
 /// A sensor that repeats more than this share of its rows is slower than the recording.
 const SLOW: f64 = 0.45;
 
-/// Looks at one sensor; dead stretches, which have a check of their own, do not count.
+/// Looks at one sensor; dead and clipped stretches, which have checks of their own, do not count.
 pub(super) fn check(triple: &Triple, sensor: &SensorIntegrity, found: &mut Conventions) {
-    let dead = |row: usize| sensor.stuck.iter().any(|rows| rows.contains(&row));
     let repeats: Vec<[bool; 4]> = triple
         .values
         .windows(2)
-        .enumerate()
-        .filter(|(at, pair)| pair[0].iter().chain(pair[1].iter()).all(|v| v.is_finite()) && !dead(at + 1))
-        .map(|(_, pair)| {
+        .zip(sensor.usable.windows(2))
+        .filter(|(_, usable)| usable[0] && usable[1])
+        .map(|(pair, _)| {
             let [x, y, z] = [0, 1, 2].map(|axis| pair[0][axis] == pair[1][axis]);
             [x, y, z, x && y && z]
         })
