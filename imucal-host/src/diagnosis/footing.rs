@@ -14,7 +14,7 @@ use crate::{
     effect::{Act, DataRun, Effect, axis_swap},
     observe::motion::{self, Attitudes},
     recording::{
-        Recording, SensorKind,
+        Recording, SensorKind, Triple,
         integrity::{self, Integrity},
         manifest::Axis,
         median,
@@ -26,6 +26,9 @@ use crate::{
 
 /// Recordings are at least this long, s.
 const SHORTEST: f64 = 30.0;
+
+/// Samples closer to a limit than this many standard deviations of their noise are not used.
+const CLIPPED: f64 = 5.0;
 
 /// What a diagnosis stands on.
 pub struct Footing {
@@ -110,6 +113,16 @@ fn usable_rows(
     usable
 }
 
+/// Noise of a triad's samples, SI unit: the largest of the axes', from neighbouring samples.
+fn noise(triple: &Triple) -> f64 {
+    let of = |axis: usize| {
+        let steps = triple.values.windows(2).map(|pair| (pair[1][axis] - pair[0][axis]).abs());
+        // The median of |x| is 0.674 of its standard deviation; a step has that of a sample, times √2.
+        median(steps.filter(|step| step.is_finite()).collect()).unwrap_or(0.0) / (0.674 * 2.0f64.sqrt())
+    };
+    (0..3).map(of).fold(0.0, f64::max)
+}
+
 /// What the samples of a data effect are of those before it, where that is linear: a column an axis.
 fn response(effect: &Effect, values: &[f64]) -> Option<Matrix3<f64>> {
     let Act::Data(_, alter) = effect.act else { return None };
@@ -127,6 +140,17 @@ fn leave_out(finding: &Finding, recording: &Recording, kind: SensorKind, usable:
     if finding.effect.id.ends_with(".stuck_samples") {
         for row in 1..usable.len() {
             usable[row] &= triple.values[row] != triple.values[row - 1];
+        }
+    }
+    if finding.effect.id.ends_with(".saturation")
+        && let (Some(shortfall), Some(full_scale)) =
+            (finding.parameters.first().and_then(|amount| amount.value), triple.full_scale_si())
+    {
+        // Just below the limit noise is clipped on one side.
+        let limit = full_scale / (1.0 + shortfall);
+        let noise = noise(triple);
+        for (usable, value) in usable.iter_mut().zip(&triple.values) {
+            *usable &= value.amax() < limit - CLIPPED * noise;
         }
     }
     if finding.effect.id.ends_with(".noise_burst") {

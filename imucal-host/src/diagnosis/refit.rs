@@ -21,7 +21,7 @@ const SETTLED: f64 = 0.05;
 /// Prior standard deviation of a term of the baseline, in usual sizes.
 const FREE: f64 = 1e4;
 /// Of an effect.
-const LARGE: f64 = 100.0;
+const LARGE: f64 = 30.0;
 
 /// Effects with fitted amplitudes and what they leave.
 #[derive(Clone, Debug)]
@@ -67,18 +67,16 @@ pub fn refit(scene: &Scene<'_>, doses: Vec<Dose>, noise: Option<&Noise>) -> Opti
         let whitenings = weighing.whitenings(&design, &noise);
         let all: Vec<usize> = (0..columns.len()).collect();
         let normal = design.normal(&whitenings, &all);
-        // Directions that the data do not show stay near zero.
         let (precision, at) = prior(&fit.doses, &columns);
-        let held = &normal.information + DMatrix::from_diagonal(&precision);
-        let covariance = held.cholesky()?.inverse();
+        let covariance = (&normal.information + DMatrix::from_diagonal(&precision)).cholesky()?.inverse();
         let step = &covariance * (&normal.score - precision.component_mul(&at));
         let variances = covariance.diagonal();
         let moved = step.iter().zip(variances.iter()).map(|(s, v)| s.abs() / v.sqrt());
         let largest = moved.fold(0.0f64, f64::max);
         let energy = |fit: &Fit| {
             let (precision, at) = prior(&fit.doses, &columns);
-            let left = Design::new(scene, Vec::new(), &[], &fit.residual).normal(&whitenings, &[]).energy;
-            left + at.component_mul(&at).dot(&precision)
+            let data = Design::new(scene, Vec::new(), &[], &fit.residual).normal(&whitenings, &[]).energy;
+            data + precision.component_mul(&at).dot(&at)
         };
         let before = energy(&fit);
         let mut factor = 1.0;

@@ -2,6 +2,7 @@
 //!
 //! Angle, rate and acceleration of each gimbal are those of a cubic through the readings within [`REACH`] of a row, by
 //! least squares: a reading's noise is averaged, and a movement whose angle is a cubic over that time stays as it is.
+//! Where a wider cubic tells another rate, the gimbal has jerked, and its rate there is not known.
 //! Between rows the nearest row's swing goes on with constant acceleration. A rig whose readings change no more than
 //! their noise would make them stands still: its rates are zero. Not modelled: readings that lag the gimbal.
 
@@ -29,6 +30,8 @@ const WINDOW: f64 = 0.1;
 const CREEP: f64 = 3e-3;
 /// and by more than this many standard deviations of a reading's noise.
 const NOISES: f64 = 8.0;
+/// Two rates further apart than this, rad/s, and than their noise are those of a jerk.
+const JERK: f64 = 1e-3;
 /// At least this many readings to each side.
 const FEWEST: usize = 2;
 
@@ -55,17 +58,31 @@ impl Replay {
         place: Place,
     ) -> Option<Self> {
         let angles = unwrapped(encoders)?;
-        let median = (time.last()? - time.first()?) / (time.len().max(2) - 1) as f64;
-        let reach = ((REACH / median).floor() as usize).max(FEWEST);
-        let moving = moving(time, &angles);
-        let known = known(encoders, reach);
+        let interval = (time.last()? - time.first()?) / (time.len().max(2) - 1) as f64;
+        let reach = ((REACH / interval).floor() as usize).max(FEWEST);
+        let noise = noise(&angles);
+        let moving = moving(time, &angles, &noise);
+        let mut known = known(encoders, reach);
         let still = |swing: Swing| Swing::still(swing.angle);
-        let swings = (0..time.len())
-            .map(|row| {
-                let swings = swing(time, &angles, row, reach);
-                if moving[row] { swings } else { swings.map(still) }
-            })
-            .collect();
+        let mut swings = Vec::with_capacity(time.len());
+        for row in 0..time.len() {
+            let near = swing(time, &angles, row, reach);
+            if !moving[row] {
+                swings.push(near.map(still));
+                continue;
+            }
+            let wide = swing(time, &angles, row, reach + 1);
+            // Noise of a rate is about that of a reading in the time between two.
+            let jerked = (0..3).any(|gimbal| {
+                let apart = (near[gimbal].rate - wide[gimbal].rate).abs();
+                apart > JERK + NOISES * noise[gimbal] / interval
+            });
+            if jerked {
+                let to = (row + reach + 1).min(known.len());
+                known[row.saturating_sub(reach)..to].fill(false);
+            }
+            swings.push(near);
+        }
         Some(Self { time: time.to_vec(), swings, moving, known, temperature, axes, place })
     }
 }
@@ -106,7 +123,7 @@ impl Recorded for Replay {
         &self.moving
     }
 
-    /// All readings that a row's swing is told from were measured.
+    /// All readings that tell a row's swing were measured, and no gimbal jerked.
     fn known(&self) -> &[bool] {
         &self.known
     }
@@ -153,13 +170,17 @@ fn known(encoders: &[[f64; 3]], reach: usize) -> Vec<bool> {
     known
 }
 
-/// Rows at which a gimbal moves.
-fn moving(time: &[f64], angles: &[[f64; 3]]) -> Vec<bool> {
-    let noise = [0, 1, 2].map(|axis| {
+/// Standard deviation of each encoder's readings, rad.
+fn noise(angles: &[[f64; 3]]) -> [f64; 3] {
+    [0, 1, 2].map(|axis| {
         let bends = angles.windows(3).map(|w| (w[0][axis] - 2.0 * w[1][axis] + w[2][axis]).abs()).collect();
         // The median of |x| is 0.674 of its standard deviation; a bend has that of a reading, times √6.
         median(bends).unwrap_or(0.0) / (0.674 * 6.0f64.sqrt())
-    });
+    })
+}
+
+/// Rows at which a gimbal moves.
+fn moving(time: &[f64], angles: &[[f64; 3]], noise: &[f64; 3]) -> Vec<bool> {
     let (mut before, mut after) = (0, 0);
     (0..time.len())
         .map(|row| {
