@@ -45,7 +45,10 @@ impl Candidates {
         let named = |effect: &Effect| without.contains(&effect.id);
         let calibrated = |kind: SensorKind| setting.calibrated.contains(&kind);
         let given = |effect: &Effect| effect.sensors.iter().all(|kind| calibrated(*kind));
+        // A reference that is no rig has a clock of its own.
+        let on_clock = |effect: &Effect| !setting.gimbals && effect.id == "clk.time_offset";
         let in_baseline = |effect: &Effect| match term(effect, kinds) {
+            _ if on_clock(effect) => !named(effect),
             Some(Term::Rig) => !named(effect),
             Some(Term::Triad) => !named(effect) && !given(effect),
             None => false,
@@ -65,7 +68,8 @@ impl Candidates {
         baseline.extend(NUISANCES.iter().filter(|effect| reached(effect) && is_free(effect)));
         let elsewhere = calibrated(SensorKind::Mag);
         let mut candidates = Self { baseline, effects: Vec::new(), untestable: Vec::new() };
-        for effect in others.into_iter().filter(|effect| term(effect, kinds).is_some() || !named(effect)) {
+        let is_term = |effect: &Effect| term(effect, kinds).is_some() || on_clock(effect);
+        for effect in others.into_iter().filter(|effect| is_term(effect) || !named(effect)) {
             // What is fixed to a calibrated sensor is iron, and the triad's terms would be the same by another name.
             if elsewhere && is_triad_term(effect, &[SensorKind::Mag]) {
                 continue;

@@ -30,8 +30,8 @@ pub const FAR: [f64; 2] = [4.0, 1.7];
 pub const NEAR: [f64; 1] = [2.0];
 /// Rounds over all standard deviations for each factor.
 const ROUNDS: usize = 4;
-/// Lengths of groups of moving blocks that are compared where no rig guides the sensor.
-const SWAY: [usize; 5] = [1, 2, 4, 8, 16];
+/// Lengths of groups of moving blocks that are compared where no rig guides the sensor; what is slower is drift.
+const SWAY: [usize; 3] = [1, 2, 4];
 /// Share of drift and scatter that [`Noise::quieter`] leaves.
 const QUIET: f64 = 0.2;
 /// Pieces of which neighbours are compared, s.
@@ -86,13 +86,20 @@ impl<'s> Weighing<'s> {
 
     /// Noise from what samples do within a tenth of a second, and drift yet to be told.
     pub fn white(&self, residual: &Means) -> Noise {
+        let scatter = 100.0 * self.least_scatter();
         let sensors = SensorKind::ALL.map(|kind| {
             let white = self.resting(kind);
             let moving = self.moving(kind, residual, &white);
             let typical = white.iter().fold(0.0f64, |a, b| a.max(*b));
-            SensorNoise { white, moving, drift: [0.05 * typical, 0.1 * typical], scatter: 1e-5 }
+            SensorNoise { white, moving, drift: [0.05 * typical, 0.1 * typical], scatter }
         });
         Noise { sensors }
+    }
+
+    /// The smallest scatter that is looked for, rad: a rig repeats its rests; a hand does not, nor is the field of a
+    /// room the same all over it.
+    fn least_scatter(&self) -> f64 {
+        if self.scene.swings.is_some() { 1e-7 } else { 1e-5 }
     }
 
     /// From the differences of neighbouring pieces of a rest.
@@ -133,7 +140,7 @@ impl<'s> Weighing<'s> {
         let most: Vec<[f64; 3]> = match guided {
             // The median of a χ² of one degree is 0.455.
             true => vec![bends(1).map(|b| crate::recording::median(b).unwrap_or(0.0) / 0.455)],
-            false => SWAY.iter().map(|length| bends(*length).map(trimmed_mean)).collect(),
+            false => SWAY.iter().map(|length| bends(*length).map(usual_square)).collect(),
         };
         std::array::from_fn(|axis| {
             let square = most.iter().map(|squares| squares[axis]).fold(0.0, f64::max);
@@ -285,7 +292,7 @@ impl<'s> Weighing<'s> {
                             *value *= step;
                             let value = *value;
                             let floor = 1e-3 * best.white[0].min(best.white[1]).min(best.white[2]);
-                            let smallest = if coordinate == 2 { 1e-7 } else { floor };
+                            let smallest = if coordinate == 2 { self.least_scatter() } else { floor };
                             if value < smallest || value > 1e4 * smallest {
                                 break;
                             }
@@ -300,6 +307,20 @@ impl<'s> Weighing<'s> {
             }
         }
         best
+    }
+}
+
+impl Noise {
+    /// With white noise that is no more than another's: a misfit that a fit has gone through is no noise.
+    #[must_use]
+    pub fn at_most(mut self, other: &Self) -> Self {
+        for (own, other) in self.sensors.iter_mut().zip(&other.sensors) {
+            for axis in 0..3 {
+                own.white[axis] = own.white[axis].min(other.white[axis]);
+                own.moving[axis] = own.moving[axis].min(other.moving[axis]);
+            }
+        }
+        self
     }
 }
 
@@ -323,6 +344,15 @@ pub fn restricted(normal: &Normal) -> f64 {
     let Some(factor) = loosened.cholesky() else { return f64::INFINITY };
     let explained = normal.score.dot(&factor.solve(&normal.score));
     normal.log_determinant + factor.ln_determinant() - n as f64 * prior.ln() + normal.energy - explained
+}
+
+/// The mean square of normal numbers from their squares without the largest tenth: a hand's jolts, and the beginning and
+/// end of an episode, are no noise.
+fn usual_square(mut squares: Vec<f64>) -> f64 {
+    squares.sort_unstable_by(f64::total_cmp);
+    let kept = squares.len() - squares.len() / 10;
+    // The mean of a χ² of one degree below its ninth decile is 0.623.
+    squares[..kept].iter().sum::<f64>() / (0.623 * kept.max(1) as f64)
 }
 
 /// The mean without the largest hundredth.

@@ -16,8 +16,8 @@ use crate::{
     },
 };
 
-/// Nodes of signatures are this far apart, s.
-const NODES: f64 = 0.045;
+/// Nodes of signatures are this far apart, s; where no rig guides the sensor, which moves briskly then, the latter.
+const NODES: (f64, f64) = (0.045, 0.0175);
 
 /// Rows at which a run is simulated.
 #[derive(Clone, Debug, Default)]
@@ -100,7 +100,8 @@ impl<'a> Scene<'a> {
             blocks.iter().map(|block| count(block).iter().filter(|usable| **usable).count()).collect()
         });
         let kinds = SensorKind::ALL.into_iter().filter(|kind| recording.sensor(*kind).is_some()).collect();
-        let stride = ((NODES / interval).round() as usize).max(1);
+        let apart = if motion.swings().is_some() { NODES.0 } else { NODES.1 };
+        let stride = ((apart / interval).round() as usize).max(1);
         let fine = Nodes::choose(&recording.time, &blocks, |_, row| row % stride == stride / 2);
         let centre = |block: &Block, row: usize| row == (block.rows.start + block.rows.end) / 2;
         let coarse = Nodes::choose(&recording.time, &blocks, centre);

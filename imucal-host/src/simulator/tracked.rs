@@ -74,6 +74,7 @@ impl Tracked {
             .into_par_iter()
             .map(|row| {
                 let state = state(time, &filled, row, reach);
+                // A reference wanders more slowly and further than its noise tells; at rest the rate is zero.
                 let still = State { w_pt_t: Vector3::zeros(), dw_pt_t: Vector3::zeros(), ..state };
                 if moving[row] { state } else { still }
             })
