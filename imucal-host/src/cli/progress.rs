@@ -30,7 +30,6 @@ impl Progress {
 
     /// Says what is being done now.
     pub fn stage(&self, what: &str) {
-        eprintln!("STAGE {what}");
         self.0.set_message(what.to_owned());
     }
 }

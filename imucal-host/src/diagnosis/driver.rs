@@ -109,17 +109,20 @@ fn of_gimbals(swings: &[[Swing; 3]]) -> Vec<Driver> {
         "rate",
         swings,
         &[
-            ("odd in the rate", &|s| s.rate),
-            ("even in the rate", &|s| s.rate.abs()),
-            ("cubic in the rate", &|s| s.rate * s.rate * s.rate),
+            ("odd in the rate", |s| s.rate),
+            ("even in the rate", |s| s.rate.abs()),
+            ("cubic in the rate", |s| s.rate * s.rate * s.rate),
         ],
     ));
-    drivers.push(per_gimbal("angular_acceleration", swings, &[("linear", &|s| s.acceleration)]));
+    drivers.push(per_gimbal("angular_acceleration", swings, &[("linear", |s| s.acceleration)]));
     drivers.push(approach(swings));
     drivers
 }
 
-fn per_gimbal(name: &str, swings: &[[Swing; 3]], of: &[(&str, &dyn Fn(&Swing) -> f64)]) -> Driver {
+/// A function of a gimbal's swing.
+type OfSwing = fn(&Swing) -> f64;
+
+fn per_gimbal(name: &str, swings: &[[Swing; 3]], of: &[(&str, OfSwing)]) -> Driver {
     let mut functions = Vec::new();
     for (gimbal, which) in ["outer", "middle", "inner"].iter().enumerate() {
         for (detail, value) in of {

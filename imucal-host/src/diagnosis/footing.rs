@@ -138,8 +138,8 @@ fn response(effect: &Effect, values: &[f64]) -> Option<Matrix3<f64>> {
 fn leave_out(finding: &Finding, recording: &Recording, kind: SensorKind, usable: &mut [bool]) {
     let Some(triple) = recording.sensor(kind) else { return };
     if finding.effect.id.ends_with(".stuck_samples") {
-        for row in 1..usable.len() {
-            usable[row] &= triple.values[row] != triple.values[row - 1];
+        for (usable, pair) in usable.iter_mut().skip(1).zip(triple.values.windows(2)) {
+            *usable &= pair[1] != pair[0];
         }
     }
     if finding.effect.id.ends_with(".saturation")
@@ -199,7 +199,8 @@ fn movement(
             let axes = axes(recording)?;
             if recording.mag.is_some() && site.field_ned_ut.is_none() {
                 return Err(
-                    "the manifest's [site] lacks field_ned_ut, against which the magnetometer is compared".into()
+                    "the manifest's [site] lacks field_ned_ut, against which the magnetometer is compared"
+                        .into(),
                 );
             }
             let replay = Replay::new(&recording.time, gimbal, temperature, axes, place);

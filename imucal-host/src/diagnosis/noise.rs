@@ -116,8 +116,8 @@ impl<'s> Weighing<'s> {
                 .chunks_exact(length)
                 .filter_map(|rows| {
                     let measured = rows.iter().filter(|row| usable[**row]);
-                    let (sum, count) =
-                        measured.fold((Vector3::zeros(), 0.0), |(s, n), row| (s + triple.values[*row], n + 1.0));
+                    let (sum, count) = measured
+                        .fold((Vector3::zeros(), 0.0), |(s, n), row| (s + triple.values[*row], n + 1.0));
                     (count > 0.0).then(|| (sum / count, count))
                 })
                 .collect();
@@ -155,7 +155,8 @@ impl<'s> Weighing<'s> {
         let mut squares: [Vec<f64>; 3] = Default::default();
         for from in (0..(values.len() + 1).saturating_sub(3 * length)).step_by(length) {
             // On a rig a block with fewer rows is one that it has just left or reached.
-            let full = |k: usize| if guided { counts[k] == counts[from] } else { 2 * counts[k] > counts[from] };
+            let full =
+                |k: usize| if guided { counts[k] == counts[from] } else { 2 * counts[k] > counts[from] };
             let whole = |k: usize| self.scene.blocks[k].rest.is_none() && counts[k] > 0 && full(k);
             if !(from..from + 3 * length).all(whole) {
                 continue;

@@ -5,6 +5,9 @@ use nalgebra::Vector3;
 use super::driver::Driver;
 use crate::{effect::Truth, recording::SensorKind};
 
+/// A function of a direction.
+type OfDirection = fn(&Vector3<f64>) -> f64;
+
 /// The drivers, from the truth of each block: first and second harmonics of the directions in the sensor, rates and
 /// angular accelerations about its axes.
 pub fn drivers(truth: &[Truth], kinds: &[SensorKind]) -> Vec<Driver> {
@@ -30,15 +33,15 @@ pub fn drivers(truth: &[Truth], kinds: &[SensorKind]) -> Vec<Driver> {
 fn direction(name: &str, truth: &[Truth], of: &dyn Fn(&Truth) -> Vector3<f64>) -> Driver {
     let directions: Vec<Vector3<f64>> =
         truth.iter().map(|row| of(row).try_normalize(0.0).unwrap_or_default()).collect();
-    let functions: [(&str, &dyn Fn(&Vector3<f64>) -> f64); 8] = [
-        ("first harmonic, x", &|u| u.x),
-        ("first harmonic, y", &|u| u.y),
-        ("first harmonic, z", &|u| u.z),
-        ("second harmonic, x and y", &|u| u.x * u.y),
-        ("second harmonic, y and z", &|u| u.y * u.z),
-        ("second harmonic, z and x", &|u| u.z * u.x),
-        ("second harmonic, x against y", &|u| u.x * u.x - u.y * u.y),
-        ("second harmonic, z against the rest", &|u| 3.0 * u.z * u.z - 1.0),
+    let functions: [(&str, OfDirection); 8] = [
+        ("first harmonic, x", |u| u.x),
+        ("first harmonic, y", |u| u.y),
+        ("first harmonic, z", |u| u.z),
+        ("second harmonic, x and y", |u| u.x * u.y),
+        ("second harmonic, y and z", |u| u.y * u.z),
+        ("second harmonic, z and x", |u| u.z * u.x),
+        ("second harmonic, x against y", |u| u.x * u.x - u.y * u.y),
+        ("second harmonic, z against the rest", |u| 3.0 * u.z * u.z - 1.0),
     ];
     let functions = functions
         .iter()
