@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 
-use super::{Ending, output, progress::Progress, read, simulate::unknown};
+use super::{Ending, load, output, progress::Progress, read, refuse, simulate::unknown};
 use crate::{
     diagnosis::{Diagnosis, Options, Verdict, diagnose},
     effect::{self, CATALOGUE},
@@ -17,6 +17,9 @@ pub(super) struct Arguments {
     /// The recording to diagnose: NAME.csv, NAME.csv.gz (or NAME.parquet), with NAME.toml beside it
     #[arg(required_unless_present = "list")]
     recording: Option<PathBuf>,
+    /// The unit's present model, as `imucal calibrate` wrote it (default: calibrated from the recording)
+    #[arg(long, value_name = "CAL")]
+    model: Option<PathBuf>,
     /// Withhold effects from what may explain the gap, or take terms (such as acc.misalignment) out of the baseline
     #[arg(long, value_name = "EFFECT_OR_TERM", num_args = 1.., value_parser = known)]
     without: Vec<String>,
@@ -41,9 +44,15 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     };
     let outputs: Vec<PathBuf> =
         arguments.json.iter().filter(|path| path.as_os_str() != "-").cloned().collect();
-    output::check(&output::files_of(path), &outputs)?;
+    let mut inputs = output::files_of(path);
+    inputs.extend(arguments.model.clone());
+    output::check(&inputs, &outputs)?;
     let recording = read(path)?;
-    let options = Options { without: arguments.without.clone() };
+    let model = match arguments.model.as_deref().map(load).transpose()? {
+        Some(Err(damaged)) => return Ok(refuse(&damaged)),
+        model => model.and_then(Result::ok),
+    };
+    let options = Options { without: arguments.without.clone(), model };
     let progress = Progress::start();
     let diagnosis = diagnose(&recording, &options, &|stage| progress.stage(stage));
     drop(progress);

@@ -10,9 +10,11 @@ use nalgebra::{DMatrix, SymmetricEigen, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
+    block::Block,
     design::Design,
     evidence::Projected,
     noise::{NEAR, Noise},
+    orientation,
     scene::{Means, Scene},
     search::Linear,
 };
@@ -57,7 +59,8 @@ pub struct Function {
 }
 
 impl Function {
-    fn new(detail: impl Into<String>, values: Vec<f64>) -> Self {
+    /// That any axis of any sensor may follow.
+    pub fn new(detail: impl Into<String>, values: Vec<f64>) -> Self {
         Self { detail: detail.into(), values, of: None }
     }
 }
@@ -90,30 +93,13 @@ pub struct Following {
 
 /// The drivers of a scene: those that vary in it. `given` is what each sensor puts out, block by block.
 pub fn drivers(scene: &Scene<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Driver> {
-    let swings: Vec<[Swing; 3]> =
-        scene.blocks.iter().map(|b| scene.swings[(b.rows.start + b.rows.end) / 2]).collect();
-    let mut drivers = Vec::new();
-    for (gimbal, name) in ["outer", "middle", "inner"].iter().enumerate() {
-        let mut functions = Vec::new();
-        for (order, harmonic) in HARMONICS.iter().enumerate() {
-            let angle = |s: &[Swing; 3]| (order + 1) as f64 * s[gimbal].angle;
-            let detail = format!("{harmonic} harmonic");
-            functions
-                .push(Function::new(detail.clone(), swings.iter().map(|s| libm::cos(angle(s))).collect()));
-            functions.push(Function::new(detail, swings.iter().map(|s| libm::sin(angle(s))).collect()));
+    let mut drivers = match scene.swings {
+        Some(swings) => {
+            let middle = |b: &Block| swings.get((b.rows.start + b.rows.end) / 2).copied().unwrap_or_default();
+            of_gimbals(&scene.blocks.iter().map(middle).collect::<Vec<_>>())
         }
-        drivers.push(Driver { name: format!("gimbal_{name}"), functions });
-    }
-    drivers.push(per_gimbal(
-        "rate",
-        &swings,
-        &[
-            ("odd in the rate", &|s| s.rate),
-            ("even in the rate", &|s| s.rate.abs()),
-            ("cubic in the rate", &|s| s.rate * s.rate * s.rate),
-        ],
-    ));
-    drivers.push(per_gimbal("angular_acceleration", &swings, &[("linear", &|s| s.acceleration)]));
+        None => orientation::drivers(&scene.plain(), &scene.kinds),
+    };
     let duration = scene.duration().max(1.0);
     let wave = |order: usize| {
         let values = scene.blocks.iter().map(|b| libm::cos(PI * order as f64 * b.time / duration)).collect();
@@ -128,7 +114,6 @@ pub fn drivers(scene: &Scene<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Driver>
         drivers
             .push(Driver { name: "temperature_rate".into(), functions: vec![Function::new("linear", rate)] });
     }
-    drivers.push(approach(&swings));
     drivers.push(input(given));
     drivers.retain_mut(|driver| {
         driver.functions.retain_mut(|function| standardise(&mut function.values));
@@ -137,10 +122,38 @@ pub fn drivers(scene: &Scene<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Driver>
     drivers
 }
 
-/// A function of a gimbal's swing, and what it is.
-type OfSwing<'a> = (&'a str, &'a dyn Fn(&Swing) -> f64);
+/// Angles, rates, accelerations and directions of approach of a rig's gimbals, block by block.
+fn of_gimbals(swings: &[[Swing; 3]]) -> Vec<Driver> {
+    let mut drivers = Vec::new();
+    for (gimbal, name) in ["outer", "middle", "inner"].iter().enumerate() {
+        let mut functions = Vec::new();
+        for (order, harmonic) in HARMONICS.iter().enumerate() {
+            let angle = |s: &[Swing; 3]| (order + 1) as f64 * s[gimbal].angle;
+            let detail = format!("{harmonic} harmonic");
+            functions
+                .push(Function::new(detail.clone(), swings.iter().map(|s| libm::cos(angle(s))).collect()));
+            functions.push(Function::new(detail, swings.iter().map(|s| libm::sin(angle(s))).collect()));
+        }
+        drivers.push(Driver { name: format!("gimbal_{name}"), functions });
+    }
+    drivers.push(per_gimbal(
+        "rate",
+        swings,
+        &[
+            ("odd in the rate", |s| s.rate),
+            ("even in the rate", |s| s.rate.abs()),
+            ("cubic in the rate", |s| s.rate * s.rate * s.rate),
+        ],
+    ));
+    drivers.push(per_gimbal("angular_acceleration", swings, &[("linear", |s| s.acceleration)]));
+    drivers.push(approach(swings));
+    drivers
+}
 
-fn per_gimbal(name: &str, swings: &[[Swing; 3]], of: &[OfSwing<'_>]) -> Driver {
+/// A function of a gimbal's swing.
+type OfSwing = fn(&Swing) -> f64;
+
+fn per_gimbal(name: &str, swings: &[[Swing; 3]], of: &[(&str, OfSwing)]) -> Driver {
     let mut functions = Vec::new();
     for (gimbal, which) in ["outer", "middle", "inner"].iter().enumerate() {
         for (detail, value) in of {

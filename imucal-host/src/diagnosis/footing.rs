@@ -7,10 +7,12 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     convention::{self, Conventions, Finding},
+    model::Model,
     revisits,
 };
 use crate::{
     effect::{Act, DataRun, Effect, axis_swap},
+    observe::motion::{self, Attitudes},
     recording::{
         Recording, SensorKind, Triple,
         integrity::{self, Integrity},
@@ -18,7 +20,8 @@ use crate::{
         median,
         unit::STANDARD_GRAVITY,
     },
-    simulator::{Motion, Place, Replay},
+    simulator::{Place, Recorded, Replay, Tracked},
+    store::StoredCalibration,
 };
 
 /// Recordings are at least this long, s.
@@ -28,14 +31,15 @@ const SHORTEST: f64 = 30.0;
 const CLIPPED: f64 = 5.0;
 
 /// What a diagnosis stands on.
-#[derive(Debug)]
 pub struct Footing {
     /// The recorded movement.
-    pub replay: Replay,
+    pub movement: Box<dyn Recorded>,
     /// Rows of each sensor that can be used, by [`SensorKind::ALL`].
     pub usable: [Vec<bool>; 3],
-    /// Triads that put axes and units right, nominal SI to SI.
+    /// Triads to start from, nominal SI to SI: those of the model, or such as put axes and units right.
     pub triads: [Triad<f64>; 3],
+    /// Sensors whose triad is the model's.
+    pub calibrated: Vec<SensorKind>,
     /// Faults of the recording that are effects of the catalogue.
     pub findings: Vec<Finding>,
     /// What else a reader ought to know.
@@ -43,25 +47,26 @@ pub struct Footing {
 }
 
 impl Footing {
-    /// Of a recording.
+    /// Of a recording, with the model of its unit where there is one.
     ///
     /// # Errors
     ///
     /// Why the recording cannot be diagnosed, for a reader.
-    pub fn new(recording: &Recording) -> Result<Self, String> {
-        let replay = replay(recording)?;
+    pub fn new(recording: &Recording, model: Option<&StoredCalibration>) -> Result<Self, String> {
+        let model = model.map(|model| Model::new(recording, model)).transpose()?.unwrap_or_default();
         let integrity = integrity::inspect(recording);
-        let conventions = convention::check(recording, &integrity, &replay);
+        let movement = movement(recording, &integrity, &model)?;
+        let conventions = convention::check(recording, &integrity, &*movement);
         if let Some(contradiction) = conventions.contradiction {
             return Err(contradiction);
         }
         let mut usable = SensorKind::ALL.map(|kind| usable_rows(recording, &integrity, &conventions, kind));
         for usable in &mut usable {
-            usable.iter_mut().zip(replay.known()).for_each(|(usable, known)| *usable &= known);
+            usable.iter_mut().zip(movement.known()).for_each(|(usable, known)| *usable &= known);
         }
-        let mut triads = [Triad::identity(); 3];
+        let mut triads = model.triads;
         if let Some(turn) = conventions.turned.and_then(axis_swap::signed_permutation) {
-            triads.iter_mut().for_each(|triad| triad.gain *= turn.transpose());
+            triads.iter_mut().for_each(|triad| triad.gain = turn.tr_mul(&triad.gain));
         }
         for finding in &conventions.findings {
             let Some(kind) = finding.effect.sensors.first().copied() else { continue };
@@ -79,9 +84,11 @@ impl Footing {
         };
         debug_assert!(recording.sensor(*measured).is_some());
         let mut remarks = conventions.remarks;
-        remarks.extend(revisits::remark(&replay));
+        remarks.extend(model.remark);
+        remarks.extend(revisits::remark(&*movement));
         remarks.extend(shortcomings(recording));
-        Ok(Self { replay, usable, triads, findings: conventions.findings, remarks })
+        let findings = conventions.findings;
+        Ok(Self { movement, usable, triads, calibrated: model.calibrated, findings, remarks })
     }
 }
 
@@ -174,37 +181,75 @@ pub fn axes(recording: &Recording) -> Result<[Axis; 3], String> {
 }
 
 /// The recorded movement, or why there is none.
-fn replay(recording: &Recording) -> Result<Replay, String> {
-    let gimbal = recording.gimbal.as_deref().ok_or(
-        "there are no encoder columns (gimbal_outer, gimbal_middle, gimbal_inner): without a rig the simulator cannot \
-         be given the movement",
-    )?;
-    let axes = axes(recording)?;
+fn movement(
+    recording: &Recording,
+    integrity: &Integrity,
+    model: &Model,
+) -> Result<Box<dyn Recorded>, String> {
     let site = &recording.manifest.site;
-    if recording.mag.is_some() && site.field_ned_ut.is_none() {
-        return Err(
-            "the manifest's [site] lacks field_ned_ut, against which the magnetometer is compared".to_owned()
-        );
-    }
-    let place = Place {
+    let mut place = Place {
         latitude_deg: site.latitude_deg.unwrap_or(0.0),
         height: site.height_m.unwrap_or(0.0),
         gravity: site.gravity().unwrap_or(STANDARD_GRAVITY),
         field_n: site.field_ned_ut.unwrap_or_default().into(),
     };
     let temperature = recording.temperature.clone().unwrap_or_else(|| vec![25.0; recording.rows()]);
-    let replay = Replay::new(&recording.time, gimbal, temperature, axes, place)
-        .ok_or("no row has a reading of all three encoders")?;
-    let length = replay.duration() - recording.time.first().copied().unwrap_or(0.0);
+    let movement: Box<dyn Recorded> = match (recording.gimbal.as_deref(), recording.reference.as_deref()) {
+        (Some(gimbal), _) => {
+            let axes = axes(recording)?;
+            if recording.mag.is_some() && site.field_ned_ut.is_none() {
+                return Err(
+                    "the manifest's [site] lacks field_ned_ut, against which the magnetometer is compared"
+                        .into(),
+                );
+            }
+            let replay = Replay::new(&recording.time, gimbal, temperature, axes, place);
+            Box::new(replay.ok_or("no row has a reading of all three encoders")?)
+        }
+        (None, Some(reference)) => {
+            let attitudes = motion::of_reference(reference);
+            if site.field_ned_ut.is_none() {
+                place.field_n = field(recording, integrity, &attitudes, model).unwrap_or_default();
+            }
+            let tracked = Tracked::new(&recording.time, &attitudes, temperature, place);
+            Box::new(tracked.ok_or("no row has a reference attitude")?)
+        }
+        (None, None) => {
+            return Err("there are neither encoder columns (gimbal_outer, gimbal_middle, gimbal_inner) nor a \
+                        reference attitude (ref_qw, ref_qx, ref_qy, ref_qz): the simulator cannot be given the \
+                        movement"
+                .into());
+        }
+    };
+    let length = movement.duration() - recording.time.first().copied().unwrap_or(0.0);
     if length < SHORTEST {
         return Err(format!(
             "{length:.0} s are too short to tell drift from anything else; {SHORTEST:.0} s at least"
         ));
     }
-    if !replay.moving().iter().any(|moves| *moves) {
+    if !movement.moving().iter().any(|moves| *moves) {
         return Err("the rig stands still: nothing tells an effect from a bias".to_owned());
     }
-    Ok(replay)
+    Ok(movement)
+}
+
+/// The field in the frame of a reference, µT: the median of what the magnetometer shows there, component by component.
+fn field(
+    recording: &Recording,
+    integrity: &Integrity,
+    attitudes: &Attitudes,
+    model: &Model,
+) -> Option<Vector3<f64>> {
+    let triad = &model.triads[SensorKind::Mag as usize];
+    let (samples, usable) = (&recording.mag.as_ref()?.values, &integrity.sensor(SensorKind::Mag)?.usable);
+    let shown: Vec<Vector3<f64>> = attitudes
+        .iter()
+        .zip(samples)
+        .zip(usable)
+        .filter_map(|((c_t_n, b), usable)| usable.then_some((*c_t_n)? * triad.correct(b)))
+        .collect();
+    let along = |axis: usize| median(shown.iter().map(|b| b[axis]).collect());
+    Some(Vector3::new(along(0)?, along(1)?, along(2)?))
 }
 
 /// What the recording lacks, and what that costs.

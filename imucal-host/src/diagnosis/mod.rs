@@ -12,7 +12,9 @@ pub mod experiment;
 pub mod finding;
 pub mod footing;
 pub mod gap;
+pub mod model;
 pub mod noise;
+pub mod orientation;
 pub mod refit;
 pub mod revisits;
 pub mod scene;
@@ -24,14 +26,14 @@ pub mod whitening;
 
 pub use self::finding::{Diagnosis, Verdict};
 use self::{
-    candidates::Candidates,
+    candidates::{Candidates, Setting},
     driver::Following,
     finding::{Cause, Place as Driven},
     footing::Footing,
     scene::Scene,
     search::Explained,
 };
-use crate::{effect::Effect, recording::Recording};
+use crate::{effect::Effect, recording::Recording, store::StoredCalibration};
 
 /// A driver is followed when noise alone would do as much less often than this, all tests counted.
 const FOLLOWED: f64 = 0.01;
@@ -47,17 +49,25 @@ const CERTAIN: f64 = 0.95;
 pub struct Options {
     /// Catalogue entries to be withheld from the candidates, and terms to be taken out of the baseline.
     pub without: Vec<String>,
+    /// The simulator's present model of the unit; without it, the baseline is calibrated from the recording.
+    pub model: Option<StoredCalibration>,
 }
 
 /// Diagnoses a recording; `progress` hears of each stage.
 pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str)) -> Diagnosis {
-    let footing = match Footing::new(recording) {
+    let footing = match Footing::new(recording, options.model.as_ref()) {
         Ok(footing) => footing,
         Err(why) => return untestable(recording, why),
     };
-    let scene = Scene::new(recording, footing.usable.clone(), &footing.replay, footing.triads);
-    let thermometer = recording.temperature.is_some();
-    let candidates = Candidates::new(&scene.kinds, thermometer, false, &options.without);
+    let scene = Scene::new(recording, footing.usable.clone(), &*footing.movement, footing.triads);
+    let setting = Setting {
+        kinds: &scene.kinds,
+        thermometer: recording.temperature.is_some(),
+        calibrated: &footing.calibrated,
+        gimbals: scene.swings.is_some(),
+        field_known: recording.manifest.site.field_ned_ut.is_some(),
+    };
+    let candidates = Candidates::new(&setting, &options.without);
     let explained = search::search(&scene, &candidates, progress);
     let answer = explained.as_ref().and_then(|explained| answer(recording, explained, progress));
     match answer {

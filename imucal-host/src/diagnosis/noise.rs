@@ -30,6 +30,8 @@ pub const FAR: [f64; 2] = [4.0, 1.7];
 pub const NEAR: [f64; 1] = [2.0];
 /// Rounds over all standard deviations for each factor.
 const ROUNDS: usize = 4;
+/// Lengths of groups of moving blocks that are compared where no rig guides the sensor; what is slower is drift.
+const SWAY: [usize; 3] = [1, 2, 4];
 /// Share of drift and scatter that [`Noise::quieter`] leaves.
 const QUIET: f64 = 0.2;
 /// Pieces of which neighbours are compared, s.
@@ -84,60 +86,94 @@ impl<'s> Weighing<'s> {
 
     /// Noise from what samples do within a tenth of a second, and drift yet to be told.
     pub fn white(&self, residual: &Means) -> Noise {
+        let scatter = 100.0 * self.least_scatter();
         let sensors = SensorKind::ALL.map(|kind| {
             let white = self.resting(kind);
             let moving = self.moving(kind, residual, &white);
             let typical = white.iter().fold(0.0f64, |a, b| a.max(*b));
-            SensorNoise { white, moving, drift: [0.05 * typical, 0.1 * typical], scatter: 1e-5 }
+            SensorNoise { white, moving, drift: [0.05 * typical, 0.1 * typical], scatter }
         });
         Noise { sensors }
     }
 
-    /// From the differences of neighbouring pieces of a rest; all pieces of a block have one length.
+    /// The smallest scatter that is looked for, rad: a rig repeats its rests; a hand does not, nor is the field of a
+    /// room the same all over it.
+    fn least_scatter(&self) -> f64 {
+        if self.scene.swings.is_some() { 1e-7 } else { 1e-5 }
+    }
+
+    /// From the differences of neighbouring pieces of a rest.
     fn resting(&self, kind: SensorKind) -> [f64; 3] {
         let Some(triple) = self.scene.recording.sensor(kind) else { return [1.0; 3] };
         let interval = self.scene.recording.median_interval().unwrap_or(PIECE);
         let length = ((PIECE / interval).round() as usize).max(1);
         let mut squares: [Vec<f64>; 3] = Default::default();
         let usable = &self.scene.usable[kind as usize];
-        let whole =
-            |block: &&Block| block.rest.is_some() && usable[block.rows.clone()].iter().all(|row| *row);
-        for block in self.scene.blocks.iter().filter(whole) {
-            let pieces: Vec<Vector3<f64>> = triple.values[block.rows.clone()]
+        for block in self.scene.blocks.iter().filter(|block| block.rest.is_some()) {
+            // A sensor may be slower than the recording: then some rows hold nothing of it.
+            let rows: Vec<usize> = block.rows.clone().collect();
+            let pieces: Vec<(Vector3<f64>, f64)> = rows
                 .chunks_exact(length)
-                .map(|rows| rows.iter().sum::<Vector3<f64>>() / length as f64)
+                .filter_map(|rows| {
+                    let measured = rows.iter().filter(|row| usable[**row]);
+                    let (sum, count) = measured
+                        .fold((Vector3::zeros(), 0.0), |(s, n), row| (s + triple.values[*row], n + 1.0));
+                    (count > 0.0).then(|| (sum / count, count))
+                })
                 .collect();
             for pair in pieces.windows(2) {
-                let step = pair[1] - pair[0];
-                for (squares, step) in
-                    squares.iter_mut().zip(step.iter()).filter(|(_, step)| step.is_finite())
-                {
-                    squares.push(0.5 * step * step * length as f64);
-                }
+                let ((before, m), (after, n)) = (pair[0], pair[1]);
+                let step = after - before;
+                let samples = 1.0 / (1.0 / m + 1.0 / n);
+                squares.iter_mut().zip(step.iter()).for_each(|(s, step)| s.push(step * step * samples));
             }
         }
         squares.map(|squares| trimmed_mean(squares).sqrt().max(f64::MIN_POSITIVE))
     }
 
-    /// From second differences of the residuals of neighbouring moving blocks, by their median; at least as at rest.
+    /// From second differences of the residuals of neighbouring moving blocks; at least as at rest. What a hand adds is
+    /// no white noise: where no rig guides the sensor, groups of blocks count as well, and that which scatters most.
     fn moving(&self, kind: SensorKind, residual: &Means, resting: &[f64; 3]) -> [f64; 3] {
         let Some(values) = &residual[kind as usize] else { return [1.0; 3] };
-        let counts = &self.scene.counts[kind as usize];
-        let mut squares: [Vec<f64>; 3] = Default::default();
-        for at in 1..values.len().saturating_sub(1) {
-            let whole =
-                |k: usize| self.scene.blocks[k].rest.is_none() && counts[k] > 0 && counts[k] == counts[at];
-            if (at - 1..=at + 1).all(whole) {
-                let bend = values[at - 1] - 2.0 * values[at] + values[at + 1];
-                let n = counts[at] as f64;
-                squares.iter_mut().zip(bend.iter()).for_each(|(s, bend)| s.push(bend * bend * n / 6.0));
-            }
-        }
-        std::array::from_fn(|axis| {
+        let guided = self.scene.swings.is_some();
+        let bends = |length: usize| self.bends(kind, values, length);
+        let most: Vec<[f64; 3]> = match guided {
             // The median of a χ² of one degree is 0.455.
-            let median = crate::recording::median(squares[axis].clone()).unwrap_or(0.0) / 0.455;
-            median.sqrt().max(resting[axis])
+            true => vec![bends(1).map(|b| crate::recording::median(b).unwrap_or(0.0) / 0.455)],
+            false => SWAY.iter().map(|length| bends(*length).map(usual_square)).collect(),
+        };
+        std::array::from_fn(|axis| {
+            let square = most.iter().map(|squares| squares[axis]).fold(0.0, f64::max);
+            square.sqrt().max(resting[axis])
         })
+    }
+
+    /// Squared second differences of neighbouring groups of moving blocks, as variances of one sample.
+    fn bends(&self, kind: SensorKind, values: &[Vector3<f64>], length: usize) -> [Vec<f64>; 3] {
+        let counts = &self.scene.counts[kind as usize];
+        let guided = self.scene.swings.is_some();
+        let mut squares: [Vec<f64>; 3] = Default::default();
+        for from in (0..(values.len() + 1).saturating_sub(3 * length)).step_by(length) {
+            // On a rig a block with fewer rows is one that it has just left or reached.
+            let full =
+                |k: usize| if guided { counts[k] == counts[from] } else { 2 * counts[k] > counts[from] };
+            let whole = |k: usize| self.scene.blocks[k].rest.is_none() && counts[k] > 0 && full(k);
+            if !(from..from + 3 * length).all(whole) {
+                continue;
+            }
+            let group = |which: usize| {
+                let blocks = from + which * length..from + (which + 1) * length;
+                blocks.fold((Vector3::zeros(), 0.0), |(sum, count), k| {
+                    let n = counts[k] as f64;
+                    (sum + values[k] * n, count + n)
+                })
+            };
+            let [(a, l), (b, m), (c, n)] = [0, 1, 2].map(group);
+            let bend = a / l - 2.0 * b / m + c / n;
+            let share = 1.0 / l + 4.0 / m + 1.0 / n;
+            squares.iter_mut().zip(bend.iter()).for_each(|(s, bend)| s.push(bend * bend / share));
+        }
+        squares
     }
 
     /// Σ⁻¹ of each channel of a design.
@@ -257,7 +293,7 @@ impl<'s> Weighing<'s> {
                             *value *= step;
                             let value = *value;
                             let floor = 1e-3 * best.white[0].min(best.white[1]).min(best.white[2]);
-                            let smallest = if coordinate == 2 { 1e-7 } else { floor };
+                            let smallest = if coordinate == 2 { self.least_scatter() } else { floor };
                             if value < smallest || value > 1e4 * smallest {
                                 break;
                             }
@@ -272,6 +308,20 @@ impl<'s> Weighing<'s> {
             }
         }
         best
+    }
+}
+
+impl Noise {
+    /// With white noise that is no more than another's: a misfit that a fit has gone through is no noise.
+    #[must_use]
+    pub fn at_most(mut self, other: &Self) -> Self {
+        for (own, other) in self.sensors.iter_mut().zip(&other.sensors) {
+            for axis in 0..3 {
+                own.white[axis] = own.white[axis].min(other.white[axis]);
+                own.moving[axis] = own.moving[axis].min(other.moving[axis]);
+            }
+        }
+        self
     }
 }
 
@@ -295,6 +345,15 @@ pub fn restricted(normal: &Normal) -> f64 {
     let Some(factor) = loosened.cholesky() else { return f64::INFINITY };
     let explained = normal.score.dot(&factor.solve(&normal.score));
     normal.log_determinant + factor.ln_determinant() - n as f64 * prior.ln() + normal.energy - explained
+}
+
+/// The mean square of normal numbers from their squares without the largest tenth: a hand's jolts, and the beginning and
+/// end of an episode, are no noise.
+fn usual_square(mut squares: Vec<f64>) -> f64 {
+    squares.sort_unstable_by(f64::total_cmp);
+    let kept = squares.len() - squares.len() / 10;
+    // The mean of a χ² of one degree below its ninth decile is 0.623.
+    squares[..kept].iter().sum::<f64>() / (0.623 * kept.max(1) as f64)
 }
 
 /// The mean without the largest hundredth.

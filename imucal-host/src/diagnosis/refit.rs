@@ -71,13 +71,18 @@ pub fn refit(scene: &Scene<'_>, doses: Vec<Dose>, noise: Option<&Noise>) -> Opti
     let columns = free(&doses);
     let residual = scene.residual(&doses)?;
     let mut fit = Fit { doses, residual };
+    let mut least: Option<Noise> = None;
     for _ in 0..STEPS {
         let reference = scene.reference(fit.doses.clone(), &scene.fine)?;
         let signatures = signatures(&reference, &columns, &|_| Vec::new())?;
         let given = crate::recording::SensorKind::ALL.map(|kind| reference.output(kind));
         let weighing = Weighing::new(scene, given);
         let design = Design::new(scene, columns.clone(), &signatures, &fit.residual);
-        let noise = noise.cloned().unwrap_or_else(|| weighing.white(&fit.residual));
+        let noise = noise.cloned().unwrap_or_else(|| {
+            let white = weighing.white(&fit.residual);
+            least.as_ref().map_or_else(|| white.clone(), |least| white.clone().at_most(least))
+        });
+        least = Some(noise.clone());
         let whitenings = weighing.whitenings(&design, &noise);
         let all: Vec<usize> = (0..columns.len()).collect();
         let normal = design.normal(&whitenings, &all);

@@ -11,13 +11,13 @@ use crate::{
     effect::{Act, Effect, Input, Parameter, Role, Swing, Truth},
     recording::{Recording, SensorKind},
     simulator::{
-        Dose, Motion, Replay,
+        Dose, Recorded,
         chain::{Chain, inputs},
     },
 };
 
-/// Nodes of signatures are this far apart, s.
-const NODES: f64 = 0.045;
+/// Nodes of signatures are this far apart, s; where no rig guides the sensor, which moves briskly then, the latter.
+const NODES: (f64, f64) = (0.045, 0.0175);
 
 /// Rows at which a run is simulated.
 #[derive(Clone, Debug, Default)]
@@ -71,11 +71,11 @@ pub struct Scene<'a> {
     pub blocks: Vec<Block>,
     /// Sensors that are there.
     pub kinds: Vec<SensorKind>,
-    /// Swings of the gimbals at each row.
-    pub swings: &'a [[Swing; 3]],
+    /// Swings of the gimbals at each row; `None` without gimbals.
+    pub swings: Option<&'a [[Swing; 3]]>,
     /// Usable rows of each block, by sensor.
     pub counts: [Vec<usize>; 3],
-    motion: &'a Replay,
+    motion: &'a dyn Recorded,
     /// Rows of each sensor that are used, by [`SensorKind::ALL`].
     pub usable: [Vec<bool>; 3],
     /// The triads that the simulator starts from, by [`SensorKind::ALL`].
@@ -91,7 +91,7 @@ impl<'a> Scene<'a> {
     pub fn new(
         recording: &'a Recording,
         usable: [Vec<bool>; 3],
-        motion: &'a Replay,
+        motion: &'a dyn Recorded,
         triads: [Triad<f64>; 3],
     ) -> Self {
         let interval = recording.median_interval().unwrap_or(0.01);
@@ -101,7 +101,8 @@ impl<'a> Scene<'a> {
             blocks.iter().map(|block| count(block).iter().filter(|usable| **usable).count()).collect()
         });
         let kinds = SensorKind::ALL.into_iter().filter(|kind| recording.sensor(*kind).is_some()).collect();
-        let stride = ((NODES / interval).round() as usize).max(1);
+        let apart = if motion.swings().is_some() { NODES.0 } else { NODES.1 };
+        let stride = ((apart / interval).round() as usize).max(1);
         let fine = Nodes::choose(&recording.time, &blocks, |_, row| row % stride == stride / 2);
         let centre = |block: &Block, row: usize| row == (block.rows.start + block.rows.end) / 2;
         let coarse = Nodes::choose(&recording.time, &blocks, centre);
@@ -126,6 +127,11 @@ impl<'a> Scene<'a> {
 
     fn truth(&self, doses: &[Dose], nodes: &Nodes) -> Vec<Truth> {
         Chain::new(doses).truth(self.motion, &nodes.times)
+    }
+
+    /// The truth in the middle of each block, without any effect.
+    pub fn plain(&self) -> Vec<Truth> {
+        self.truth(&[], &self.coarse)
     }
 
     /// Recorded less simulated, block by block. `None` where a triad is singular.

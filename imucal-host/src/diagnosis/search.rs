@@ -14,14 +14,20 @@ use super::{
     shape::{self, Backdrop},
     whitening::Whitening,
 };
-use crate::{effect::Effect, recording::SensorKind, simulator::Dose};
+use crate::{
+    effect::{Effect, class::class},
+    recording::SensorKind,
+    simulator::Dose,
+};
 
-/// Most effects in a set.
-const MOST: usize = 3;
+/// Most effects in a set; where no rig guides the sensor, the latter: a hand and a reference add gaps of their own.
+const MOST: (usize, usize) = (3, 5);
 /// An addition must raise the evidence by this, beyond its share of the prior.
 const GAIN: f64 = 3.0;
 /// Sets judged with a noise of their own at each turn.
 const JUDGED: usize = 6;
+/// Fits of the baseline, each with the noise that the last one left, where no rig guides the sensor.
+const SETTLING: usize = 2;
 
 /// A set of effects and how it was judged.
 #[derive(Clone, Debug)]
@@ -195,7 +201,8 @@ impl<'s> Linear<'s> {
             .candidates
             .effects
             .iter()
-            .filter(|effect| !set.iter().any(|other| std::ptr::eq(*other, **effect)))
+            // Two of a class explain each other's noise and not the gap.
+            .filter(|effect| !set.iter().any(|other| class(&other.id) == class(&effect.id)))
             .map(|effect| (value(Some(&places(effect))) - self.surprise(effect), *effect))
             .collect();
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -292,15 +299,24 @@ pub fn search<'s>(
     trace("baseline fitted");
     let mut linear = Linear::new(scene, candidates, &fit, None)?;
     let white = linear.weighing.white(&fit.residual);
-    let none = linear.judge(&[], &white, &SensorKind::ALL, &FAR)?;
+    let mut none = linear.judge(&[], &white, &SensorKind::ALL, &FAR)?;
     trace(&format!("none: {:.1} {:?}", none.log_evidence, none.noise));
+    // Where no rig guides the sensor, the first noise holds much of the misfit that the first fit began with.
+    for _ in 0..if scene.swings.is_none() { SETTLING } else { 0 } {
+        fit = refit(scene, fit.doses, Some(&none.noise))?;
+        linear = Linear::new(scene, candidates, &fit, None)?;
+        let start = with_white(&none.noise, &linear.weighing.white(&fit.residual));
+        none = linear.judge(&[], &start, &SensorKind::ALL, &FAR)?;
+        trace(&format!("none again: {:.1} {:?}", none.log_evidence, none.noise));
+    }
+    let most = if scene.swings.is_some() { MOST.0 } else { MOST.1 };
     let mut best = none.clone();
     linear = Linear::new(scene, candidates, &fit, Some(&best.noise))?;
     trace("shapes");
     loop {
         best = linear.judge(&best.set, &best.noise, &SensorKind::ALL, &FAR)?;
         let mut next: Option<Judged> = None;
-        if best.set.len() < MOST {
+        if best.set.len() < most {
             next = linear.added(&best)?.filter(|judged| judged.log_evidence > best.log_evidence + GAIN);
         }
         if next.is_none() && best.set.len() > 1 {
@@ -348,9 +364,17 @@ fn advance<'s>(
     }
     let fit = refit(scene, doses, Some(&next.noise))?;
     let white = linear.weighing.white(&fit.residual);
-    for (own, white) in next.noise.sensors.iter_mut().zip(white.sensors) {
-        (own.white, own.moving) = (white.white, white.moving);
-    }
+    next.noise = with_white(&next.noise, &white);
     let linear = Linear::new(scene, candidates, &fit, Some(&next.noise))?;
     Some((fit, linear, next))
+}
+
+/// A noise with the white noise of another, where that is less: a misfit that a fit has gone through is no noise.
+fn with_white(noise: &Noise, white: &Noise) -> Noise {
+    let least = white.clone().at_most(noise);
+    let mut noise = noise.clone();
+    for (own, least) in noise.sensors.iter_mut().zip(least.sensors) {
+        (own.white, own.moving) = (least.white, least.moving);
+    }
+    noise
 }

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::{
     Options, Verdict,
-    candidates::Candidates,
+    candidates::{Candidates, Setting},
     design::Normal,
     diagnose,
     evidence::Projected,
@@ -28,9 +28,11 @@ static HEALTHY: LazyLock<Recording> = LazyLock::new(|| simulation(11).record("he
 
 /// The problem about a healthy recording's baseline.
 fn with_linear<T>(check: impl FnOnce(&Linear<'_>) -> T) -> T {
-    let footing = Footing::new(&HEALTHY).unwrap();
-    let scene = Scene::new(&HEALTHY, footing.usable.clone(), &footing.replay, footing.triads);
-    let candidates = Candidates::new(&scene.kinds, true, false, &[]);
+    let footing = Footing::new(&HEALTHY, None).unwrap();
+    let scene = Scene::new(&HEALTHY, footing.usable.clone(), &*footing.movement, footing.triads);
+    let setting =
+        Setting { kinds: &scene.kinds, thermometer: true, calibrated: &[], gimbals: true, field_known: true };
+    let candidates = Candidates::new(&setting, &[]);
     let doses = candidates
         .baseline
         .iter()

@@ -1,10 +1,11 @@
 //! A recorded movement: what the encoders of a rig said, as a source of truth.
 //!
-//! Angle, rate and acceleration of each gimbal are those of a cubic through the readings within some hundredths of a second of a row, by
-//! least squares: a reading's noise is averaged, and a movement whose angle is a cubic over that time stays as it is.
+//! Angle, rate and acceleration of each gimbal are those of a cubic through the readings about a row, by least squares:
+//! a reading's noise is averaged, and a movement whose angle is a cubic over that time stays as it is. The noisier the
+//! readings, the more of them: a rate that is as noisy as a gyroscope would be taken for one that is filtered.
 //! Where a wider cubic tells another rate, the gimbal has jerked, and its rate there is not known.
-//! Between rows the nearest row's swing goes on with constant acceleration. Where readings change no more than
-//! their noise would make them, the cubic goes through those of a fifth of a second. Not modelled: readings that lag the gimbal.
+//! Between rows the nearest row's swing goes on with constant acceleration. Where readings change no more than their
+//! noise would make them, the cubic goes through those of a fifth of a second. Not modelled: readings that lag the gimbal.
 
 use std::f64::consts::TAU;
 
@@ -12,7 +13,7 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::{
     gimbal::direction,
-    truth::{Motion, Place, on_rig},
+    truth::{Motion, Place, Recorded, on_rig},
 };
 use crate::{
     effect::{Machine, Swing, Truth},
@@ -22,8 +23,10 @@ use crate::{
     },
 };
 
-/// Readings within this time of a row tell its swing, s.
-const REACH: f64 = 0.031;
+/// Readings within so long of a row tell its swing, s: least and most.
+const REACH: (f64, f64) = (0.03, 0.12);
+/// A rate may be as noisy as this, rad/s.
+const RATE_NOISE: f64 = 5e-4;
 /// A gimbal moves if its reading changes over twice this time, s,
 const WINDOW: f64 = 0.1;
 /// by more than this rate would make it, rad/s,
@@ -59,8 +62,8 @@ impl Replay {
     ) -> Option<Self> {
         let angles = unwrapped(encoders)?;
         let interval = (time.last()? - time.first()?) / (time.len().max(2) - 1) as f64;
-        let reach = ((REACH / interval).floor() as usize).max(FEWEST);
         let noise = noise(&angles);
+        let reach = ((reach(&noise, interval) / interval).round() as usize).max(FEWEST);
         let moving = moving(time, &angles, &noise);
         let mut known = known(encoders, reach);
         // What hardly moves does so slowly: more readings tell its rate.
@@ -86,30 +89,6 @@ impl Replay {
         }
         Some(Self { time: time.to_vec(), swings, moving, known, temperature, axes, place })
     }
-
-    /// Swings of the gimbals at each row, outermost first.
-    pub fn swings(&self) -> &[[Swing; 3]] {
-        &self.swings
-    }
-
-    /// Whether a gimbal moves, row by row.
-    pub fn moving(&self) -> &[bool] {
-        &self.moving
-    }
-
-    /// Whether a row's swing is known: all readings that tell it were measured, and no gimbal jerked.
-    pub fn known(&self) -> &[bool] {
-        &self.known
-    }
-
-    fn nearest(&self, time: f64) -> usize {
-        let after = self.time.partition_point(|t| *t < time).min(self.time.len().saturating_sub(1));
-        let before = after.saturating_sub(1);
-        match (self.time.get(before), self.time.get(after)) {
-            (Some(b), Some(a)) if time - b < a - time => before,
-            _ => after,
-        }
-    }
 }
 
 impl Motion for Replay {
@@ -118,7 +97,7 @@ impl Motion for Replay {
     }
 
     fn truth(&self, time: f64, rig: &dyn Fn(&mut Machine)) -> Truth {
-        let row = self.nearest(time);
+        let row = nearest(&self.time, time);
         let since = time - self.time.get(row).copied().unwrap_or(time);
         let mut machine = Machine::exact(self.axes.map(direction));
         machine.gimbals = self.swings.get(row).copied().unwrap_or_default().map(|swing| Swing {
@@ -131,7 +110,7 @@ impl Motion for Replay {
     }
 
     fn encoders(&self, time: f64) -> Option<[f64; 3]> {
-        self.swings.get(self.nearest(time)).map(|swings| swings.map(|swing| swing.angle))
+        self.swings.get(nearest(&self.time, time)).map(|swings| swings.map(|swing| swing.angle))
     }
 
     fn rig(&self) -> Rig {
@@ -140,6 +119,31 @@ impl Motion for Replay {
 
     fn place(&self) -> Place {
         self.place
+    }
+}
+
+impl Recorded for Replay {
+    fn moving(&self) -> &[bool] {
+        &self.moving
+    }
+
+    /// All readings that tell a row's swing were measured, and no gimbal jerked.
+    fn known(&self) -> &[bool] {
+        &self.known
+    }
+
+    fn swings(&self) -> Option<&[[Swing; 3]]> {
+        Some(&self.swings)
+    }
+}
+
+/// The row nearest to a time, s.
+pub fn nearest(times: &[f64], time: f64) -> usize {
+    let after = times.partition_point(|t| *t < time).min(times.len().saturating_sub(1));
+    let before = after.saturating_sub(1);
+    match (times.get(before), times.get(after)) {
+        (Some(b), Some(a)) if time - b < a - time => before,
+        _ => after,
     }
 }
 
@@ -157,6 +161,14 @@ fn unwrapped(encoders: &[[f64; 3]]) -> Option<Vec<[f64; 3]>> {
         last
     };
     Some(encoders.iter().map(unwrap).collect())
+}
+
+/// How far the readings that tell a swing reach, s. The slope of a cubic through n readings of noise σ has the variance
+/// 75 σ² / (n³ Δt²).
+fn reach(noise: &[f64; 3], interval: f64) -> f64 {
+    let sigma = noise.iter().fold(0.0f64, |most, sigma| most.max(*sigma));
+    let span = libm::pow(sigma * libm::sqrt(75.0 * interval) / RATE_NOISE, 2.0 / 3.0);
+    (0.5 * span).clamp(REACH.0, REACH.1)
 }
 
 /// Rows about which all readings were measured.
@@ -262,7 +274,7 @@ mod tests {
         let replay = Replay::new(&time, &encoders, vec![25.0; 600], axes, Place::ankara()).unwrap();
         assert!(replay.moving()[..285].iter().all(|moves| !moves));
         assert!(replay.moving()[300..].iter().all(|moves| *moves));
-        assert!(replay.swings()[100][0].rate.abs() < 1e-3);
+        assert!(replay.swings().unwrap()[100][0].rate.abs() < 1e-3);
     }
 
     #[test]

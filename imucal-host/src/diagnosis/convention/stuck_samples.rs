@@ -12,6 +12,10 @@ use crate::recording::{Triple, integrity::SensorIntegrity};
 const PIECE: usize = 100;
 /// A sensor that repeats more than this share of its rows is slower than the recording.
 const SLOW: f64 = 0.45;
+/// So does one whose distances between repetitions vary by less than this share of what chance would give, where there
+/// are this many of them.
+const EVEN: f64 = 0.25;
+const EVEN_FROM: f64 = 20.0;
 
 /// Looks at one sensor; dead and clipped stretches, which have checks of their own, do not count.
 pub(super) fn check(triple: &Triple, sensor: &SensorIntegrity, found: &mut Conventions) {
@@ -41,7 +45,7 @@ pub(super) fn check(triple: &Triple, sensor: &SensorIntegrity, found: &mut Conve
     if p_value > SURE || rows < 2.0 * expected {
         return;
     }
-    if rows > SLOW * total {
+    if rows > SLOW * total || is_even(&repeats) {
         found.remarks.push(format!(
             "{kind} repeats {:.0} % of its rows: it is slower than the recording, or its transport repeats samples",
             100.0 * rows / total
@@ -53,4 +57,19 @@ pub(super) fn check(triple: &Triple, sensor: &SensorIntegrity, found: &mut Conve
     let std_error = share / starts.sqrt();
     let values = [(Some(share), Some(std_error))];
     found.findings.extend(Finding::new(&format!("{kind}.stuck_samples"), &values, p_value));
+}
+
+/// Stretches of repetitions come at even distances: a slower sensor's, where a transport's come by chance.
+fn is_even(repeats: &[[bool; 4]]) -> bool {
+    let starts = |row: &usize| repeats[*row][3] && (*row == 0 || !repeats[*row - 1][3]);
+    let at: Vec<usize> = (0..repeats.len()).filter(starts).collect();
+    let apart: Vec<f64> = at.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect();
+    let n = apart.len() as f64;
+    if n < EVEN_FROM {
+        return false;
+    }
+    let mean = apart.iter().sum::<f64>() / n;
+    let variance = apart.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / n;
+    // Distances of events by chance are geometric.
+    variance < EVEN * mean * (mean - 1.0)
 }
