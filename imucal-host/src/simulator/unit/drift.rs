@@ -14,12 +14,12 @@ pub enum DriftKind {
     Quick,
     /// One Gauss–Markov process that forgets within minutes.
     Slow,
-    /// A random walk from zero, which reaches the drift's standard deviation within [`WALK`].
+    /// A random walk from zero, which reaches the drift's standard deviation within five minutes.
     Walk,
 }
 
 /// Time in which a random walk goes as far as the drift's standard deviation, s.
-pub const WALK: f64 = 300.0;
+const WALK: f64 = 300.0;
 
 impl DriftKind {
     /// All of them.
