@@ -146,6 +146,7 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
             gap_closed_ci95: Some(share.interval),
         });
     }
+    let remarks = if linear.scene.swings.is_none() { unborne(&mut causes) } else { Vec::new() };
     causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let mut credible_set: Vec<String> = Vec::new();
     for effect in standings.iter().flat_map(|standing| &standing.set) {
@@ -165,9 +166,18 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
     };
     let (absent, not_testable) = testable::testable(linear, &best.set, &best.noise)?;
     let found = !causes.is_empty();
+    if !remarks.is_empty() {
+        credible_set
+            .retain(|id| causes.iter().any(|cause| cause.effect == *id || cause.equivalents.contains(id)));
+    }
+    let verdict = match (remarks.is_empty(), found) {
+        (true, _) => verdict(&causes, left, &closed),
+        (false, true) => Verdict::Partly,
+        (false, false) => Verdict::Unknown,
+    };
     Some(Diagnosis {
-        verdict: verdict(&causes, left, &closed),
-        remarks: Vec::new(),
+        verdict,
+        remarks,
         gap: gap::table(linear, &best.set, &best.noise)?,
         places: places(if found { &before } else { &after }, gap::size(linear, &best.set, &best.noise)?),
         causes,
@@ -180,6 +190,23 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
         next_experiment,
         ..untestable(recording, String::new())
     })
+}
+
+/// Takes out causes that no held-out block bears out, or that are too small to matter: where no rig guides the sensor,
+/// what hand and reference add is no noise of any kind that is estimated, and evidence alone is too sure.
+fn unborne(causes: &mut Vec<Cause>) -> Vec<String> {
+    let borne = |cause: &Cause| {
+        cause.material
+            && cause.gap_closed.is_some_and(|share| share > REMAINDER)
+            && cause.gap_closed_ci95.is_some_and(|[from, _]| from > 0.0)
+    };
+    let (kept, out): (Vec<Cause>, Vec<Cause>) = causes.drain(..).partition(borne);
+    *causes = kept;
+    if out.is_empty() {
+        return Vec::new();
+    }
+    let names: Vec<&str> = out.iter().map(|cause| cause.effect.as_str()).collect();
+    vec![format!("not asserted, since held-out data do not bear them out: {}", names.join(", "))]
 }
 
 fn is_followed(following: &Following, tests: usize) -> bool {
