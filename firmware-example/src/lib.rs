@@ -1,28 +1,44 @@
 //! What the images share: the record they carry, the samples they correct, and the panic gate.
 //!
-//! Every image of this crate, built with profile `firmware`, is a proof: there is no global allocator, and the panic
-//! handler calls a function that does not exist, so that an image with a panic path left in it does not link.
+//! Every image of this crate but `log` and `nrf52840`, built with profile `firmware`, is a proof: there is no global
+//! allocator, and the panic handler calls a function that does not exist, so that an image with a panic path left in it
+//! does not link.
 //!
 //! | image | does |
 //! | --- | --- |
 //! | `replay` | reads the record, corrects the samples, prints the bits; on a host it prints the host's |
 //! | `gate` | calls everything a device may want of the core |
 //! | `correct` | reads the record and corrects a sample: the least a device does |
-//! | `fit` | fits all sensors, judges the fits and writes a record, prints the bits as `replay` does |
+//! | `fit` | fits every model to simulated sets, judges the fits and writes records, prints the bits as `replay` does |
+//! | `fits` | reads a record, corrects, fits every model and packs a record, without text: what that takes of flash |
+//! | `cost` | prints what parts of the core take: instructions and stack |
+//! | `coprocessor` | keeps a record, corrects, fits and stores, at the end of a UART |
+//! | `log` | says by defmt what it does, over semihosting; with `--features log` |
+//! | `nrf52840` | the co-processor on a real board; with `--features nrf52840` |
 //! | `empty` | start-up code and the record's bytes, to compare the size of `correct` with |
 #![no_std]
 
+pub mod board;
 #[cfg(target_os = "none")]
 pub mod console;
+pub mod coprocessor;
 pub mod correct;
+#[cfg(target_os = "none")]
+pub mod cost;
+pub mod drill;
 pub mod fit;
+pub mod fitting;
 #[cfg(target_os = "none")]
 mod gate;
+pub mod judgement;
+#[cfg(target_os = "none")]
+pub mod machine;
 pub mod replay;
 pub mod scene;
 pub mod search;
 #[cfg(target_os = "none")]
 pub mod stack;
+pub mod storage;
 
 /// A record as it would lie in flash: the golden bytes of the format's version 1.0.
 pub static RECORD: &[u8] = include_bytes!("../../imucal-core/tests/golden/record-1.0.bin");

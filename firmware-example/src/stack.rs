@@ -21,3 +21,29 @@ pub fn deepest() -> (usize, usize) {
     }
     (start.addr() - at.addr(), start.addr() - end.addr())
 }
+
+/// Bytes left unpainted below whoever paints: his own frame and the painter's.
+const MARGIN: usize = 128;
+
+/// Paints what of the stack lies free; where the paint ends.
+#[inline(never)]
+pub fn paint() -> usize {
+    let here = 0u32;
+    let (mut at, top) = (&raw const _stack_end as *mut u32, (&raw const here).addr() - MARGIN);
+    while at.addr() < top {
+        // SAFETY: between the stack's end and the frames in use lies nothing; volatile, since no variable is there.
+        unsafe { at.write_volatile(STACK_PAINT_VALUE) };
+        at = at.wrapping_add(1);
+    }
+    top
+}
+
+/// Bytes below the end of the paint that have lost it.
+pub fn used_below(top: usize) -> usize {
+    let mut at = &raw const _stack_end;
+    // SAFETY: as above.
+    while at.addr() < top && unsafe { at.read_volatile() } == STACK_PAINT_VALUE {
+        at = at.wrapping_add(1);
+    }
+    top - at.addr()
+}

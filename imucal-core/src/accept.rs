@@ -8,17 +8,22 @@
 use core::fmt;
 
 use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     coverage::Coverage,
     model::{Model, SquaredSum},
     scalar::Scalar,
-    solver::{LevenbergMarquardt, SolveReport, Termination, condition::weakest_direction},
+    solver::{
+        LevenbergMarquardt, SolveReport, Termination, condition::weakest_direction,
+        triangular::weighted_square,
+    },
     triad::Triad,
 };
 
 /// What is asked of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Limits {
     /// Observations at least.
     pub observations: usize,
@@ -55,8 +60,9 @@ impl Limits {
     }
 }
 
-/// Why a fit was refused. The figures are those that led to it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Why a fit was refused. The figures are those that led to it. The order of the variants is the messages' format:
+/// append only.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Refusal {
@@ -124,7 +130,7 @@ pub enum Refusal {
 }
 
 /// A quantity that [`Refusal::Implausible`] speaks of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Quantity {
@@ -214,11 +220,10 @@ pub fn check_observations<T: Scalar>(
     if coverage.observations < limits.observations {
         return Err(Refusal::TooFewObservations { have: coverage.observations, need: limits.observations });
     }
-    let (share, flatness) = (coverage.share.wide(), coverage.flatness.wide());
-    if share < limits.coverage || flatness < limits.flatness {
+    if coverage.share < T::of(limits.coverage) || coverage.flatness < T::of(limits.flatness) {
         return Err(Refusal::PoorCoverage {
-            coverage: share,
-            flatness,
+            coverage: coverage.share.wide(),
+            flatness: coverage.flatness.wide(),
             need_coverage: limits.coverage,
             need_flatness: limits.flatness,
         });
@@ -240,8 +245,8 @@ pub fn check_report<T: Scalar>(report: &SolveReport<T>, limits: &Limits) -> Resu
         termination if !termination.was_successful() => return Err(Refusal::DidNotConverge { termination }),
         _ => {}
     }
-    let condition = report.condition.wide();
-    if condition > limits.condition {
+    if report.condition > T::of(limits.condition) {
+        let condition = report.condition.wide();
         return Err(Refusal::IllConditioned { condition, limit: limits.condition });
     }
     Ok(())
@@ -254,8 +259,8 @@ const ROUNDING_SHARE: f64 = 0.1;
 /// How far rounding moves the sum of squares: 2 Σ r e, with e the rounding of the terms that a residual is made of.
 fn rounding_of_cost<T: Scalar, const P: usize>(fit: &LevenbergMarquardt<T, P>, variance: T) -> T {
     let here = fit.factor().squared_sum();
-    let rows = here / variance + T::of(P as f64);
-    let terms = fit.theta().component_mul(&fit.factor().column_norms()).norm_squared();
+    let rows = here / variance + T::whole(P as u32);
+    let terms = weighted_square(fit.theta().as_slice(), fit.factor().column_norms().as_slice());
     (here * terms / rows).root() * T::EPSILON * T::of(2.0)
 }
 
@@ -281,7 +286,7 @@ pub fn nonlinearity<T: Scalar, const P: usize>(
         return T::LARGEST;
     };
     // Scaled so that the parabola rises by inflation² · variance.
-    let rise = (fit.factor().r() * unit).norm_squared().root();
+    let rise = fit.factor().length_of(&unit);
     let step: SVector<T, P> = unit * (variance.root() * inflation / rise);
     let expected = variance * inflation * inflation;
     if rounding_of_cost(fit, variance) > expected * T::of(ROUNDING_SHARE) {
@@ -302,9 +307,8 @@ pub fn nonlinearity<T: Scalar, const P: usize>(
 /// # Errors
 /// ill-conditioned, with the departure.
 pub fn check_nonlinearity<T: Scalar>(nonlinearity: T, limits: &Limits) -> Result<(), Refusal> {
-    let nonlinearity = nonlinearity.wide();
-    if nonlinearity > limits.nonlinearity {
-        return Err(Refusal::TooNonlinear { nonlinearity, limit: limits.nonlinearity });
+    if nonlinearity > T::of(limits.nonlinearity) {
+        return Err(Refusal::TooNonlinear { nonlinearity: nonlinearity.wide(), limit: limits.nonlinearity });
     }
     Ok(())
 }
@@ -323,23 +327,21 @@ pub fn check_plausibility<T: Scalar>(
     if !triad.is_finite() || !relative_rms.finite() {
         return Err(Refusal::NotFinite);
     }
-    let (least, most) = limits.gain;
-    let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+    let (least, most) = (T::of(limits.gain.0), T::of(limits.gain.1));
+    let (mut low, mut high) = (T::LARGEST, T::zero());
     for column in triad.gain.column_iter() {
-        let gain = libm::sqrt(column.norm_squared().wide());
-        low = low.min(gain);
-        high = high.max(gain);
-        if nominal && !(least..=most).contains(&gain) {
-            let limit = if gain < least { least } else { most };
-            return Err(Refusal::Implausible { what: Quantity::Gain, value: gain, limit });
+        let gain = column.norm_squared().root();
+        low = if gain < low { gain } else { low };
+        high = if gain > high { gain } else { high };
+        if nominal && !(gain >= least && gain <= most) {
+            let limit = if gain < least { limits.gain.0 } else { limits.gain.1 };
+            return Err(Refusal::Implausible { what: Quantity::Gain, value: gain.wide(), limit });
         }
     }
-    if high > most / least * low {
-        return Err(Refusal::Implausible {
-            what: Quantity::AxisRatio,
-            value: high / low,
-            limit: most / least,
-        });
+    let ratio = most / least;
+    if high > ratio * low {
+        let value = (high / low).wide();
+        return Err(Refusal::Implausible { what: Quantity::AxisRatio, value, limit: ratio.wide() });
     }
     check_residual(relative_rms, limits)
 }
@@ -349,11 +351,11 @@ pub fn check_plausibility<T: Scalar>(
 /// # Errors
 /// not-finite or implausible.
 pub fn check_residual<T: Scalar>(relative_rms: T, limits: &Limits) -> Result<(), Refusal> {
-    let value = relative_rms.wide();
     if !relative_rms.finite() {
         return Err(Refusal::NotFinite);
     }
-    if value > limits.rms {
+    if relative_rms > T::of(limits.rms) {
+        let value = relative_rms.wide();
         return Err(Refusal::Implausible { what: Quantity::Residual, value, limit: limits.rms });
     }
     Ok(())

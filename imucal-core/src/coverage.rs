@@ -24,6 +24,7 @@ pub const MOST_DISTINCT: usize = 24;
 
 /// How well the sphere of directions is covered.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Coverage<T> {
     /// Observations looked at.
     pub observations: usize,
@@ -47,22 +48,28 @@ impl<T: Scalar> Coverage<T> {
     }
 }
 
-/// Centre of cell `index`, unit vector.
-fn cell<T: Scalar>(index: u16) -> Vector3<T> {
-    let golden = core::f64::consts::PI * (3.0 - 2.236_067_977_499_79);
-    let z = 1.0 - (2.0 * f64::from(index) + 1.0) / f64::from(CELLS);
-    let radius = libm::sqrt(1.0 - z * z);
-    let azimuth = golden * f64::from(index);
-    Vector3::new(T::of(radius * libm::cos(azimuth)), T::of(radius * libm::sin(azimuth)), T::of(z))
-}
+/// cos and sin of the golden angle, π (3 − √5), by which each cell lies further round than the last.
+const GOLDEN: (f64, f64) = (-0.737_368_878_078_319_7, 0.675_490_294_261_523_8);
+/// cos of [`REACH`].
+const COS_REACH: f64 = 0.866_025_403_784_438_6;
+/// cos of [`APART`].
+const COS_APART: f64 = 0.965_925_826_289_068_3;
 
+/// By turning on from cell to cell: neither sine nor double precision is asked of a device.
 fn share<T: Scalar>(directions: impl Iterator<Item = Vector3<T>> + Clone) -> T {
-    let near = T::of(libm::cos(REACH));
-    let reached = (0..CELLS).filter(|index| {
-        let centre = cell(*index);
-        directions.clone().any(|u| u.dot(&centre) >= near)
-    });
-    T::of(reached.count() as f64 / f64::from(CELLS))
+    let (cos, sin) = (T::of(GOLDEN.0), T::of(GOLDEN.1));
+    let (mut x, mut y) = (T::one(), T::zero());
+    let mut reached = 0;
+    for index in 0..u32::from(CELLS) {
+        let z = T::one() - T::whole(2 * index + 1) / T::whole(CELLS.into());
+        let radius = (T::one() - z * z).root();
+        let centre = Vector3::new(radius * x, radius * y, z);
+        if directions.clone().any(|u| u.dot(&centre) >= T::of(COS_REACH)) {
+            reached += 1;
+        }
+        (x, y) = (cos * x - sin * y, sin * x + cos * y);
+    }
+    T::whole(reached) / T::whole(CELLS.into())
 }
 
 fn flatness<T: Scalar>(directions: impl Iterator<Item = Vector3<T>>) -> T {
@@ -75,30 +82,41 @@ fn flatness<T: Scalar>(directions: impl Iterator<Item = Vector3<T>>) -> T {
     if count == 0 {
         return T::zero();
     }
-    let per = T::one() / T::of(f64::from(count));
+    let per = T::one() / T::whole(count);
     let mean = sum * per;
     least_eigenvalue(&(squares * per - mean * mean.transpose()))
 }
 
-/// Least eigenvalue of a symmetric positive semi-definite 3×3 matrix, by the trigonometric closed form
-/// (Smith 1961).
+/// Rounds of Newton's method; where two eigenvalues are equal, each halves the error.
+const ROUNDS: usize = 40;
+
+/// Least eigenvalue of a symmetric positive semi-definite 3×3 matrix.
+///
+/// Scaled to mean 0 and Σ λ² = 6, eigenvalues are the roots of t³ − 3t − det, of which the least lies in [−2, −1]:
+/// Newton's method from −2 rises to it and never beyond. (The closed form of Smith 1961 takes an arc cosine.)
 fn least_eigenvalue<T: Scalar>(m: &Matrix3<T>) -> T {
-    let third = T::of(1.0 / 3.0);
-    let mean = m.trace() * third;
+    let three = T::of(3.0);
+    let mean = m.trace() * T::of(1.0 / 3.0);
     let off = m - Matrix3::identity() * mean;
     let p = (off.norm_squared() / T::of(6.0)).root();
     if p <= T::EPSILON {
         return mean;
     }
-    let half_det = (off / p).determinant() * T::of(0.5);
-    let clamped = half_det.wide().clamp(-1.0, 1.0);
-    let angle = libm::acos(clamped) / 3.0 + 2.0 * core::f64::consts::FRAC_PI_3;
-    let least = mean + p * T::of(2.0 * libm::cos(angle));
+    let det = (off / p).determinant();
+    let mut t = T::of(-2.0);
+    for _ in 0..ROUNDS {
+        let (value, slope) = (t * t * t - three * t - det, three * (t * t - T::one()));
+        if value >= T::zero() || slope <= T::zero() {
+            break;
+        }
+        t -= value / slope;
+    }
+    let least = mean + p * t;
     if least > T::zero() { least } else { T::zero() }
 }
 
 fn distinct<T: Scalar>(directions: impl Iterator<Item = Vector3<T>>) -> usize {
-    let near = T::of(libm::cos(APART));
+    let near = T::of(COS_APART);
     let mut found: Vec<Vector3<T>, MOST_DISTINCT> = Vec::new();
     for u in directions {
         if !found.iter().any(|other| other.dot(&u) > near) && found.push(u).is_err() {

@@ -18,6 +18,7 @@
 //! | whether to believe it | [`coverage`], [`accept`] | typed refusals with their figures |
 //! | what is kept | [`record`] | bytes with a version and a CRC |
 //! | what is applied | [`corrector`] | `calibrated = gain · (raw − bias)`, sample by sample |
+//! | what is said to a host | `link`, a feature | frames and messages between a device and its host |
 //!
 //! A device that only applies needs the last two.
 //!
@@ -72,3 +73,6 @@ pub mod accept;
 pub mod record;
 
 pub mod corrector;
+
+#[cfg(feature = "link")]
+pub mod link;

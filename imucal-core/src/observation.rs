@@ -33,7 +33,7 @@ impl<T: Scalar> Moments<T> {
     pub fn push(&mut self, sample: &Vector3<T>) {
         self.count = self.count.saturating_add(1);
         let before = sample - self.mean;
-        self.mean += before / T::of(f64::from(self.count));
+        self.mean += before / T::whole(self.count);
         self.squares += before.component_mul(&(sample - self.mean));
     }
 
@@ -52,7 +52,7 @@ impl<T: Scalar> Moments<T> {
         if self.count < 2 {
             return Vector3::zeros();
         }
-        self.squares / T::of(f64::from(self.count - 1))
+        self.squares / T::whole(self.count - 1)
     }
 }
 
@@ -88,6 +88,17 @@ pub struct Block<T: Scalar> {
     pub s1: Vector3<T>,
     /// Coning sum, rad².
     pub c: Vector3<T>,
+}
+
+impl<T: Scalar> Block<T> {
+    /// This block, of a duration in s, and the next one, as one: the block of their samples, to rounding.
+    pub fn join(&self, duration: T, next: &Self, next_duration: T) -> Self {
+        Self {
+            s0: self.s0 + next.s0,
+            s1: self.s1 + self.s0 * next_duration + next.s1 - next.s0 * duration,
+            c: self.c + next.c + self.s0.cross(&next.s0),
+        }
+    }
 }
 
 /// How long each block of a turn lasts, s.
@@ -265,6 +276,22 @@ mod tests {
             samples.iter().map(|s| (s - mean).component_mul(&(s - mean))).sum::<Vector3<f64>>() / 49.0;
         assert!((m.mean() - mean).norm() < 1e-9);
         assert!((m.variance() - variance).norm() < 1e-6);
+    }
+
+    #[test]
+    fn two_blocks_joined_are_the_block_of_their_samples() {
+        let rate = |k: usize| Vector3::new((k as f64).sin(), 0.3 * k as f64, (0.7 * k as f64).cos());
+        let of = |range: std::ops::Range<usize>| {
+            let mut builder = BlockBuilder::default();
+            range.for_each(|k| builder.push(&rate(k), 0.01 + 0.001 * k as f64));
+            builder.finish()
+        };
+        let ((a, a_duration), (b, b_duration), (both, duration)) = (of(0..4), of(4..9), of(0..9));
+        let joined = a.join(a_duration, &b, b_duration);
+        assert!((a_duration + b_duration - duration).abs() < 1e-15);
+        for (x, y) in [(joined.s0, both.s0), (joined.s1, both.s1), (joined.c, both.c)] {
+            assert!((x - y).norm() < 1e-15, "{x} {y}");
+        }
     }
 
     #[test]

@@ -12,7 +12,8 @@
 //! ```
 //!
 //! Below one radian the coefficients come from their power series (to φ¹⁶: the remainder is below 1e-15, see
-//! `series_and_closed_form_agree`), above from libm. Source: Rodrigues' formula; the derivative as in Chirikjian,
+//! `series_and_closed_form_agree`), above from those of half the angle: libm's sine takes double precision, which a
+//! device has to emulate. Source: Rodrigues' formula; the derivative as in Chirikjian,
 //! *Stochastic Models, Information Theory, and Lie Groups*, vol. 2, ch. 10; matrix to quaternion as in Shepperd 1978
 //! (J. Guidance and Control 1). Errors, largest entry over angles up to π, asserted by the tests:
 //!
@@ -35,12 +36,37 @@ const TERMS: usize = 9;
 const SHORT_LIMIT: f64 = 0.02;
 /// Terms of each series there.
 const SHORT_TERMS: usize = 6;
+/// And so many, in single precision.
+const SINGLE_TERMS: usize = 4;
 
 /// `[v]×`: the matrix that takes x to v × x.
 #[inline]
 pub fn cross_matrix<T: Scalar>(v: &Vector3<T>) -> Matrix3<T> {
     let o = T::zero();
     Matrix3::new(o, -v.z, v.y, v.z, o, -v.x, -v.y, v.x, o)
+}
+
+/// `m · v`, by components: nalgebra's product is the same arithmetic in the same order, but at a device's
+/// `opt-level = "s"` it stays a loop, four times as long.
+#[inline]
+pub fn image<T: Scalar>(m: &Matrix3<T>, v: &Vector3<T>) -> Vector3<T> {
+    Vector3::new(
+        m.m11 * v.x + m.m12 * v.y + m.m13 * v.z,
+        m.m21 * v.x + m.m22 * v.y + m.m23 * v.z,
+        m.m31 * v.x + m.m32 * v.y + m.m33 * v.z,
+    )
+}
+
+/// `a · b`, likewise, and out of line: it takes 200 bytes wherever it is written out.
+#[inline(never)]
+pub fn product<T: Scalar>(a: &Matrix3<T>, b: &Matrix3<T>) -> Matrix3<T> {
+    let (x, y, z) = (
+        Vector3::new(b.m11, b.m21, b.m31),
+        Vector3::new(b.m12, b.m22, b.m32),
+        Vector3::new(b.m13, b.m23, b.m33),
+    );
+    let (x, y, z) = (image(a, &x), image(a, &y), image(a, &z));
+    Matrix3::new(x.x, y.x, z.x, x.y, y.y, z.y, x.z, y.z, z.z)
 }
 
 /// The three coefficients a, b, c of the module's equations at a squared angle.
@@ -51,33 +77,26 @@ struct Coefficients<T> {
     c: T,
 }
 
-/// Factors of a series, as constants: a device without double precision takes hundreds of instructions for each.
-struct Factors<const N: u32>;
-
-impl<const N: u32> Factors<N> {
-    const ALL: [f64; TERMS - 1] = [
-        Self::at(1),
-        Self::at(2),
-        Self::at(3),
-        Self::at(4),
-        Self::at(5),
-        Self::at(6),
-        Self::at(7),
-        Self::at(8),
-    ];
-
-    const fn at(k: u32) -> f64 {
-        1.0 / ((2 * k + N - 1) * (2 * k + N)) as f64
-    }
+/// Factor k of a series.
+const fn factor(k: u32, n: u32) -> f64 {
+    1.0 / ((2 * k + n - 1) * (2 * k + n)) as f64
 }
 
 /// The first `TERMS` of `Σ_k (−x)^k · N! / (2k + N)!` by Horner's rule, that is 1 − x/((N+1)(N+2)) · (1 − …).
+///
+/// Written out: a loop over a table of `f64` has a device without double precision convert each factor each time, at
+/// five times the cost of all the rest.
 #[inline]
 fn series<T: Scalar, const N: u32, const TERMS: usize>(x: T) -> T {
     let mut sum = T::one();
-    for factor in Factors::<N>::ALL.iter().take(TERMS - 1).rev() {
-        sum = T::one() - x * sum * T::of(*factor);
+    macro_rules! terms {
+        ($($k:literal)*) => {
+            $(if TERMS > $k {
+                sum = T::one() - x * sum * T::of(const { factor($k, N) });
+            })*
+        };
     }
+    terms!(8 7 6 5 4 3 2 1);
     sum
 }
 
@@ -90,24 +109,49 @@ fn series_coefficients<T: Scalar, const TERMS: usize>(x: T) -> Coefficients<T> {
     }
 }
 
-#[inline]
+#[inline(never)]
 fn coefficients<T: Scalar>(x: T) -> Coefficients<T> {
     if x < T::of(SHORT_LIMIT) {
         series_coefficients::<T, SHORT_TERMS>(x)
     } else if x < T::of(SERIES_LIMIT) {
         series_coefficients::<T, TERMS>(x)
     } else {
-        let angle = x.root();
-        let (sin, cos) = (angle.sin(), angle.cos());
-        Coefficients { a: sin / angle, b: (T::one() - cos) / x, c: (angle - sin) / (x * angle) }
+        doubled_coefficients(x)
     }
+}
+
+/// Halvings of an angle at the most: more have none left.
+const HALVINGS: u32 = 64;
+
+/// The coefficients of a larger angle, from those of its half, as often as need be: sin 2h = 2 sin h cos h.
+#[inline(never)]
+fn doubled_coefficients<T: Scalar>(x: T) -> Coefficients<T> {
+    let (mut small, mut halvings) = (x, 0);
+    while small >= T::of(SERIES_LIMIT) && halvings < HALVINGS {
+        small *= T::of(0.25);
+        halvings += 1;
+    }
+    let mut k = series_coefficients::<T, TERMS>(small);
+    for _ in 0..halvings {
+        let a = k.a * (T::one() - k.b * small);
+        small *= T::of(4.0);
+        k = Coefficients { a, b: k.a * k.a * T::of(0.5), c: (T::one() - a) / small };
+    }
+    k
+}
+
+/// Sine and cosine of an angle, rad, meant for small ones: half a dozen roundings more for each doubling beyond 1 rad.
+pub fn sin_cos<T: Scalar>(angle: T) -> (T, T) {
+    let x = angle * angle;
+    let k = coefficients(x);
+    (k.a * angle, T::one() - k.b * x)
 }
 
 /// `I + first · [φ]× + second · [φ]×²`, the square as φφᵀ − φ² I.
 #[inline]
 fn polynomial<T: Scalar>(phi: &Vector3<T>, x: T, first: T, second: T) -> Matrix3<T> {
-    let v = phi * first;
-    let w = phi * second;
+    let v = Vector3::new(phi.x * first, phi.y * first, phi.z * first);
+    let w = Vector3::new(phi.x * second, phi.y * second, phi.z * second);
     let d = T::one() - second * x;
     Matrix3::new(
         d + w.x * phi.x,
@@ -133,9 +177,35 @@ pub fn exp_with_jacobian<T: Scalar>(phi: &Vector3<T>) -> (Matrix3<T>, Matrix3<T>
 /// `C = exp([φ]×)`: the rotation matrix of a rotation vector φ, rad.
 #[inline]
 pub fn exp<T: Scalar>(phi: &Vector3<T>) -> Matrix3<T> {
-    let x = phi.dot(phi);
-    let k = coefficients(x);
-    polynomial(phi, x, k.a, k.b)
+    let x = phi.x * phi.x + phi.y * phi.y + phi.z * phi.z;
+    let (a, b) = if x < T::of(SHORT_LIMIT) {
+        if T::EPSILON > T::of(1e-10) {
+            // In single precision the first term left out, x⁴/9!, is nothing.
+            (series::<T, 1, SINGLE_TERMS>(x), series::<T, 2, SINGLE_TERMS>(x) * T::of(0.5))
+        } else {
+            (series::<T, 1, SHORT_TERMS>(x), series::<T, 2, SHORT_TERMS>(x) * T::of(0.5))
+        }
+    } else {
+        let k = coefficients(x);
+        (k.a, k.b)
+    };
+    polynomial(phi, x, a, b)
+}
+
+/// `C ← C exp([φ]×)`, in place: what a swarm's particle does for each block, so that its cost is that of a search.
+#[inline(never)]
+pub fn turn<T: Scalar>(c: &mut Matrix3<T>, phi: &Vector3<T>) {
+    let e = exp(phi);
+    let row = |x: T, y: T, z: T| {
+        (
+            x * e.m11 + y * e.m21 + z * e.m31,
+            x * e.m12 + y * e.m22 + z * e.m32,
+            x * e.m13 + y * e.m23 + z * e.m33,
+        )
+    };
+    (c.m11, c.m12, c.m13) = row(c.m11, c.m12, c.m13);
+    (c.m21, c.m22, c.m23) = row(c.m21, c.m22, c.m23);
+    (c.m31, c.m32, c.m33) = row(c.m31, c.m32, c.m33);
 }
 
 /// Below this squared tangent of half the angle the logarithm takes its series: angles below 16°.

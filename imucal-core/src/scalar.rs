@@ -25,6 +25,8 @@ pub trait Scalar: sealed::Sealed + RealField + Copy {
 
     /// The nearest number to `value`.
     fn of(value: f64) -> Self;
+    /// The nearest number to a whole one, without double precision in between.
+    fn whole(value: u32) -> Self;
     /// This number in double precision, exactly.
     fn wide(self) -> f64;
     /// Square root, correctly rounded; NaN below zero.
@@ -39,6 +41,10 @@ impl Scalar for f32 {
 
     #[inline]
     fn of(value: f64) -> Self {
+        value as f32
+    }
+    #[inline]
+    fn whole(value: u32) -> Self {
         value as f32
     }
     #[inline]
@@ -62,6 +68,10 @@ impl Scalar for f64 {
     #[inline]
     fn of(value: f64) -> Self {
         value
+    }
+    #[inline]
+    fn whole(value: u32) -> Self {
+        value.into()
     }
     #[inline]
     fn wide(self) -> f64 {

@@ -1,9 +1,12 @@
 //! Apply: a recording corrected by the core, in `f32`, as the device would.
 
+use std::convert::Infallible;
+
 use imucal_core::{
     corrector::Corrector,
     record::{CalibrationRecord, Match},
 };
+use nalgebra::Vector3;
 
 use crate::{
     recording::{Nominal, Recording, SensorKind, Unit},
@@ -99,31 +102,52 @@ pub fn check(
 
 /// The recording with every calibrated sensor corrected, in calibrated units; the others as they were.
 pub fn apply(recording: &Recording, stored: &StoredCalibration, record: &CalibrationRecord) -> Recording {
-    let mut corrected = recording.clone();
-    let temperature = recording.temperature.as_deref();
-    for kind in SensorKind::ALL {
-        let (Some(stored), Some(triad)) = (stored.triad(kind), record.triad(kind.into())) else {
-            continue;
+    let by_core = |kind: SensorKind, raw: &[Vector3<f32>], warmth: &[f32]| {
+        let corrector = record.triad(kind.into()).map(Corrector::<f32>::from);
+        let corrected = |(raw, warmth): (&Vector3<f32>, &f32)| {
+            corrector.as_ref().map_or(*raw, |corrector| corrector.apply_at(raw, *warmth))
         };
+        Ok::<_, Infallible>(raw.iter().zip(warmth).map(corrected).collect())
+    };
+    match apply_by(recording, stored, by_core) {
+        Ok(corrected) => corrected,
+        Err(never) => match never {},
+    }
+}
+
+/// The same, corrected by whoever is called: with a sensor, its raw samples, and the temperature of each, °C or NaN.
+///
+/// # Errors
+/// Those of `correct`.
+pub fn apply_by<E>(
+    recording: &Recording,
+    stored: &StoredCalibration,
+    mut correct: impl FnMut(SensorKind, &[Vector3<f32>], &[f32]) -> Result<Vec<Vector3<f32>>, E>,
+) -> Result<Recording, E> {
+    let mut corrected = recording.clone();
+    let warmth: Vec<f32> = match &recording.temperature {
+        Some(temperature) => temperature.iter().map(|t| *t as f32).collect(),
+        None => vec![f32::NAN; recording.rows()],
+    };
+    for kind in SensorKind::ALL {
+        let Some(stored) = stored.triad(kind) else { continue };
         let triple = match kind {
             SensorKind::Acc => &mut corrected.acc,
             SensorKind::Gyr => &mut corrected.gyr,
             SensorKind::Mag => &mut corrected.mag,
         };
         let Some(triple) = triple else { continue };
-        let corrector = Corrector::<f32>::from(triad);
+        let raw: Vec<_> = triple.raw_samples().collect();
         let nominal = nominal_out(stored, triple.nominal);
-        for (row, value) in triple.values.iter_mut().enumerate() {
-            let raw = value.map(|x| triple.nominal.to_raw(x) as f32);
-            let warmth = temperature.map_or(f32::NAN, |t| t[row] as f32);
-            *value = corrector.apply_at(&raw, warmth).map(|x| nominal.to_si(f64::from(x)));
+        for (value, calibrated) in triple.values.iter_mut().zip(correct(kind, &raw, &warmth)?) {
+            *value = calibrated.map(|x| nominal.to_si(f64::from(x)));
         }
         triple.unit = stored.unit_out;
         triple.full_scale = triple.full_scale_si().map(|scale| scale * nominal.per_unit.abs());
         triple.nominal = nominal;
         set_unit(&mut corrected, kind, stored.unit_out);
     }
-    corrected
+    Ok(corrected)
 }
 
 /// Conversion of calibrated values; counts without their offset, which the calibration took out.

@@ -23,6 +23,8 @@ pub mod store;
 
 pub mod apply;
 
+pub mod device;
+
 pub mod equivalence;
 
 pub mod diagnosis;

@@ -5,19 +5,21 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// A microcontroller the images are built for. Its machine in QEMU is named in `.cargo/config.toml`.
+/// A microcontroller the images are built for. How cargo runs them stands in `.cargo/config.toml`.
 #[derive(Clone, Copy, Debug)]
 pub struct Board {
     /// Target triple.
     pub target: &'static str,
     /// Core, for people.
     pub core: &'static str,
+    /// Machine of QEMU.
+    pub machine: &'static str,
 }
 
 /// The boards every test goes through: one with a floating-point unit and one without.
 pub const BOARDS: [Board; 2] = [
-    Board { target: "thumbv7em-none-eabihf", core: "Cortex-M4F" },
-    Board { target: "thumbv6m-none-eabi", core: "Cortex-M0" },
+    Board { target: "thumbv7em-none-eabihf", core: "Cortex-M4F", machine: "mps2-an386" },
+    Board { target: "thumbv6m-none-eabi", core: "Cortex-M0", machine: "microbit" },
 ];
 
 /// An image that has not ended by then hangs: it takes milliseconds.
@@ -79,17 +81,48 @@ pub fn build(board: Board, image: &str, features: &[&str]) -> Result<PathBuf, St
     }
 }
 
+/// Nanoseconds of virtual time that an instruction takes in [`counted`]: 2 to this power.
+pub const SHIFT: u32 = 6;
+
+/// Builds one image and runs it on a clock that counts instructions; what it wrote.
+///
+/// # Panics
+///
+/// Where it does not build, hangs or fails.
+pub fn counted(board: Board, image: &str) -> String {
+    let path = build(board, image, &[]).unwrap_or_else(|refusal| panic!("{refusal}"));
+    let output = assert_cmd::Command::new("qemu-system-arm")
+        .args(["-machine", board.machine, "-nographic", "-monitor", "none", "-serial", "none"])
+        .args(["-chardev", "stdio,id=console", "-icount", &format!("shift={SHIFT}")])
+        .args(["-semihosting-config", "enable=on,target=native,chardev=console", "-kernel"])
+        .arg(path)
+        .timeout(PATIENCE)
+        .output()
+        .expect("QEMU starts");
+    assert_eq!(output.status.code(), Some(0), "{image} on {}: {output:?}", board.core);
+    String::from_utf8(output.stdout).expect("the image writes text")
+}
+
 /// Builds and runs one image; its exit status and what it wrote.
 ///
 /// # Panics
 ///
 /// Where it does not build, or hangs.
 pub fn run(board: Board, image: &str) -> Output {
-    if let Err(refusal) = build(board, image, &[]) {
+    run_with(board, image, &[])
+}
+
+/// The same with features.
+///
+/// # Panics
+///
+/// As above.
+pub fn run_with(board: Board, image: &str, features: &[&str]) -> Output {
+    if let Err(refusal) = build(board, image, features) {
         panic!("{image} does not build for {}:\n{refusal}", board.target);
     }
     // On Unix cargo becomes its runner, so that to kill the child is to kill QEMU.
-    let mut child = cargo("run", board, image, &[])
+    let mut child = cargo("run", board, image, features)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

@@ -38,7 +38,7 @@ use super::{
 };
 use crate::{
     observation::{Block, Motion},
-    rotation::{exp, exp_with_jacobian, inverse_left_jacobian, matrix, quaternion, quaternion_log},
+    rotation::{exp_with_jacobian, inverse_left_jacobian, matrix, product, quaternion, quaternion_log, turn},
     scalar::Scalar,
 };
 
@@ -153,6 +153,7 @@ impl<T: Scalar> Derivative<T> {
 }
 
 impl<T: Scalar, const P: usize> Model<T, P> for AttitudeModel<'_, T, P> {
+    #[inline(never)]
     fn rows<S: RowSink<T, P>>(&self, theta: &SVector<T, P>, sink: &mut S) {
         let gyroscope = Gyroscope::new(&self.form, theta);
         for motion in self.motions {
@@ -165,9 +166,9 @@ impl<T: Scalar, const P: usize> Model<T, P> for AttitudeModel<'_, T, P> {
                     if S::JACOBIAN {
                         let (step, jacobian) = exp_with_jacobian(&phi);
                         sums.add(&(c * jacobian), &gyroscope, motion, (index, block));
-                        c *= step;
+                        c = product(&c, &step);
                     } else {
-                        c *= exp(&phi);
+                        turn(&mut c, &phi);
                     }
                     index += 1;
                 }
@@ -237,7 +238,7 @@ impl<T: Scalar, const P: usize> Cost<T, P> for AttitudeModel<'_, T, P> {
             let until = after.min(pass.block.saturating_add(*budget));
             let mut c = pass.attitude;
             for (index, block) in motion.blocks.iter().enumerate().take(until).skip(pass.block) {
-                c *= exp(&pass.gyroscope.vector(motion, index, block));
+                turn(&mut c, &pass.gyroscope.vector(motion, index, block));
             }
             pass.attitude = c;
             *budget = budget.saturating_sub(until.saturating_sub(pass.block));
@@ -249,6 +250,6 @@ impl<T: Scalar, const P: usize> Cost<T, P> for AttitudeModel<'_, T, P> {
             pass.terms = pass.terms.saturating_add(1);
             pass.reference += 1;
         }
-        Some(pass.sum / T::of(f64::from(pass.terms)))
+        Some(pass.sum / T::whole(pass.terms))
     }
 }

@@ -23,7 +23,12 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::parameterisation::ENTRIES;
-use crate::{observation::Block, rotation::cross_matrix, scalar::Scalar, triad::Triad};
+use crate::{
+    observation::Block,
+    rotation::{cross_matrix, image, product},
+    scalar::Scalar,
+    triad::Triad,
+};
 
 /// Derivative of a rotation vector by the twelve entries of a triad.
 pub(super) type ByEntries<T> = SMatrix<T, 3, ENTRIES>;
@@ -54,8 +59,16 @@ impl<T: Scalar> BlockRotation<T> {
     /// φ of the module's first equation, less what stands still: v.
     #[inline]
     pub(super) fn vector(&self, block: &Block<T>, duration: T, still: &Vector3<T>) -> Vector3<T> {
-        let swing = self.cofactor * block.c - (self.gain * block.s1).cross(still);
-        self.gain * block.s0 - still * duration + swing * T::of(0.5)
+        // By components, for the same reason as `image`.
+        let (s, v) = (block, still);
+        let (angle, moment, coning) =
+            (image(&self.gain, &s.s0), image(&self.gain, &s.s1), image(&self.cofactor, &s.c));
+        let half = T::of(0.5);
+        Vector3::new(
+            angle.x - v.x * duration + (coning.x - (moment.y * v.z - moment.z * v.y)) * half,
+            angle.y - v.y * duration + (coning.y - (moment.z * v.x - moment.x * v.z)) * half,
+            angle.z - v.z * duration + (coning.z - (moment.x * v.y - moment.y * v.x)) * half,
+        )
     }
 
     /// Derivative of φ by the bias: −T A − ½ cof(A) \[s1\]×.
@@ -129,7 +142,9 @@ impl<T: Scalar> DerivativeSums<T> {
         let [x, y, z] = columns(gain);
         let [cx, cy, cz] = [x, y, z].map(|c| cross_matrix(&c));
         let [kx, ky, kz] = self.coning;
-        let by_cofactor = [ky * cz - kz * cy, kz * cx - kx * cz, kx * cy - ky * cx];
+        let commuted = |a, y, b, x| product(a, y) - product(b, x);
+        let by_cofactor =
+            [commuted(&ky, &cz, &kz, &cy), commuted(&kz, &cx, &kx, &cz), commuted(&kx, &cy, &ky, &cx)];
         let mut by = ByEntries::zeros();
         for (column, (angle, cofactor)) in self.angle.iter().zip(by_cofactor.iter()).enumerate() {
             let part = angle + cofactor;
@@ -139,10 +154,9 @@ impl<T: Scalar> DerivativeSums<T> {
         }
         let cofactor = BlockRotation::cofactor(gain);
         let [mx, my, mz] = self.moment;
-        let moment = mx * cofactor * cross_matrix(&Vector3::x())
-            + my * cofactor * cross_matrix(&Vector3::y())
-            + mz * cofactor * cross_matrix(&Vector3::z());
-        by.fixed_columns_mut::<3>(9).copy_from(&(-(self.time * gain) - moment * T::of(0.5)));
+        let across = |m, axis| product(&product(m, &cofactor), &cross_matrix(&axis));
+        let moment = across(&mx, Vector3::x()) + across(&my, Vector3::y()) + across(&mz, Vector3::z());
+        by.fixed_columns_mut::<3>(9).copy_from(&(-product(&self.time, gain) - moment * T::of(0.5)));
         by
     }
 }

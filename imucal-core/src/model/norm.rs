@@ -84,6 +84,7 @@ impl<T: Scalar> Shell<T> {
 }
 
 impl<T: Scalar, const P: usize> Model<T, P> for NormModel<'_, T, P> {
+    #[inline(never)]
     fn rows<S: RowSink<T, P>>(&self, theta: &SVector<T, P>, sink: &mut S) {
         let triad = self.form.triad(theta);
         for point in self.points {

@@ -16,7 +16,10 @@
 
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
-use crate::{rotation::matrix, scalar::Scalar};
+use crate::{
+    rotation::{matrix, product},
+    scalar::Scalar,
+};
 
 /// An axis of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,6 +112,11 @@ impl<T: Scalar> GimbalPose<T> {
         Self { value, sin: angles.map(|a| a.sin()), cos: angles.map(|a| a.cos()) }
     }
 
+    /// A pose at the sines and cosines of its encoder angles.
+    pub fn turned(value: Vector3<T>, sin: Vector3<T>, cos: Vector3<T>) -> Self {
+        Self { value, sin, cos }
+    }
+
     /// The encoders' angles (outer, middle, inner), rad, in (−π, π].
     pub fn angles(&self) -> Vector3<T> {
         self.sin.zip_map(&self.cos, |sin, cos| sin.atan2(cos))
@@ -133,8 +141,12 @@ impl<T: Scalar> Pose<T> for GimbalPose<T> {
         let r_0 = about(outer, self.sin.x, self.cos.x);
         let r_1 = about(middle, self.sin.y, self.cos.y);
         let r_2 = about(inner, self.sin.z, self.cos.z);
-        let c_t_o = r_1 * r_2;
-        PoseRotations { c_p_t: (r_0 * c_t_o).transpose(), c_o_t: c_t_o.transpose(), c_m_t: r_2.transpose() }
+        let c_t_o = product(&r_1, &r_2);
+        PoseRotations {
+            c_p_t: product(&r_0, &c_t_o).transpose(),
+            c_o_t: c_t_o.transpose(),
+            c_m_t: r_2.transpose(),
+        }
     }
 }
 

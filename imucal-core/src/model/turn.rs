@@ -26,7 +26,7 @@ use super::{
 };
 use crate::{
     observation::Turn,
-    rotation::{cross_matrix, exp, exp_with_jacobian},
+    rotation::{self, cross_matrix, exp_with_jacobian, product},
     scalar::Scalar,
     triad::Triad,
 };
@@ -43,10 +43,10 @@ pub struct TurnModel<'a, T: Scalar, const P: usize> {
 /// `C_after_before`: the attitude after the turn, as the product of its blocks.
 pub fn attitude<T: Scalar>(triad: &Triad<T>, turn: &Turn<'_, T>) -> Matrix3<T> {
     let mut c = Matrix3::identity();
-    let rotation = BlockRotation::new(triad);
+    let blocks = BlockRotation::new(triad);
     let still = triad.gain * triad.bias;
     for (index, block) in turn.blocks.iter().enumerate() {
-        c *= exp(&rotation.vector(block, turn.durations.get(index), &still));
+        rotation::turn(&mut c, &blocks.vector(block, turn.durations.get(index), &still));
     }
     c
 }
@@ -61,13 +61,14 @@ fn attitude_with_derivative<T: Scalar>(triad: &Triad<T>, turn: &Turn<'_, T>) -> 
         let duration = turn.durations.get(index);
         let (angle, coning) = reduce(&triad.bias, block, duration);
         let (step, jacobian) = exp_with_jacobian(&rotation.vector(block, duration, &still));
-        sums.add(&(c * jacobian), &angle, &coning, block, duration);
-        c *= step;
+        sums.add(&product(&c, &jacobian), &angle, &coning, block, duration);
+        c = product(&c, &step);
     }
     (c, sums.by_entries(&triad.gain))
 }
 
 impl<T: Scalar, const P: usize> Model<T, P> for TurnModel<'_, T, P> {
+    #[inline(never)]
     fn rows<S: RowSink<T, P>>(&self, theta: &SVector<T, P>, sink: &mut S) {
         let triad = self.form.triad(theta);
         for turn in self.turns {
@@ -124,7 +125,8 @@ impl<T: Scalar, const P: usize> Cost<T, P> for TurnModel<'_, T, P> {
         while let Some(turn) = self.turns.get(pass.turn) {
             let until = turn.blocks.len().min(pass.block.saturating_add(*budget));
             for (index, block) in turn.blocks.iter().enumerate().take(until).skip(pass.block) {
-                pass.attitude *= exp(&pass.rotation.vector(block, turn.durations.get(index), &pass.still));
+                let angle = pass.rotation.vector(block, turn.durations.get(index), &pass.still);
+                rotation::turn(&mut pass.attitude, &angle);
             }
             *budget = budget.saturating_sub(until.saturating_sub(pass.block));
             pass.block = until;
@@ -136,7 +138,7 @@ impl<T: Scalar, const P: usize> Cost<T, P> for TurnModel<'_, T, P> {
             pass.block = 0;
             pass.attitude = Matrix3::identity();
         }
-        Some(pass.sum / T::of(self.turns.len() as f64))
+        Some(pass.sum / T::whole(self.turns.len() as u32))
     }
 }
 
@@ -146,6 +148,7 @@ mod tests {
     use crate::{
         model::parameterisation::{FULL, FULL_GAIN},
         observation::{Block, BlockBuilder, Durations},
+        rotation::exp,
         solver::jacobian_check::largest_jacobian_error,
     };
     use proptest::prelude::*;

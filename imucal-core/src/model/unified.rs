@@ -27,7 +27,10 @@ use super::{
     parameterisation::{matrix_by_rows, select, vector},
     rig::{GimbalPose, Pose, PoseRotations},
 };
-use crate::scalar::Scalar;
+use crate::{
+    rotation::{product, sin_cos},
+    scalar::Scalar,
+};
 
 /// Entries of the unified model.
 pub const UNIFIED: usize = 32;
@@ -75,19 +78,19 @@ impl<T: Scalar> UnifiedParameters<T> {
     /// All entries in a row.
     pub fn to_vector(&self) -> SVector<T, UNIFIED> {
         let by_rows = self.sensitivity.transpose();
-        let entries = by_rows
-            .iter()
-            .chain(self.bias.iter())
-            .chain(self.tilt.iter())
-            .chain(self.vector_n.iter())
-            .chain(self.outer_source.iter())
-            .chain(self.middle_source.iter())
-            .chain(self.quadratic.iter())
-            .chain(self.cubic.iter())
-            .chain(self.cross_product.iter());
+        let vectors = [
+            &self.vector_n,
+            &self.outer_source,
+            &self.middle_source,
+            &self.quadratic,
+            &self.cubic,
+            &self.cross_product,
+        ];
+        let first = [by_rows.as_slice(), self.bias.as_slice(), &self.tilt];
         let mut all = SVector::<T, UNIFIED>::zeros();
-        for (slot, value) in all.iter_mut().zip(entries) {
-            *slot = *value;
+        let mut slots = all.iter_mut();
+        for part in first.into_iter().chain(vectors.map(|vector| vector.as_slice())) {
+            part.iter().zip(&mut slots).for_each(|(value, slot)| *slot = *value);
         }
         all
     }
@@ -165,7 +168,7 @@ struct Tilt<T: Scalar> {
 
 impl<T: Scalar> Tilt<T> {
     fn new([alpha, beta]: [T; 2]) -> Self {
-        let (sa, ca, sb, cb) = (alpha.sin(), alpha.cos(), beta.sin(), beta.cos());
+        let ((sa, ca), (sb, cb)) = (sin_cos(alpha), sin_cos(beta));
         let o = T::zero();
         Self {
             c_n_p: Matrix3::new(cb, o, -sb, sa * sb, ca, sa * cb, ca * sb, -sa, ca * cb),
@@ -251,21 +254,21 @@ impl<T: Scalar, const P: usize, G: Pose<T>> UnifiedModel<'_, T, P, G> {
         let v = now.sensed(r, tilt);
         let y = now.sensitivity * v;
         let slope = now.slope(&y);
-        let by_v = slope * now.sensitivity;
-        let by_base = by_v * r.c_p_t;
+        let by_v = product(&slope, &now.sensitivity);
+        let by_base = product(&by_v, &r.c_p_t);
         let mut by = ByAll::<T>::zeros();
         for (row, column) in slope.column_iter().enumerate() {
             for (k, component) in v.iter().enumerate() {
-                by.set_column(3 * row + k, &(column * *component));
+                by.set_column(3 * row + k, &column.map(|entry| entry * *component));
             }
         }
         let square = y.component_mul(&y);
         by.fixed_columns_mut::<3>(9).copy_from(&Matrix3::identity());
         by.set_column(12, &(by_base * (tilt.by_alpha * now.vector_n)));
         by.set_column(13, &(by_base * (tilt.by_beta * now.vector_n)));
-        by.fixed_columns_mut::<3>(14).copy_from(&(by_base * tilt.c_n_p));
-        by.fixed_columns_mut::<3>(17).copy_from(&(by_v * r.c_o_t));
-        by.fixed_columns_mut::<3>(20).copy_from(&(by_v * r.c_m_t));
+        by.fixed_columns_mut::<3>(14).copy_from(&product(&by_base, &tilt.c_n_p));
+        by.fixed_columns_mut::<3>(17).copy_from(&product(&by_v, &r.c_o_t));
+        by.fixed_columns_mut::<3>(20).copy_from(&product(&by_v, &r.c_m_t));
         by.fixed_columns_mut::<3>(23).copy_from(&Matrix3::from_diagonal(&square));
         by.fixed_columns_mut::<3>(26).copy_from(&Matrix3::from_diagonal(&square.component_mul(&y)));
         by.fixed_columns_mut::<3>(29).copy_from(&Matrix3::from_diagonal(&products(&y)));
@@ -294,6 +297,7 @@ impl<T: Scalar, const P: usize, G: Pose<T>> UnifiedModel<'_, T, P, G> {
 type ByAll<T> = SMatrix<T, 3, UNIFIED>;
 
 impl<T: Scalar, const P: usize, G: Pose<T>> Model<T, P> for UnifiedModel<'_, T, P, G> {
+    #[inline(never)]
     fn rows<S: RowSink<T, P>>(&self, theta: &SVector<T, P>, sink: &mut S) {
         let now = self.terms.parameters(&self.base, theta);
         let tilt = Tilt::new(now.tilt);

@@ -85,7 +85,7 @@ impl CalibrationRecord {
 }
 
 /// One of the three triads of a unit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sensor {
     /// Specific force.

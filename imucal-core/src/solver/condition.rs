@@ -5,7 +5,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::triangular::{back_substitute, solve_transposed};
+use super::triangular::{dot, substitute_back, substitute_transposed};
 use crate::scalar::Scalar;
 
 /// Sweeps over all pairs; nine parameters need five or six.
@@ -16,19 +16,26 @@ const ROUNDS: usize = 12;
 /// Largest over smallest singular value of `a` once its columns have unit length; the largest number there is
 /// where `a` is singular.
 pub fn normalised_condition<T: Scalar, const P: usize>(a: &SMatrix<T, P, P>) -> T {
-    let mut w = *a;
-    for mut column in w.column_iter_mut() {
-        let length = column.norm_squared().root();
+    let mut columns = *a;
+    condition_of(columns.as_mut_slice(), P)
+}
+
+/// The same over a slice, by columns of a size, which it uses up: one body serves every size.
+#[inline(never)]
+fn condition_of<T: Scalar>(columns: &mut [T], size: usize) -> T {
+    for column in columns.chunks_exact_mut(size.max(1)) {
+        let length = dot(column, column).root();
         if length <= T::zero() || !length.finite() {
             return T::LARGEST;
         }
-        column /= length;
+        column.iter_mut().for_each(|entry| *entry /= length);
     }
-    let values = singular_values(w);
+    orthogonalise_all(columns, size);
     let (mut least, mut most) = (T::LARGEST, T::zero());
-    for value in values.iter() {
-        least = if *value < least { *value } else { least };
-        most = if *value > most { *value } else { most };
+    for column in columns.chunks_exact(size.max(1)) {
+        let value = dot(column, column).root();
+        least = if value < least { value } else { least };
+        most = if value > most { value } else { most };
     }
     if least > T::zero() && most.finite() { most / least } else { T::LARGEST }
 }
@@ -40,43 +47,49 @@ pub fn normalised_condition<T: Scalar, const P: usize>(a: &SMatrix<T, P, P>) -> 
 pub fn weakest_direction<T: Scalar, const P: usize>(r: &SMatrix<T, P, P>) -> Option<SVector<T, P>> {
     let mut unit = *r;
     let mut lengths = SVector::<T, P>::zeros();
-    for (mut column, length) in unit.column_iter_mut().zip(lengths.iter_mut()) {
-        *length = column.norm_squared().root();
-        column /= *length;
-    }
     let mut direction = SVector::<T, P>::repeat(T::one());
-    for _ in 0..ROUNDS {
-        let image = solve_transposed(&unit, &direction)?;
-        direction = back_substitute(&unit, &image)?;
-        direction /= direction.norm_squared().root();
-    }
-    Some(direction.component_div(&lengths))
+    weaken(unit.as_mut_slice(), lengths.as_mut_slice(), direction.as_mut_slice()).then_some(direction)
 }
 
-/// Singular values of `w`, in no order.
-fn singular_values<T: Scalar, const P: usize>(mut w: SMatrix<T, P, P>) -> SVector<T, P> {
+/// The same over slices, R by columns, which it uses up; false where R is singular.
+#[inline(never)]
+fn weaken<T: Scalar>(unit: &mut [T], lengths: &mut [T], direction: &mut [T]) -> bool {
+    let size = direction.len().max(1);
+    for (column, length) in unit.chunks_exact_mut(size).zip(lengths.iter_mut()) {
+        *length = dot(column, column).root();
+        column.iter_mut().for_each(|entry| *entry /= *length);
+    }
+    for _ in 0..ROUNDS {
+        if !substitute_transposed(unit, direction) || !substitute_back(unit, direction) {
+            return false;
+        }
+        let length = dot(direction, direction).root();
+        direction.iter_mut().for_each(|entry| *entry /= length);
+    }
+    direction.iter_mut().zip(lengths).for_each(|(entry, length)| *entry /= *length);
+    true
+}
+
+/// Turns columns until their lengths are the singular values.
+fn orthogonalise_all<T: Scalar>(columns: &mut [T], size: usize) {
     for _ in 0..SWEEPS {
         let mut turned = false;
-        for i in 0..P {
-            for j in (i + 1)..P {
-                if let Ok([first, second]) = w.data.0.get_disjoint_mut([i, j]) {
-                    turned |= orthogonalise(first, second);
-                }
+        for i in 0..size {
+            // Those before i + 1, of which the last is turned with each of those after.
+            let Some((head, tail)) = columns.split_at_mut_checked((i + 1) * size) else { return };
+            let Some((_, first)) = head.split_at_mut_checked(i * size) else { return };
+            for second in tail.chunks_exact_mut(size.max(1)) {
+                turned |= orthogonalise(first, second);
             }
         }
         if !turned {
-            break;
+            return;
         }
     }
-    let mut values = SVector::<T, P>::zeros();
-    for (value, column) in values.iter_mut().zip(w.column_iter()) {
-        *value = column.norm_squared().root();
-    }
-    values
 }
 
 /// Rotates two columns so that they are orthogonal; false where they were.
-fn orthogonalise<T: Scalar, const P: usize>(first: &mut [T; P], second: &mut [T; P]) -> bool {
+fn orthogonalise<T: Scalar>(first: &mut [T], second: &mut [T]) -> bool {
     let (mut a, mut b, mut c) = (T::zero(), T::zero(), T::zero());
     for (x, y) in first.iter().zip(second.iter()) {
         a += *x * *x;

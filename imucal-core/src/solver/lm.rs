@@ -13,7 +13,7 @@ use nalgebra::{SMatrix, SVector};
 use super::{
     condition::normalised_condition,
     report::{SolveReport, Termination},
-    triangular::Triangular,
+    triangular::{Triangular, dot, weighted_square},
 };
 use crate::{
     model::{Model, SquaredSum},
@@ -142,7 +142,8 @@ impl<T: Scalar, const P: usize> LevenbergMarquardt<T, P> {
         self.evaluations = self.evaluations.saturating_add(1);
         self.independent_rows = model.independent_rows();
         let finite = self.factor.squared_sum().finite()
-            && self.factor.r().iter().chain(self.theta.iter()).all(|x| x.finite());
+            && all_finite(self.factor.r().as_slice())
+            && all_finite(self.theta.as_slice());
         if !finite {
             return Err(Termination::NotFinite);
         }
@@ -153,17 +154,8 @@ impl<T: Scalar, const P: usize> LevenbergMarquardt<T, P> {
 
     /// Largest cosine between the residual and a column of the Jacobian.
     fn orthogonality(&self) -> T {
-        let length = self.factor.squared_sum().root();
-        let mut worst = T::zero();
-        for (slope, norm) in self.factor.gradient().iter().zip(self.factor.column_norms().iter()) {
-            let size = if *slope < T::zero() { -*slope } else { *slope };
-            let reach = *norm * length;
-            if reach > T::zero() {
-                let cosine = size / reach;
-                worst = if cosine > worst { cosine } else { worst };
-            }
-        }
-        worst
+        let (slopes, norms) = (self.factor.gradient(), self.factor.column_norms());
+        largest_cosine(slopes.as_slice(), norms.as_slice(), self.factor.squared_sum().root())
     }
 
     fn try_step(&mut self, model: &impl Model<T, P>) -> Option<Termination> {
@@ -172,13 +164,14 @@ impl<T: Scalar, const P: usize> LevenbergMarquardt<T, P> {
         let Some(delta) = self.factor.damped_step(self.mu, &scale) else {
             return self.damp_more();
         };
-        let scaled = delta.component_mul(&scale);
-        let reach = self.theta.component_mul(&scale).norm_squared().root();
-        if scaled.norm_squared().root() <= self.settings.step * reach {
+        let squared_step = weighted_square(delta.as_slice(), scale.as_slice());
+        let reach = weighted_square(self.theta.as_slice(), scale.as_slice()).root();
+        if squared_step.root() <= self.settings.step * reach {
             return Some(Termination::Step);
         }
         let before = self.factor.squared_sum() * half;
-        let predicted = (scaled.norm_squared() * self.mu - delta.dot(&self.factor.gradient())) * half;
+        let slope = dot(delta.as_slice(), self.factor.gradient().as_slice());
+        let predicted = (squared_step * self.mu - slope) * half;
         if predicted <= T::EPSILON * before {
             return Some(Termination::Precision);
         }
@@ -218,6 +211,11 @@ impl<T: Scalar, const P: usize> LevenbergMarquardt<T, P> {
         &self.theta
     }
 
+    /// Steps tried so far; [`report`](Self::report) tells the rest, and works for it.
+    pub fn iterations(&self) -> u16 {
+        self.iterations
+    }
+
     /// The triangular factor of the rows at the last parameters that were differentiated: those of
     /// [`theta`](Self::theta) once the fit has stopped.
     pub fn factor(&self) -> &Triangular<T, P> {
@@ -240,7 +238,7 @@ impl<T: Scalar, const P: usize> LevenbergMarquardt<T, P> {
     /// Variance of a residual, from the cost and the degrees of freedom left; `None` without any.
     pub fn variance(&self) -> Option<T> {
         let freedom = self.independent_rows.checked_sub(P).filter(|n| *n > 0)?;
-        Some(self.factor.squared_sum() / T::of(freedom as f64))
+        Some(self.factor.squared_sum() / T::whole(freedom as u32))
     }
 
     /// Covariance of the parameters for residuals that are independent and of equal variance; `None` without
@@ -248,4 +246,24 @@ impl<T: Scalar, const P: usize> LevenbergMarquardt<T, P> {
     pub fn covariance(&self) -> Option<SMatrix<T, P, P>> {
         self.factor.covariance(self.variance()?)
     }
+}
+
+/// Largest of |slope| over norm and length; zero where they have none.
+#[inline(never)]
+fn largest_cosine<T: Scalar>(slopes: &[T], norms: &[T], length: T) -> T {
+    let mut worst = T::zero();
+    for (slope, norm) in slopes.iter().zip(norms) {
+        let size = if *slope < T::zero() { -*slope } else { *slope };
+        let reach = *norm * length;
+        if reach > T::zero() {
+            let cosine = size / reach;
+            worst = if cosine > worst { cosine } else { worst };
+        }
+    }
+    worst
+}
+
+#[inline(never)]
+fn all_finite<T: Scalar>(figures: &[T]) -> bool {
+    figures.iter().all(|x| x.finite())
 }

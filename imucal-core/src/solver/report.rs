@@ -1,9 +1,11 @@
 //! Why a solver stopped, and where.
 
+use serde::{Deserialize, Serialize};
+
 use crate::scalar::Scalar;
 
-/// Why a solver stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Why a solver stopped. The order of the variants is the messages' format: append only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Termination {
@@ -46,6 +48,7 @@ impl Termination {
 
 /// What a solver did and where it stopped.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SolveReport<T: Scalar> {
     /// Why it stopped.
     pub termination: Termination,

@@ -81,8 +81,8 @@ impl Variant {
         match self {
             Self::Constriction => (T::of(0.7298), T::of(1.49618)),
             Self::LinearInertia => {
-                let share = f64::from(done) / f64::from(all.saturating_sub(1).max(1));
-                (T::of(0.9 - 0.5 * share), T::of(2.0))
+                let share = T::whole(done.into()) / T::whole(all.saturating_sub(1).max(1).into());
+                (T::of(0.9) - share * T::of(0.5), T::of(2.0))
             }
         }
     }
@@ -109,6 +109,7 @@ impl<T: Scalar> Default for Settings<T> {
 
 /// What a swarm did so far.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SwarmReport<T: Scalar> {
     /// Why it stopped: [`Spread`](Termination::Spread), [`Iterations`](Termination::Iterations), or
     /// [`NotFinite`](Termination::NotFinite) where no particle of the first iteration had a finite cost. `None`
@@ -252,13 +253,14 @@ impl<T: Scalar, const N: usize, const P: usize, S> Swarm<T, N, P, S> {
         };
         self.state = None;
         self.evaluations = self.evaluations.saturating_add(1);
-        if value.finite() && value < particle.least {
-            particle.least = value;
-            particle.best = particle.position;
+        let Particle { position, best, least, .. } = particle;
+        if value.finite() && value < *least {
+            *least = value;
+            keep(best, position);
         }
         if value.finite() && value < self.least {
             self.least = value;
-            self.best = particle.position;
+            keep(&mut self.best, position);
         }
         self.turn += 1;
         if self.turn >= N {
@@ -368,9 +370,16 @@ impl<T: Scalar, const P: usize> Particle<T, P> {
     }
 }
 
+/// `best ← position`. Out of line: within one particle the compiler would call for a move, 1.6 KiB of code that nothing
+/// else on a device needs.
+#[inline(never)]
+fn keep<T: Scalar, const P: usize>(best: &mut SVector<T, P>, position: &SVector<T, P>) {
+    *best = *position;
+}
+
 /// A number in [0, 1), a multiple of 2⁻²⁴: the top 24 of 32 bits drawn, exact in `f32`, so that `f32` and `f64`
 /// draw alike.
 #[inline]
 pub fn uniform<T: Scalar>(rng: &mut impl Rng) -> T {
-    T::of(f64::from(rng.next_u32() >> 8)) * T::of(1.0 / 16_777_216.0)
+    T::whole(rng.next_u32() >> 8) * T::of(1.0 / 16_777_216.0)
 }

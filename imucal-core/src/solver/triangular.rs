@@ -27,25 +27,8 @@ impl<T: Scalar, const P: usize> Triangular<T, P> {
     /// Rotates one row into the factor.
     pub fn push(&mut self, residual: T, jacobian: &SVector<T, P>) {
         let mut row = *jacobian;
-        let mut rest = residual;
         self.squared_sum += residual * residual;
-        for k in 0..P {
-            let (Some(d), Some(x)) = (self.r.get((k, k)).copied(), row.get(k).copied()) else {
-                return;
-            };
-            let length = (d * d + x * x).root();
-            // Nothing to rotate, or both squares underflowed: below every rounding here.
-            if x == T::zero() || length == T::zero() {
-                continue;
-            }
-            let (cos, sin) = (d / length, x / length);
-            for (above, below) in self.r.row_mut(k).iter_mut().zip(row.iter_mut()).skip(k) {
-                (*above, *below) = (cos * *above + sin * *below, cos * *below - sin * *above);
-            }
-            if let Some(above) = self.q.get_mut(k) {
-                (*above, rest) = (cos * *above + sin * rest, cos * rest - sin * *above);
-            }
-        }
+        rotate_in(self.r.as_mut_slice(), self.q.as_mut_slice(), row.as_mut_slice(), residual);
     }
 
     /// Σ r² of the rows.
@@ -60,81 +43,186 @@ impl<T: Scalar, const P: usize> Triangular<T, P> {
 
     /// Jᵀr.
     pub fn gradient(&self) -> SVector<T, P> {
-        self.r.tr_mul(&self.q)
+        let mut gradient = SVector::<T, P>::zeros();
+        multiply_transposed(self.r.as_slice(), self.q.as_slice(), gradient.as_mut_slice());
+        gradient
     }
 
     /// Lengths of the Jacobian's columns.
     pub fn column_norms(&self) -> SVector<T, P> {
         let mut norms = SVector::<T, P>::zeros();
-        for (norm, column) in norms.iter_mut().zip(self.r.column_iter()) {
-            *norm = column.norm_squared().root();
-        }
+        column_lengths(self.r.as_slice(), norms.as_mut_slice());
         norms
+    }
+
+    /// |R x|: how far `x` moves the residual.
+    pub fn length_of(&self, x: &SVector<T, P>) -> T {
+        length_of_image(self.r.as_slice(), x.as_slice())
     }
 
     /// The δ that minimises `|J δ + r|² + μ Σ (d_k δ_k)²`; `None` where that is singular.
     pub fn damped_step(&self, mu: T, scale: &SVector<T, P>) -> Option<SVector<T, P>> {
-        let mut damped = *self;
-        let root = mu.root();
-        for (k, length) in scale.iter().enumerate() {
-            damped.push(T::zero(), &unit(k, root * *length));
-        }
-        back_substitute(&damped.r, &-damped.q)
+        let (mut r, mut q, mut row) = (self.r, self.q, SVector::<T, P>::zeros());
+        damp(r.as_mut_slice(), q.as_mut_slice(), row.as_mut_slice(), mu.root(), scale.as_slice());
+        back_substitute(&r, &-q)
     }
 
     /// R⁻¹; `None` where R is singular.
     pub fn inverse(&self) -> Option<SMatrix<T, P, P>> {
         let mut inverse = SMatrix::<T, P, P>::zeros();
-        for k in 0..P {
-            inverse.set_column(k, &back_substitute(&self.r, &unit(k, T::one()))?);
-        }
-        Some(inverse)
+        invert(self.r.as_slice(), inverse.as_mut_slice(), P).then_some(inverse)
     }
 
     /// `variance · (JᵀJ)⁻¹`, from R alone; `None` where it is singular.
+    #[inline(never)]
     pub fn covariance(&self, variance: T) -> Option<SMatrix<T, P, P>> {
         let inverse = self.inverse()?;
-        Some(inverse * inverse.transpose() * variance)
+        let mut covariance = SMatrix::<T, P, P>::zeros();
+        square(inverse.as_slice(), covariance.as_mut_slice(), P, variance);
+        Some(covariance)
     }
 }
 
-/// `size` in place `k`, zero elsewhere.
-fn unit<T: Scalar, const P: usize>(k: usize, size: T) -> SVector<T, P> {
-    let mut unit = SVector::<T, P>::zeros();
-    if let Some(entry) = unit.get_mut(k) {
-        *entry = size;
+// What follows works on slices, matrices by columns, and stands out of line: one body serves every number of
+// parameters, which halves the flash of a device with several fits.
+
+/// x · y.
+#[inline(never)]
+pub(crate) fn dot<T: Scalar>(x: &[T], y: &[T]) -> T {
+    x.iter().zip(y).fold(T::zero(), |sum, (a, b)| sum + *a * *b)
+}
+
+/// Σ (x_k w_k)².
+#[inline(never)]
+pub(crate) fn weighted_square<T: Scalar>(x: &[T], weights: &[T]) -> T {
+    x.iter().zip(weights).fold(T::zero(), |sum, (a, w)| {
+        let weighted = *a * *w;
+        sum + weighted * weighted
+    })
+}
+
+/// y = Rᵀ x.
+#[inline(never)]
+fn multiply_transposed<T: Scalar>(r: &[T], x: &[T], y: &mut [T]) {
+    for (column, slot) in r.chunks_exact(x.len().max(1)).zip(y) {
+        *slot = dot(column, x);
     }
-    unit
+}
+
+/// Lengths of the columns.
+#[inline(never)]
+fn column_lengths<T: Scalar>(r: &[T], lengths: &mut [T]) {
+    for (column, slot) in r.chunks_exact(lengths.len().max(1)).zip(lengths) {
+        *slot = dot(column, column).root();
+    }
+}
+
+/// |R x|.
+#[inline(never)]
+fn length_of_image<T: Scalar>(r: &[T], x: &[T]) -> T {
+    let size = x.len();
+    let rows = (0..size).map(|k| {
+        let row = r.iter().skip(k).step_by(size);
+        row.zip(x).fold(T::zero(), |sum, (a, b)| sum + *a * *b)
+    });
+    rows.fold(T::zero(), |sum, entry| sum + entry * entry).root()
+}
+
+/// Rotates in a row for each parameter, `root · scale_k` in its place.
+#[inline(never)]
+fn damp<T: Scalar>(r: &mut [T], q: &mut [T], row: &mut [T], root: T, scale: &[T]) {
+    for (k, length) in scale.iter().enumerate() {
+        row.fill(T::zero());
+        if let Some(entry) = row.get_mut(k) {
+            *entry = root * *length;
+        }
+        rotate_in(r, q, row, T::zero());
+    }
+}
+
+/// R⁻¹, column by column; false where R is singular.
+#[inline(never)]
+fn invert<T: Scalar>(r: &[T], inverse: &mut [T], size: usize) -> bool {
+    inverse.chunks_exact_mut(size.max(1)).enumerate().all(|(k, column)| {
+        column.fill(T::zero());
+        if let Some(entry) = column.get_mut(k) {
+            *entry = T::one();
+        }
+        substitute_back(r, column)
+    })
+}
+
+/// `factor · A Aᵀ`.
+#[inline(never)]
+fn square<T: Scalar>(a: &[T], out: &mut [T], size: usize, factor: T) {
+    for (j, column) in out.chunks_exact_mut(size.max(1)).enumerate() {
+        for (i, slot) in column.iter_mut().enumerate() {
+            let (left, right) = (a.iter().skip(i).step_by(size), a.iter().skip(j).step_by(size));
+            *slot = left.zip(right).fold(T::zero(), |sum, (x, y)| sum + *x * *y) * factor;
+        }
+    }
+}
+
+/// Rotates a row and its residual into a factor R, by columns, and q.
+///
+/// Over slices, out of line: one body serves every number of parameters.
+#[inline(never)]
+fn rotate_in<T: Scalar>(r: &mut [T], q: &mut [T], row: &mut [T], residual: T) {
+    let size = q.len();
+    let mut rest = residual;
+    for (k, q_k) in q.iter_mut().enumerate() {
+        // Row k of R from its diagonal on.
+        let above = r.iter_mut().skip(k * size + k).step_by(size);
+        let mut pairs = above.zip(row.iter_mut().skip(k));
+        let Some((d, x)) = pairs.next() else { return };
+        let length = (*d * *d + *x * *x).root();
+        // Nothing to rotate, or both squares underflowed: below every rounding here.
+        if *x == T::zero() || length == T::zero() {
+            continue;
+        }
+        let (cos, sin) = (*d / length, *x / length);
+        for (above, below) in core::iter::once((d, x)).chain(pairs) {
+            (*above, *below) = (cos * *above + sin * *below, cos * *below - sin * *above);
+        }
+        (*q_k, rest) = (cos * *q_k + sin * rest, cos * rest - sin * *q_k);
+    }
 }
 
 /// x with R x = y, R upper triangular; `None` where a pivot vanishes or the answer is not finite.
-pub(super) fn back_substitute<T: Scalar, const P: usize>(
+fn back_substitute<T: Scalar, const P: usize>(
     r: &SMatrix<T, P, P>,
     y: &SVector<T, P>,
 ) -> Option<SVector<T, P>> {
     let mut x = *y;
-    for k in (0..P).rev() {
-        let known: T = r.row(k).iter().zip(x.iter()).skip(k + 1).fold(T::zero(), |sum, (a, b)| sum + *a * *b);
-        let pivot = r.get((k, k)).copied().filter(|pivot| *pivot != T::zero())?;
-        let entry = x.get_mut(k)?;
-        *entry = (*entry - known) / pivot;
-    }
-    x.iter().all(|value| value.finite()).then_some(x)
+    substitute_back(r.as_slice(), x.as_mut_slice()).then_some(x)
 }
 
-/// x with Rᵀ x = y, R upper triangular; `None` as above.
-pub(super) fn solve_transposed<T: Scalar, const P: usize>(
-    r: &SMatrix<T, P, P>,
-    y: &SVector<T, P>,
-) -> Option<SVector<T, P>> {
-    let mut x = *y;
-    for k in 0..P {
-        let known: T = r.column(k).iter().zip(x.iter()).take(k).fold(T::zero(), |sum, (a, b)| sum + *a * *b);
-        let pivot = r.get((k, k)).copied().filter(|pivot| *pivot != T::zero())?;
-        let entry = x.get_mut(k)?;
+/// The same over slices, R by columns, in place; false where there is no answer.
+#[inline(never)]
+pub(super) fn substitute_back<T: Scalar>(r: &[T], x: &mut [T]) -> bool {
+    let size = x.len();
+    for k in (0..size).rev() {
+        let row = r.iter().skip(k).step_by(size);
+        let known: T = row.zip(x.iter()).skip(k + 1).fold(T::zero(), |sum, (a, b)| sum + *a * *b);
+        let pivot = r.get(k * size + k).copied().filter(|pivot| *pivot != T::zero());
+        let (Some(entry), Some(pivot)) = (x.get_mut(k), pivot) else { return false };
         *entry = (*entry - known) / pivot;
     }
-    x.iter().all(|value| value.finite()).then_some(x)
+    x.iter().all(|value| value.finite())
+}
+
+/// x with Rᵀ x = y, R upper triangular, in place; false as above.
+#[inline(never)]
+pub(super) fn substitute_transposed<T: Scalar>(r: &[T], x: &mut [T]) -> bool {
+    let size = x.len();
+    for k in 0..size {
+        let column = r.iter().skip(k * size);
+        let known: T = column.zip(x.iter()).take(k).fold(T::zero(), |sum, (a, b)| sum + *a * *b);
+        let pivot = r.get(k * size + k).copied().filter(|pivot| *pivot != T::zero());
+        let (Some(entry), Some(pivot)) = (x.get_mut(k), pivot) else { return false };
+        *entry = (*entry - known) / pivot;
+    }
+    x.iter().all(|value| value.finite())
 }
 
 impl<T: Scalar, const P: usize> RowSink<T, P> for Triangular<T, P> {

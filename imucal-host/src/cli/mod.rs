@@ -10,6 +10,7 @@ mod apply;
 mod blind;
 mod calibrate;
 mod demo;
+mod device;
 mod diagnose;
 mod import;
 mod inspect;
@@ -37,6 +38,8 @@ enum Command {
     Inspect(inspect::Arguments),
     /// Compare the core in f32 with a reference in f64, sample by sample and fit by fit.
     Verify(verify::Arguments),
+    /// Talk to a co-processor: identify, get and put its record, stream, calibrate on board.
+    Device(device::Arguments),
     /// Make a recording of another program's files.
     Import(import::Arguments),
     /// Record a simulated unit on a simulated flight motion simulator.
@@ -67,6 +70,7 @@ pub fn run() -> ExitCode {
         Command::Apply(arguments) => apply::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
+        Command::Device(arguments) => device::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),

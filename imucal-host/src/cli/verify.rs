@@ -3,12 +3,18 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use imucal_core::record::{self, CalibrationRecord};
 
-use super::{Ending, load, output::say, progress::Progress, read, refuse, warn};
+use super::{Ending, device::ending, load, output::say, progress::Progress, read, refuse, warn};
 use crate::{
     apply,
     calibrate::{AccModel, Options, calibrate, gyr_rig, ladder},
-    equivalence::{FitEquivalence, SampleEquivalence, fits, samples},
+    device::{Address, Session},
+    equivalence::{
+        FitEquivalence, SampleEquivalence,
+        board::{self, BoardSamples},
+        fits, samples,
+    },
     recording::{Recording, SensorKind},
     report::table::words,
     store::StoredCalibration,
@@ -21,6 +27,13 @@ pub(super) struct Arguments {
     /// The calibration: TOML or record
     #[arg(long, value_name = "CAL")]
     calibration: PathBuf,
+    /// Replay through a device as well, and compare bits: serial:PATH[@BAUD], tcp:HOST:PORT, qemu[:IMAGE] or
+    /// microbit[:IMAGE]. It stores the calibration's record
+    #[arg(long, value_name = "WHERE")]
+    device: Option<Address>,
+    /// File that keeps the flash of qemu from one start to the next
+    #[arg(long, value_name = "FILE")]
+    flash: Option<PathBuf>,
     /// Compare although the calibration was made for another serial
     #[arg(long)]
     force: bool,
@@ -51,9 +64,53 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     drop(progress);
     samples.iter().try_for_each(print_samples)?;
     fits.iter().try_for_each(print_fit)?;
-    let passed = samples.iter().all(SampleEquivalence::passes) && fits.iter().all(FitEquivalence::passes);
+    let alike = match &arguments.device {
+        None => true,
+        Some(address) => {
+            let session = Session::open(address, arguments.flash.as_deref());
+            match session
+                .map_err(Into::into)
+                .and_then(|mut session| replay(&mut session, &recording, &record))
+            {
+                Err(error) => return ending(Err(error)),
+                Ok(alike) => alike,
+            }
+        }
+    };
+    let passed =
+        alike && samples.iter().all(SampleEquivalence::passes) && fits.iter().all(FitEquivalence::passes);
     say!("{}", if passed { "equivalent" } else { "NOT equivalent" });
     Ok(if passed { Ending::Done } else { Ending::Refused })
+}
+
+/// Replays fits and samples through a device; whether every bit is the same.
+fn replay(session: &mut Session, recording: &Recording, record: &CalibrationRecord) -> anyhow::Result<bool> {
+    let options = Options { rig_acc: None, rig_gyr: None, rig_mag: None, ..Options::default() };
+    let fits = board::fits(session, &calibrate(recording, &options, &|_| {}))?;
+    let mut page = [0; record::MAX_LEN];
+    let bytes = record::encode(record, &mut page)?;
+    session.put_record(bytes, false)?;
+    let kept = session.record()?.as_deref() == Some(bytes);
+    let samples = board::samples(session, recording, record)?;
+    for fit in &fits {
+        say!("{}: fitted on the device: {}", words(fit.kind), bits(fit.equal));
+    }
+    say!("record of {} bytes, stored and read back: {}", bytes.len(), bits(kept));
+    for s in &samples {
+        say!(
+            "{}: {} samples corrected on the device: {}{}",
+            words(s.kind),
+            s.samples,
+            bits(s.passes()),
+            s.first
+                .map_or_else(String::new, |first| format!(": {} of them, the first is {first}", s.different))
+        );
+    }
+    Ok(kept && fits.iter().all(|fit| fit.equal) && samples.iter().all(BoardSamples::passes))
+}
+
+fn bits(equal: bool) -> &'static str {
+    if equal { "equal bit for bit" } else { "DIFFERENT" }
 }
 
 /// Fits again whatever the recording and the calibration share, by the models that the calibration names.

@@ -1,8 +1,10 @@
 //! Equivalence: what the device computes in `f32` against a floating-point reference in `f64`.
 //!
 //! Two questions, sensor by sensor: does the core correct samples alike, and does it fit the same parameters from
-//! the same observations? The reference shares no code with the core's models.
+//! the same observations? The reference shares no code with the core's models. [`board`] asks a third one of a real or
+//! emulated device: does it compute the bits that the core computes here?
 
+pub mod board;
 pub mod fits;
 mod known_attitudes;
 pub mod reference;

@@ -45,6 +45,11 @@ pub struct Triple {
 }
 
 impl Triple {
+    /// The samples in the file's unit and the device's precision: what the sensor put out.
+    pub fn raw_samples(&self) -> impl Iterator<Item = Vector3<f32>> {
+        self.values.iter().map(|value| value.map(|x| self.nominal.to_raw(x) as f32))
+    }
+
     /// Full scale on the SI side (m/s², rad/s, µT), positive.
     #[must_use]
     pub fn full_scale_si(&self) -> Option<f64> {

@@ -1,0 +1,58 @@
+//! What a board brings: four small traits, none of which waits.
+
+use embedded_storage::nor_flash::NorFlash;
+
+/// A line to the host, byte by byte.
+pub trait ByteLink {
+    /// The next byte that has come, if one has.
+    fn receive(&mut self) -> Option<u8>;
+
+    /// Takes a byte to send, unless there is no room now.
+    fn send(&mut self, byte: u8) -> bool;
+}
+
+/// Time.
+pub trait Clock {
+    /// Since the start, ms; comes round after 49 days.
+    fn uptime(&mut self) -> u32;
+}
+
+/// One sample of all the sensors, in the raw units of the record. `None` where there is no such sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// Accelerometer, gyroscope, magnetometer: the order of [`imucal_core::record::Sensor::ALL`].
+    pub raw: [Option<[f32; 3]>; 3],
+    /// °C; NaN where it is not known.
+    pub temperature: f32,
+}
+
+/// The sensors.
+pub trait SampleSource {
+    /// The next sample, if one has come.
+    fn sample(&mut self) -> Option<Sample>;
+}
+
+/// A board that brings samples only by its link.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoSensor;
+
+impl SampleSource for NoSensor {
+    fn sample(&mut self) -> Option<Sample> {
+        None
+    }
+}
+
+/// All that the co-processor needs of its board.
+#[derive(Debug)]
+pub struct Board<L: ByteLink, F: NorFlash, C: Clock, S: SampleSource> {
+    /// The line to the host.
+    pub link: L,
+    /// The region of flash for the record, all of it.
+    pub flash: F,
+    /// Time.
+    pub clock: C,
+    /// The sensors.
+    pub sensors: S,
+    /// Stack used at most so far, bytes, where the board looks.
+    pub stack: fn() -> Option<u32>,
+}

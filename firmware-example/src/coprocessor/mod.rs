@@ -1,0 +1,362 @@
+//! The co-processor: corrects samples, talks to its host, fits and stores, and never waits.
+//!
+//! ```text
+//! poll:  send what the link takes → answer what is due → take a frame → correct a sample → one slice of work
+//! ```
+//!
+//! A slice is one flash operation of [`crate::storage`] or one slice of [`crate::fitting`]. A request that takes many
+//! slices is answered when it is done; until then one that would need its result is [`Fault::Busy`], and samples are
+//! corrected, from the sensors and from the host alike. The rules of the link stand in [`imucal_core::link`].
+
+mod calibration;
+mod outgoing;
+mod requests;
+
+use embedded_storage::nor_flash::NorFlash;
+use imucal_core::{
+    link::{Fault, FrameError, Receiver, RecordState, Reply, Request, VERSION, split},
+    record::{Date, Sensor, SensorIdentity},
+};
+
+use crate::{
+    board::{Board, ByteLink, Clock, SampleSource},
+    fitting::{Finished, Fitting, Memory},
+    storage::{SLOT, Slots, Writing},
+};
+use calibration::Calibration;
+use outgoing::Outgoing;
+
+/// Bytes taken from the link in one turn, so that a flood of them leaves time for samples.
+const BYTES_A_TURN: usize = 64;
+
+/// What takes many slices, and the request it answers.
+#[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one, and no heap")]
+enum Job {
+    /// Before the first turn.
+    Booting,
+    None,
+    /// A record on its way into flash.
+    Storing(u32, Writing),
+    /// Slices of the fit that are left; `None`: to its end.
+    Stepping(u32, Option<u16>),
+    /// A fit that has stopped, and the day.
+    Judging(u32, Date),
+}
+
+/// An answer that waits until the link is free.
+#[derive(Clone, Copy, Debug)]
+enum Due {
+    Stored(u32),
+    Progress,
+    Report,
+    Fault(Fault),
+}
+
+/// A stream of corrected samples.
+#[derive(Clone, Copy, Debug)]
+struct Stream {
+    id: u32,
+    every: u16,
+    /// Samples until the next that is sent.
+    left: u16,
+}
+
+/// The co-processor on its board. The sizes are those of [`Memory`].
+#[derive(Debug)]
+pub struct Coprocessor<
+    'a,
+    L: ByteLink,
+    F: NorFlash,
+    C: Clock,
+    S: SampleSource,
+    const POINTS: usize,
+    const POSES: usize,
+    const TURNS: usize,
+    const BLOCKS: usize,
+    const PARTICLES: usize,
+> {
+    link: L,
+    receiver: Receiver,
+    /// Apart from the receiver, whose bytes a request borrows.
+    device: Device<'a, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
+}
+
+/// All but the way in.
+#[derive(Debug)]
+struct Device<
+    'a,
+    F: NorFlash,
+    C: Clock,
+    S: SampleSource,
+    const POINTS: usize,
+    const POSES: usize,
+    const TURNS: usize,
+    const BLOCKS: usize,
+    const PARTICLES: usize,
+> {
+    clock: C,
+    sensors: S,
+    stack: fn() -> Option<u32>,
+    /// `None` where the flash cannot be used.
+    slots: Option<Slots<F>>,
+    outgoing: Outgoing,
+    calibration: Calibration,
+    fitting: Fitting<'a, POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
+    job: Job,
+    due: Option<(u32, Due)>,
+    /// The last fit that was judged.
+    finished: Option<Finished>,
+    stream: Option<Stream>,
+    /// The last id taken.
+    last: u32,
+    refused: u32,
+    corrected: u32,
+    number: u32,
+}
+
+impl<
+    'a,
+    L: ByteLink,
+    F: NorFlash,
+    C: Clock,
+    S: SampleSource,
+    const POINTS: usize,
+    const POSES: usize,
+    const TURNS: usize,
+    const BLOCKS: usize,
+    const PARTICLES: usize,
+> Coprocessor<'a, L, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES>
+{
+    /// Looks for the record in the flash; the first turn reads it.
+    pub fn new(
+        board: Board<L, F, C, S>,
+        unit: SensorIdentity,
+        memory: &'a mut Memory<POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
+    ) -> Self {
+        let Board { link, flash, clock, sensors, stack } = board;
+        let slots = Slots::open(flash).ok();
+        let calibration = Calibration::new(unit);
+        let device = Device {
+            clock,
+            sensors,
+            stack,
+            slots,
+            outgoing: Outgoing::new(),
+            calibration,
+            fitting: Fitting::new(memory),
+            job: Job::Booting,
+            due: None,
+            finished: None,
+            stream: None,
+            last: 0,
+            refused: 0,
+            corrected: 0,
+            number: 0,
+        };
+        Self { link, receiver: Receiver::default(), device }
+    }
+
+    /// One turn; to be called over and over. True where there was something to do.
+    pub fn poll(&mut self) -> bool {
+        if matches!(self.device.job, Job::Booting) {
+            self.device.boot();
+        }
+        self.device.outgoing.flush(&mut self.link);
+        let mut busy = !self.device.outgoing.is_free();
+        busy |= self.device.answer_due();
+        busy |= self.listen();
+        busy |= self.device.take_sample();
+        busy | self.device.work()
+    }
+
+    /// Takes bytes up to the end of a frame, while there is room for its answer.
+    fn listen(&mut self) -> bool {
+        for count in 0..BYTES_A_TURN {
+            if !self.device.outgoing.is_free() {
+                return true;
+            }
+            let Some(byte) = self.link.receive() else { return count > 0 };
+            if let Some(frame) = self.receiver.push(byte) {
+                self.device.receive(frame);
+            }
+        }
+        true
+    }
+
+    /// The board's link and flash, after all is done; no flash where it could not be used.
+    pub fn into_parts(self) -> (L, Option<F>) {
+        (self.link, self.device.slots.map(Slots::close))
+    }
+}
+
+impl<
+    F: NorFlash,
+    C: Clock,
+    S: SampleSource,
+    const POINTS: usize,
+    const POSES: usize,
+    const TURNS: usize,
+    const BLOCKS: usize,
+    const PARTICLES: usize,
+> Device<'_, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES>
+{
+    /// Uses what the flash holds.
+    #[inline(never)]
+    fn boot(&mut self) {
+        let mut buffer = [0; SLOT];
+        let bytes = self.slots.as_mut().and_then(|slots| slots.read(&mut buffer).ok()).unwrap_or_default();
+        if !bytes.is_empty() {
+            self.calibration.state = self.calibration.load(bytes);
+        }
+        self.job = Job::None;
+    }
+
+    /// Sends an answer that has waited for the link.
+    #[inline(never)]
+    fn answer_due(&mut self) -> bool {
+        if !self.outgoing.is_free() {
+            return false;
+        }
+        let Some((id, due)) = self.due.take() else { return false };
+        let reply = match due {
+            Due::Stored(sequence) => Reply::Stored { sequence },
+            Due::Progress => self.progress(),
+            Due::Fault(fault) => Reply::Fault(fault),
+            Due::Report => return self.answer_report(id),
+        };
+        self.outgoing.send(id, &reply);
+        true
+    }
+
+    #[inline(never)]
+    fn answer_report(&mut self, id: u32) -> bool {
+        let report = self.finished.take().map(|finished| Reply::Report(finished.report));
+        self.outgoing.send(id, &report.unwrap_or(Reply::Fault(Fault::NotReady)));
+        true
+    }
+
+    #[inline(never)]
+    fn judge(&mut self, id: u32, date: Date) {
+        self.finished = self.fitting.finish().ok();
+        if let Some((sensor, triad)) = self.finished.as_ref().and_then(|finished| finished.accepted.as_ref())
+        {
+            self.calibration.adopt(*sensor, triad, date);
+        }
+        self.end(id, Due::Report);
+    }
+
+    /// Apart from who waits for bytes: a request takes its memory only while it is worked at.
+    #[inline(never)]
+    fn receive(&mut self, frame: Result<&[u8], FrameError>) {
+        match frame.and_then(split) {
+            Ok((header, message)) => match header.read::<Request<'_>>(message) {
+                Ok(request) => self.take(header.id, request),
+                Err(error) => self.refuse(header.id, of_frame(error)),
+            },
+            Err(error) => self.refuse(0, of_frame(error)),
+        }
+    }
+
+    /// Ids rise; only who asks for the next one may use any.
+    fn take(&mut self, id: u32, request: Request<'_>) {
+        if id == 0 {
+            return self.refuse(0, Fault::Malformed);
+        }
+        if !matches!(request, Request::Identify) {
+            if id <= self.last {
+                return self.refuse(id, Fault::Stale { last: self.last });
+            }
+            self.last = id;
+        }
+        self.handle(id, request);
+    }
+
+    fn refuse(&mut self, id: u32, fault: Fault) {
+        self.refused = self.refused.saturating_add(1);
+        self.outgoing.send(id, &Reply::Fault(fault));
+    }
+
+    /// Corrects a sample of the board's own sensors.
+    #[inline(never)]
+    fn take_sample(&mut self) -> bool {
+        let Some(sample) = self.sensors.sample() else { return false };
+        self.number = self.number.wrapping_add(1);
+        let mut values = [None; 3];
+        for ((value, sensor), raw) in values.iter_mut().zip(Sensor::ALL).zip(sample.raw) {
+            *value = raw.and_then(|raw| self.calibration.correct(sensor, raw, sample.temperature));
+        }
+        self.corrected = self.corrected.saturating_add(1);
+        let number = self.number;
+        if let Some(stream) = &mut self.stream {
+            stream.left = stream.left.saturating_sub(1);
+            // A stream never waits: what the link does not take is left out, and the number tells.
+            if stream.left == 0 {
+                stream.left = stream.every;
+                if self.outgoing.is_free() {
+                    self.outgoing.send(stream.id, &Reply::Sample { number, values });
+                }
+            }
+        }
+        true
+    }
+
+    /// One slice of what takes many.
+    #[inline(never)]
+    fn work(&mut self) -> bool {
+        match &mut self.job {
+            Job::Booting | Job::None => return false,
+            Job::Storing(id, writing) => {
+                let id = *id;
+                let done = match &mut self.slots {
+                    Some(slots) => slots.step(writing),
+                    None => return false,
+                };
+                match done {
+                    Ok(None) => {}
+                    Ok(Some(sequence)) => self.stored(id, sequence),
+                    Err(_) => self.end(id, Due::Fault(Fault::Flash)),
+                }
+            }
+            Job::Stepping(id, left) => {
+                let id = *id;
+                let stopped = self.fitting.step();
+                if let Some(left) = left {
+                    *left = left.saturating_sub(1);
+                }
+                if stopped || *left == Some(0) {
+                    self.end(id, Due::Progress);
+                }
+            }
+            Job::Judging(id, date) => {
+                let (id, date) = (*id, *date);
+                self.judge(id, date);
+            }
+        }
+        true
+    }
+
+    fn end(&mut self, id: u32, due: Due) {
+        self.job = Job::None;
+        self.due = Some((id, due));
+    }
+
+    /// A record is whole in flash: it is in use from now on.
+    #[inline(never)]
+    fn stored(&mut self, id: u32, sequence: u32) {
+        let mut buffer = [0; SLOT];
+        let bytes = self.slots.as_mut().and_then(|slots| slots.read(&mut buffer).ok());
+        self.calibration.state = bytes.map_or(RecordState::Unusable, |bytes| self.calibration.load(bytes));
+        self.calibration.unsaved = false;
+        self.end(id, Due::Stored(sequence));
+    }
+}
+
+fn of_frame(error: FrameError) -> Fault {
+    match error {
+        FrameError::Oversized => Fault::Oversized,
+        FrameError::Damaged => Fault::Damaged,
+        FrameError::Version { .. } => Fault::Version { supported: VERSION },
+        FrameError::Malformed => Fault::Malformed,
+    }
+}

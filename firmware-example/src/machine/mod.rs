@@ -1,0 +1,113 @@
+//! The emulated boards: their UART, their flash and their clock, behind the traits of [`crate::board`].
+//!
+//! | machine | core | UART | record's flash |
+//! | --- | --- | --- | --- |
+//! | `mps2-an386` | Cortex-M4F | CMSDK (Arm DDI 0479) | a window of the board's PSRAM under NOR rules, that a file backs |
+//! | `microbit` | Cortex-M0, soft float | nRF51 | the nRF51's own, by its NVMC; lost when QEMU ends |
+#![allow(unsafe_code)] // Registers, and memory that no variable owns.
+
+use core::{mem::MaybeUninit, num::NonZeroU32};
+
+#[cfg(microbit)]
+mod microbit;
+#[cfg(mps2)]
+mod mps2;
+mod stopwatch;
+mod ticks;
+
+#[cfg(microbit)]
+pub use microbit::{Flash, Uart, idle};
+#[cfg(mps2)]
+pub use mps2::{Flash, Uart, idle};
+pub use stopwatch::Stopwatch;
+pub use ticks::Ticks;
+
+use crate::{
+    board::{Board, NoSensor},
+    coprocessor::Coprocessor,
+    fitting::Memory,
+};
+
+/// The fits that there is memory for.
+#[cfg(mps2)]
+pub type MachineMemory = Memory<256, 64, 48, 2048, 40>;
+/// The fits that there is memory for.
+#[cfg(microbit)]
+pub type MachineMemory = Memory<40, 12, 8, 48, 3>;
+
+/// The core's clock, kHz.
+#[cfg(mps2)]
+const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(25_000).unwrap();
+/// See above.
+#[cfg(microbit)]
+const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(64_000).unwrap();
+
+/// The co-processor on this machine.
+#[cfg(mps2)]
+type Whole = Coprocessor<'static, Uart, Flash, Ticks, NoSensor, 256, 64, 48, 2048, 40>;
+/// See above.
+#[cfg(microbit)]
+type Whole = Coprocessor<'static, Uart, Flash, Ticks, NoSensor, 40, 12, 8, 48, 3>;
+
+/// Runs the co-processor on this machine, for ever.
+pub fn run(name: &str, serial: &str) -> ! {
+    let coprocessor = start(name, serial);
+    loop {
+        if !coprocessor.poll() {
+            idle();
+        }
+    }
+}
+
+/// Puts the co-processor where it stays: on the stack it would lie below all that follows.
+#[inline(never)]
+fn start(name: &str, serial: &str) -> &'static mut Whole {
+    static mut MEMORY: MachineMemory = MachineMemory::new();
+    static mut WHOLE: MaybeUninit<Whole> = MaybeUninit::uninit();
+    // SAFETY: `run` is called once, and nothing else knows the variables.
+    let (memory, whole) = unsafe { (&mut *(&raw mut MEMORY), &mut *(&raw mut WHOLE)) };
+    let unit = imucal_core::record::SensorIdentity {
+        name: name.parse().unwrap_or_default(),
+        serial: serial.parse().unwrap_or_default(),
+    };
+    let board = Board {
+        link: Uart::start(),
+        flash: Flash::new(),
+        clock: Ticks::start(PER_MILLISECOND),
+        sensors: NoSensor,
+        stack: || u32::try_from(crate::stack::deepest().0).ok(),
+    };
+    whole.write(Coprocessor::new(board, unit, memory))
+}
+
+/// A register.
+#[derive(Clone, Copy, Debug)]
+struct Register(usize);
+
+impl Register {
+    fn read(self) -> u32 {
+        // SAFETY: addresses are those of the machine's registers, which are read without harm.
+        unsafe { (self.0 as *const u32).read_volatile() }
+    }
+
+    fn write(self, value: u32) {
+        // SAFETY: as above; what is written there is no memory of Rust's.
+        unsafe { (self.0 as *mut u32).write_volatile(value) }
+    }
+}
+
+/// Interrupts stay masked: one that is pending ends the wait, and is cleared by hand.
+const ENABLE: Register = Register(0xE000_E100);
+const CLEAR_PENDING: Register = Register(0xE000_E280);
+
+/// Lets an interrupt line end [`wait`].
+fn wake_by(line: u32) {
+    cortex_m::interrupt::disable();
+    ENABLE.write(1 << line);
+}
+
+/// Waits for an interrupt of that line; not at all, if one is pending.
+fn wait(line: u32) {
+    cortex_m::asm::wfi();
+    CLEAR_PENDING.write(1 << line);
+}

@@ -1,0 +1,113 @@
+//! mps2-an386: CMSDK UART 0, and flash in the board's PSRAM.
+
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
+};
+
+use super::{Register, wait, wake_by};
+use crate::board::ByteLink;
+
+const DATA: Register = Register(0x4000_4000);
+const STATE: Register = Register(0x4000_4004);
+const CONTROL: Register = Register(0x4000_4008);
+const CLEAR: Register = Register(0x4000_400C);
+const DIVISOR: Register = Register(0x4000_4010);
+/// Interrupt of a byte that has come.
+const RECEIVED: u32 = 0;
+
+/// The UART.
+#[derive(Debug)]
+pub struct Uart(());
+
+impl Uart {
+    /// Switches it on, at 115 200 baud.
+    pub fn start() -> Self {
+        // QEMU sends nothing while the divisor is below 16.
+        DIVISOR.write(25_000_000 / 115_200);
+        // Both directions, and an interrupt where a byte comes.
+        CONTROL.write(0b1011);
+        wake_by(RECEIVED);
+        Self(())
+    }
+}
+
+impl ByteLink for Uart {
+    fn receive(&mut self) -> Option<u8> {
+        (STATE.read() & 0b10 != 0).then(|| DATA.read() as u8)
+    }
+
+    fn send(&mut self, byte: u8) -> bool {
+        let free = STATE.read() & 0b01 == 0;
+        if free {
+            DATA.write(byte.into());
+        }
+        free
+    }
+}
+
+/// Waits for a byte.
+pub fn idle() {
+    wait(RECEIVED);
+    CLEAR.write(0b10);
+}
+
+/// Start of the PSRAM, which QEMU lets a file back.
+const WINDOW: u32 = 0x2100_0000;
+/// Bytes of it that are the record's.
+const CAPACITY: usize = 4 * PAGE;
+const PAGE: usize = 4096;
+const WORD: usize = 4;
+
+/// Flash: memory of which bits are only cleared, and pages are set.
+#[derive(Debug)]
+pub struct Flash(());
+
+impl Flash {
+    pub(super) fn new() -> Self {
+        Self(())
+    }
+
+    fn word(offset: u32) -> Register {
+        Register((WINDOW + offset) as usize)
+    }
+}
+
+impl ErrorType for Flash {
+    type Error = NorFlashErrorKind;
+}
+
+impl ReadNorFlash for Flash {
+    const READ_SIZE: usize = WORD;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        check_read(self, offset, bytes.len())?;
+        for (word, at) in bytes.chunks_exact_mut(WORD).zip((offset..).step_by(WORD)) {
+            word.copy_from_slice(&Self::word(at).read().to_le_bytes());
+        }
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        CAPACITY
+    }
+}
+
+impl NorFlash for Flash {
+    const WRITE_SIZE: usize = WORD;
+    const ERASE_SIZE: usize = PAGE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        check_erase(self, from, to)?;
+        (from..to).step_by(WORD).for_each(|at| Self::word(at).write(u32::MAX));
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        check_write(self, offset, bytes.len())?;
+        for (word, at) in bytes.as_chunks::<WORD>().0.iter().zip((offset..).step_by(WORD)) {
+            let place = Self::word(at);
+            place.write(place.read() & u32::from_le_bytes(*word));
+        }
+        Ok(())
+    }
+}

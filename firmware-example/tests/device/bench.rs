@@ -1,0 +1,145 @@
+//! A co-processor on the bench: its link and flash are in our hands.
+
+use std::{cell::RefCell, collections::VecDeque, rc::Rc};
+
+use firmware_example::{
+    board::{Board, ByteLink, Clock, Sample, SampleSource},
+    coprocessor::Coprocessor,
+    fitting::Memory,
+};
+use imucal_core::{
+    link::{MAX_FRAME, Receiver, Reply, Request, encode, split},
+    record::SensorIdentity,
+};
+
+use crate::nor::Nor;
+
+/// Bytes on their way, both ways.
+#[derive(Clone, Debug, Default)]
+pub struct Wire {
+    pub to_device: Rc<RefCell<VecDeque<u8>>>,
+    pub to_host: Rc<RefCell<VecDeque<u8>>>,
+}
+
+impl ByteLink for Wire {
+    fn receive(&mut self) -> Option<u8> {
+        self.to_device.borrow_mut().pop_front()
+    }
+
+    fn send(&mut self, byte: u8) -> bool {
+        self.to_host.borrow_mut().push_back(byte);
+        true
+    }
+}
+
+/// Milliseconds that pass when asked for.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ticks(u32);
+
+impl Clock for Ticks {
+    fn uptime(&mut self) -> u32 {
+        self.0 += 1;
+        self.0
+    }
+}
+
+/// Sensors that count.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Counting {
+    pub count: f32,
+    /// They put samples out.
+    pub on: bool,
+}
+
+impl SampleSource for Counting {
+    fn sample(&mut self) -> Option<Sample> {
+        self.count += 1.0;
+        let raw = [Some([self.count; 3]), Some([self.count; 3]), None];
+        self.on.then_some(Sample { raw, temperature: 25.0 })
+    }
+}
+
+/// The sizes of the bench's fits.
+pub type BenchMemory = Memory<256, 64, 48, 512, 10>;
+type Device<'a> = Coprocessor<'a, Wire, Nor, Ticks, Counting, 256, 64, 48, 512, 10>;
+
+/// Serial of the record that the images carry.
+pub const SERIAL: &str = "00300017";
+
+pub fn unit(serial: &str) -> SensorIdentity {
+    SensorIdentity { name: "bench".parse().expect("short"), serial: serial.parse().expect("short") }
+}
+
+pub struct Bench<'a> {
+    pub device: Device<'a>,
+    pub wire: Wire,
+    receiver: Receiver,
+    next: u32,
+}
+
+impl<'a> Bench<'a> {
+    pub fn new(nor: Nor, serial: &str, sensors: Counting, memory: &'a mut BenchMemory) -> Self {
+        let wire = Wire::default();
+        let board =
+            Board { link: wire.clone(), flash: nor, clock: Ticks::default(), sensors, stack: || None };
+        let device = Coprocessor::new(board, unit(serial), memory);
+        Self { device, wire, receiver: Receiver::default(), next: 1 }
+    }
+
+    /// Takes the power away.
+    pub fn off(self) -> Nor {
+        self.device.into_parts().1.expect("the flash serves")
+    }
+
+    /// Sends under the next id, which it gives.
+    pub fn send(&mut self, request: &Request<'_>) -> u32 {
+        let id = self.next;
+        self.next += 1;
+        self.send_as(id, request);
+        id
+    }
+
+    pub fn send_as(&mut self, id: u32, request: &Request<'_>) {
+        let mut buffer = [0; MAX_FRAME];
+        let frame = encode(id, request, &mut buffer).expect("a request fits").to_vec();
+        self.wire.to_device.borrow_mut().extend(frame);
+    }
+
+    /// Polls until the device has nothing to do; the replies that came, each with its id.
+    pub fn replies<R>(&mut self, mut each: impl FnMut(u32, &Reply<'_>) -> R) -> Vec<R> {
+        let mut turns = 0;
+        let mut replies = Vec::new();
+        let mut busy = true;
+        while busy {
+            busy = self.device.poll();
+            turns += 1;
+            assert!(turns < 1_000_000, "the device hangs");
+            let bytes: Vec<u8> = self.wire.to_host.borrow_mut().drain(..).collect();
+            for byte in bytes {
+                if let Some(frame) = self.receiver.push(byte) {
+                    let (header, message) = split(frame.expect("intact")).expect("intact");
+                    let reply = header.read::<Reply<'_>>(message).expect("a reply");
+                    replies.push(each(header.id, &reply));
+                }
+            }
+        }
+        replies
+    }
+
+    /// Asks, and gives the one answer.
+    pub fn ask<R>(&mut self, request: &Request<'_>, mut each: impl FnMut(&Reply<'_>) -> R) -> R {
+        let id = self.send(request);
+        let mut replies = self.replies(|got, reply| {
+            assert_eq!(got, id, "{reply:?}");
+            each(reply)
+        });
+        assert_eq!(replies.len(), 1);
+        replies.remove(0)
+    }
+
+    /// Asks under an id of one's own.
+    pub fn ask_from<R>(&mut self, id: u32, request: &Request<'_>, each: impl FnMut(&Reply<'_>) -> R) -> R {
+        self.next = id;
+        self.ask(request, each)
+    }
+}

@@ -1,0 +1,246 @@
+//! What a host may do with a co-processor, in peace.
+
+use firmware_example::{RECORD, drill, scene::Noise};
+use imucal_core::{
+    corrector::Corrector,
+    link::{BATCH, Fault, FitModel, Observation, RecordState, Reply, Request, Values},
+    model::{norm::NormModel, parameterisation::UPPER_TRIANGULAR},
+    observation::ShellPoint,
+    record::{self, Date, Sensor},
+    solver::LevenbergMarquardt,
+    triad::Triad,
+};
+use nalgebra::Vector3;
+
+use crate::{
+    bench::{Bench, BenchMemory, Counting, SERIAL},
+    nor::Nor,
+};
+
+fn put(record: &[u8]) -> Request<'_> {
+    Request::PutRecord { record, replace: false }
+}
+
+fn fault(reply: &Reply<'_>) -> Option<Fault> {
+    match reply {
+        Reply::Fault(fault) => Some(*fault),
+        _ => None,
+    }
+}
+
+fn state(bench: &mut Bench<'_>) -> RecordState {
+    bench.ask(&Request::Status, |reply| match reply {
+        Reply::Status(status) => status.record,
+        other => panic!("{other:?}"),
+    })
+}
+
+/// The record that the images carry, with its header or its serial changed and the checksum made anew.
+fn altered(change: impl Fn(&mut Vec<u8>)) -> Vec<u8> {
+    let mut bytes = RECORD.to_vec();
+    change(&mut bytes);
+    let end = bytes.len() - 4;
+    let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&bytes[..end]);
+    bytes[end..].copy_from_slice(&checksum.to_le_bytes());
+    bytes
+}
+
+fn newer() -> Vec<u8> {
+    altered(|bytes| bytes[4] += 1)
+}
+
+fn of_another() -> Vec<u8> {
+    altered(|bytes| {
+        let at = bytes.windows(8).position(|window| window == SERIAL.as_bytes()).expect("its serial");
+        bytes[at + 7] = b'8';
+    })
+}
+
+#[test]
+fn a_record_is_stored_used_given_back_and_there_after_a_power_cycle() {
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    assert_eq!(state(&mut bench), RecordState::Empty);
+    let raw = Values::from_slice(&[[33_000.0, 32_000.0, 31_000.0]]).expect("room");
+    let correct = Request::Correct { sensor: Sensor::Accelerometer, temperature: 31.0, raw: raw.clone() };
+    assert_eq!(bench.ask(&correct, fault), Some(Fault::NoRecord));
+    assert_eq!(bench.ask(&put(RECORD), |reply| format!("{reply:?}")), "Stored { sequence: 1 }");
+    let nor = bench.off();
+
+    let mut bench = Bench::new(nor, SERIAL, Counting::default(), &mut memory);
+    assert_eq!(state(&mut bench), RecordState::InUse);
+    assert!(
+        bench.ask(&Request::GetRecord, |reply| matches!(reply, Reply::Record(bytes) if *bytes == RECORD))
+    );
+    let record = record::decode(RECORD).expect("it is golden");
+    let corrector = Corrector::<f32>::from(record.acc.as_ref().expect("it has one"));
+    let expected =
+        Values::from_slice(&[corrector.apply_at(&Vector3::from(raw[0]), 31.0).into()]).expect("room");
+    assert!(bench.ask(&correct, |reply| *reply == Reply::Corrected(expected.clone())));
+}
+
+#[test]
+fn a_record_of_another_sensor_a_newer_format_or_with_damage_is_refused_and_changes_nothing() {
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    assert_eq!(bench.ask(&put(RECORD), fault), None);
+    assert_eq!(bench.ask(&put(&of_another()), fault), Some(Fault::OtherSensor));
+    assert_eq!(bench.ask(&put(&newer()), fault), Some(Fault::NewerFormat));
+    let mut damaged = RECORD.to_vec();
+    damaged[40] ^= 4;
+    assert_eq!(bench.ask(&put(&damaged), fault), Some(Fault::BadRecord));
+    assert_eq!(state(&mut bench), RecordState::InUse);
+    assert!(
+        bench.ask(&Request::GetRecord, |reply| matches!(reply, Reply::Record(bytes) if *bytes == RECORD))
+    );
+}
+
+#[test]
+fn a_stored_record_of_another_sensor_is_kept_unused_until_it_is_to_be_replaced() {
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), "00300018", Counting::default(), &mut memory);
+    assert_eq!(bench.ask(&put(&of_another()), fault), None);
+    let nor = bench.off();
+    // The flash has moved to another board.
+    let mut bench = Bench::new(nor, SERIAL, Counting::default(), &mut memory);
+    assert_eq!(state(&mut bench), RecordState::OtherSensor);
+    assert_eq!(bench.ask(&put(RECORD), fault), Some(Fault::Occupied));
+    let kept = of_another();
+    assert!(bench.ask(&Request::GetRecord, |reply| matches!(reply, Reply::Record(bytes) if *bytes == kept)));
+    assert_eq!(bench.ask(&Request::PutRecord { record: RECORD, replace: true }, fault), None);
+    assert_eq!(state(&mut bench), RecordState::InUse);
+}
+
+#[test]
+fn a_request_that_comes_again_or_late_is_told_the_last_id_and_who_asks_the_next() {
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    bench.send_as(7, &Request::Status);
+    bench.send_as(7, &Request::Status);
+    bench.send_as(3, &Request::Status);
+    bench.send_as(0, &Request::Status);
+    bench.send_as(2, &Request::Identify);
+    let replies = bench.replies(|id, reply| match reply {
+        Reply::Identity(identity) => (id, format!("next {}", identity.next_id)),
+        Reply::Status(_) => (id, "status".into()),
+        other => (id, format!("{other:?}")),
+    });
+    let stale = "Fault(Stale { last: 7 })".to_owned();
+    let expected = [
+        (7, "status".into()),
+        (7, stale.clone()),
+        (3, stale),
+        (0, "Fault(Malformed)".into()),
+        (2, "next 8".into()),
+    ];
+    assert_eq!(replies, expected);
+}
+
+fn rests(count: usize) -> Vec<ShellPoint<f32>> {
+    let mut points = Vec::new();
+    drill::observe(FitModel::T9, count, &mut Noise(1), |observation| match observation {
+        Observation::Point(value, _) => points.push(ShellPoint::new(Vector3::from(value))),
+        other => panic!("{other:?}"),
+    });
+    points
+}
+
+fn feed(bench: &mut Bench<'_>, points: &[ShellPoint<f32>]) {
+    let observations: Vec<_> =
+        points.iter().map(|point| Observation::Point(point.value.into(), point.excess)).collect();
+    for (index, batch) in observations.chunks(BATCH).enumerate() {
+        let observations = heapless::Vec::from_slice(batch).expect("a batch");
+        let index = (index * BATCH) as u16;
+        assert_eq!(bench.ask(&Request::Feed { index, observations: observations.clone() }, fault), None);
+        // Sent again, as after a lost answer.
+        let expected = index + batch.len() as u16;
+        let again = bench.ask(&Request::Feed { index, observations }, fault);
+        assert_eq!(again, Some(Fault::OutOfSequence { expected }));
+    }
+}
+
+#[test]
+fn a_fit_on_board_is_the_core_s_and_samples_are_corrected_meanwhile() {
+    let mut memory = BenchMemory::new();
+    let points = rests(40);
+    let mut alone = LevenbergMarquardt::new(UPPER_TRIANGULAR.theta(&Triad::identity()), Default::default());
+    alone.run(&NormModel { points: &points, norm: 9.80665, form: UPPER_TRIANGULAR });
+
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    assert_eq!(bench.ask(&put(RECORD), fault), None);
+    assert_eq!(bench.ask(&Request::StartFit(drill::task(FitModel::T9)), fault), None);
+    feed(&mut bench, &points);
+    assert_eq!(bench.ask(&Request::FinishFit { date: Date::from_days(1) }, fault), Some(Fault::NotReady));
+    let step = bench.send(&Request::StepFit { slices: u16::MAX });
+    let busy = bench.send(&Request::Store { replace: false });
+    let raw = Values::from_slice(&[[1.0; 3]]).expect("room");
+    let corrected = bench.send(&Request::Correct { sensor: Sensor::Accelerometer, temperature: 20.0, raw });
+    let order = bench.replies(|id, reply| (id, fault(reply)));
+    assert_eq!(order, [(busy, Some(Fault::Busy)), (corrected, None), (step, None)]);
+
+    let report = bench.ask(&Request::FinishFit { date: Date::from_days(20_000) }, |reply| match reply {
+        Reply::Report(report) => report.clone(),
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(report.refusal, None);
+    assert_eq!(&report.theta[..], alone.theta().as_slice());
+    let covariance = alone.covariance().expect("redundant");
+    let upper: Vec<f32> =
+        (0..9).flat_map(|k| covariance.column(k).iter().take(k + 1).copied().collect::<Vec<_>>()).collect();
+    assert_eq!(&report.covariance[..], &upper[..]);
+
+    // In use at once, in flash when asked for, beside what else the record before held.
+    assert_eq!(bench.ask(&Request::Store { replace: false }, fault), None);
+    let stored = bench.ask(&Request::GetRecord, |reply| match reply {
+        Reply::Record(bytes) => record::decode(bytes).expect("a record"),
+        other => panic!("{other:?}"),
+    });
+    assert_eq!((stored.sensor.serial.as_str(), stored.date), (SERIAL, Date::from_days(20_000)));
+    assert_eq!(stored.mag, record::decode(RECORD).expect("golden").mag);
+    let acc = stored.acc.expect("fitted");
+    assert_eq!(acc.triad::<f32>(), UPPER_TRIANGULAR.triad(alone.theta()));
+    assert_eq!((acc.model.as_str(), acc.quality.observations), ("T9", 40));
+}
+
+#[test]
+fn too_few_rests_are_refused_on_board_and_the_calibration_stays() {
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    assert_eq!(bench.ask(&put(RECORD), fault), None);
+    assert_eq!(bench.ask(&Request::StartFit(drill::task(FitModel::T9)), fault), None);
+    feed(&mut bench, &rests(9));
+    assert_eq!(bench.ask(&Request::StepFit { slices: u16::MAX }, fault), None);
+    let reason = bench.ask(&Request::FinishFit { date: Date::from_days(1) }, |reply| match reply {
+        Reply::Report(report) => report.refusal.map(|refusal| refusal.reason()),
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(reason, Some("too-few-observations"));
+    let unsaved =
+        bench.ask(&Request::Status, |reply| matches!(reply, Reply::Status(status) if status.unsaved));
+    assert!(!unsaved);
+}
+
+#[test]
+fn a_stream_sends_every_so_many_samples_under_the_id_that_asked_for_it() {
+    let mut memory = BenchMemory::new();
+    let mut bench =
+        Bench::new(Nor::new(2), SERIAL, Counting { on: true, ..Counting::default() }, &mut memory);
+    bench.send(&put(RECORD));
+    let stream = bench.send(&Request::Stream { every: 3 });
+    for _ in 0..400 {
+        bench.device.poll();
+    }
+    let bytes: Vec<u8> = bench.wire.to_host.borrow_mut().drain(..).collect();
+    let mut receiver = imucal_core::link::Receiver::default();
+    let mut numbers = Vec::new();
+    for byte in bytes {
+        let Some(frame) = receiver.push(byte) else { continue };
+        let (header, message) = imucal_core::link::split(frame.expect("intact")).expect("intact");
+        if let Ok(Reply::Sample { number, values }) = header.read(message) {
+            assert_eq!(header.id, stream);
+            assert!(values[2].is_none());
+            numbers.push(number);
+        }
+    }
+    assert!(numbers.len() > 50 && numbers.windows(2).all(|pair| pair[1] - pair[0] == 3), "{numbers:?}");
+}

@@ -1,0 +1,278 @@
+//! What a host may ask, and what a device may answer.
+
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+use super::{FitProgress, FitReport, FitTask, Observation};
+use crate::record::{Date, Sensor, SensorIdentity};
+
+/// Observations of one message at the most.
+pub const BATCH: usize = 12;
+
+/// Samples of one triad, as many as a frame has room for.
+pub type Values = Vec<[f32; 3], { 4 * BATCH }>;
+
+/// From host to device. The order of the variants is the format: append only.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Request<'a> {
+    /// Who is there? Answered by [`Reply::Identity`].
+    Identify,
+    /// How are you? Answered by [`Reply::Status`].
+    Status,
+    /// The stored record's bytes, whether they can be used or not. Answered by [`Reply::Record`].
+    GetRecord,
+    /// Store a record and use it. Answered by [`Reply::Stored`] once it is whole in flash.
+    PutRecord {
+        /// Its bytes.
+        record: &'a [u8],
+        /// Store it although the one stored is another sensor's or a newer format's.
+        replace: bool,
+    },
+    /// Correct samples, raw unit of the record. Answered by [`Reply::Corrected`].
+    Correct {
+        /// Of which triad.
+        sensor: Sensor,
+        /// °C; NaN where it is not known.
+        temperature: f32,
+        /// The samples.
+        raw: Values,
+    },
+    /// Send each so many samples of the device's own sensor corrected; 0 ends the stream. Answered by
+    /// [`Reply::Done`], and then by [`Reply::Sample`]s.
+    Stream {
+        /// Every so many samples.
+        every: u16,
+    },
+    /// Begin a fit; one that is under way is given up. Answered by [`Reply::Progress`].
+    StartFit(FitTask),
+    /// Observations of the fit begun. Answered by [`Reply::Progress`].
+    Feed {
+        /// Index of the first one.
+        index: u16,
+        /// The observations.
+        observations: Vec<Observation, BATCH>,
+    },
+    /// Go on with the fit for so many slices, or to its end. Answered by [`Reply::Progress`] when that is done;
+    /// meanwhile the device does whatever else it does.
+    StepFit {
+        /// Slices; 65 535: to the end.
+        slices: u16,
+    },
+    /// Judge a fit that has stopped; one that is accepted is used from then on, and stored by [`Request::Store`].
+    /// Answered by [`Reply::Report`].
+    FinishFit {
+        /// Today, for the record.
+        date: Date,
+    },
+    /// Store the record in use. Answered as [`Request::PutRecord`] is.
+    Store {
+        /// As there.
+        replace: bool,
+    },
+    /// Give the fit up. Answered by [`Reply::Done`].
+    AbortFit,
+}
+
+/// From device to host. The order of the variants is the format: append only.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Reply<'a> {
+    /// To [`Request::Identify`].
+    Identity(Identity),
+    /// To [`Request::Status`].
+    Status(Status),
+    /// To [`Request::GetRecord`].
+    Record(&'a [u8]),
+    /// A record is in flash.
+    Stored {
+        /// Its number since the flash was empty.
+        sequence: u32,
+    },
+    /// To [`Request::Correct`]: the same samples, calibrated.
+    Corrected(Values),
+    /// One sample of a stream.
+    Sample {
+        /// Number since the device started.
+        number: u32,
+        /// Accelerometer, gyroscope and magnetometer, calibrated; `None` where the device has none, or no
+        /// calibration of it.
+        values: [Option<[f32; 3]>; 3],
+    },
+    /// How far the fit is.
+    Progress(FitProgress),
+    /// To [`Request::FinishFit`].
+    Report(FitReport),
+    /// Done, and nothing to tell.
+    Done,
+    /// Not done.
+    Fault(Fault),
+}
+
+/// Who a device is.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Identity {
+    /// The unit; its serial is what records are compared with.
+    pub unit: SensorIdentity,
+    /// Version of the firmware.
+    pub firmware: (u8, u8, u8),
+    /// Major and minor version of the records it reads.
+    pub record_version: (u8, u8),
+    /// An id that is above all taken so far.
+    pub next_id: u32,
+    /// What it has room for.
+    pub capacity: Capacity,
+}
+
+/// What a device has room for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Capacity {
+    /// Points of a fit.
+    pub points: u16,
+    /// Poses of a fit on a rig.
+    pub poses: u16,
+    /// Turns of a gyroscope's fit.
+    pub turns: u16,
+    /// Blocks of all turns together.
+    pub blocks: u16,
+    /// Particles of a swarm; 0: it does not search.
+    pub particles: u16,
+}
+
+/// What became of the stored record at the start, or since.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum RecordState {
+    /// None is stored.
+    Empty,
+    /// It is in use.
+    InUse,
+    /// It is in use, though record or unit has no serial.
+    Unconfirmed,
+    /// It was made for another unit, and is kept without being used.
+    OtherSensor,
+    /// Its format is newer than this firmware, and it is kept without being used.
+    NewerFormat,
+    /// It was stored whole, but cannot be used.
+    Unusable,
+}
+
+/// How a device is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Status {
+    /// Time since the start, ms.
+    pub uptime: u32,
+    /// The stored record.
+    pub record: RecordState,
+    /// Its number; 0 where none is stored.
+    pub sequence: u32,
+    /// The record in use differs from the stored one.
+    pub unsaved: bool,
+    /// Samples corrected since the start.
+    pub corrected: u32,
+    /// Frames refused since the start.
+    pub refused: u32,
+    /// Stack used at most since the start, bytes; `None` where the device does not look.
+    pub stack: Option<u32>,
+    /// The fit under way.
+    pub fit: Option<FitProgress>,
+}
+
+/// Why a request was not done. Nothing has changed, but that observations before the one refused are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Fault {
+    /// A frame was damaged on its way.
+    Damaged,
+    /// A frame was too long.
+    Oversized,
+    /// The frame's version is not this.
+    Version {
+        /// The device's.
+        supported: u8,
+    },
+    /// Intact, but no request of this version, or figures that are not finite.
+    Malformed,
+    /// A request that came again, or late.
+    Stale {
+        /// The last id taken.
+        last: u32,
+    },
+    /// Observations before or after those expected.
+    OutOfSequence {
+        /// Index of the next.
+        expected: u16,
+    },
+    /// No room for these observations.
+    Full,
+    /// The fit begun does not take such observations, or does not exist on this device.
+    Unsuited,
+    /// Another request is still being worked at.
+    Busy,
+    /// No fit was begun, or it has not stopped.
+    NotReady,
+    /// No record is in use for this sensor.
+    NoRecord,
+    /// The record is damaged, or not usable.
+    BadRecord,
+    /// The record's format is newer than this firmware.
+    NewerFormat,
+    /// The record was made for another unit.
+    OtherSensor,
+    /// What is stored is another sensor's or a newer format's, and `replace` was not set.
+    Occupied,
+    /// The flash did not take it.
+    Flash,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        accept::Refusal,
+        link::{FitModel, MAX_FRAME, MOST_COVARIANCE, MOST_PARAMETERS, encode},
+        record,
+        solver::Termination,
+    };
+
+    fn fits(message: &impl Serialize) -> bool {
+        encode(u32::MAX, message, &mut [0; MAX_FRAME]).is_ok()
+    }
+
+    #[test]
+    fn the_longest_messages_fit_a_frame() {
+        let values = Values::from([[1e30; 3]; 4 * BATCH]);
+        assert!(fits(&Request::Correct {
+            sensor: Sensor::Magnetometer,
+            temperature: 1e30,
+            raw: values.clone()
+        }));
+        assert!(fits(&Reply::Corrected(values)));
+        assert!(fits(&Request::PutRecord { record: &[1; record::MAX_LEN], replace: true }));
+        let block = Observation::Block([1.0; 3], [1.0; 3], [1.0; 3], 1.0);
+        assert!(fits(&Request::Feed { index: u16::MAX, observations: Vec::from([block; BATCH]) }));
+        let refusal =
+            Refusal::PoorCoverage { coverage: 1.0, flatness: 1.0, need_coverage: 1.0, need_flatness: 1.0 };
+        assert!(fits(&Reply::Report(FitReport {
+            model: FitModel::I14,
+            termination: Termination::NotFinite,
+            iterations: u16::MAX,
+            evaluations: u16::MAX,
+            independent_rows: u32::MAX,
+            cost: 1.0,
+            gradient: 1.0,
+            condition: 1.0,
+            nonlinearity: 1.0,
+            coverage: 1.0,
+            refusal: Some(refusal),
+            theta: Vec::from([1.0; MOST_PARAMETERS]),
+            covariance: Vec::from([1.0; MOST_COVARIANCE]),
+        })));
+    }
+}

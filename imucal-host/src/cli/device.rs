@@ -1,0 +1,276 @@
+//! `imucal device`
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use imucal_core::{
+    link::FitReport,
+    record::{self, Date},
+};
+
+use super::{
+    Ending, load,
+    output::{self, say},
+    read, refuse, warn,
+};
+use crate::{
+    apply,
+    calibrate::{Options, calibrate},
+    device::{Address, DeviceError, Session, fit::BoardFit},
+    recording::{AtomicFile, Recording, SensorKind},
+    report::table::words,
+    store::StoredCalibration,
+};
+
+#[derive(Args, Debug)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Say who is there, what it holds and how it is
+    Identify(Place),
+    /// Download the stored record
+    Get(Get),
+    /// Upload a calibration; the device checks, stores and uses it
+    Put(Put),
+    /// Correct a recording sample by sample on the device
+    Stream(Stream),
+    /// Fit a recording's observations on board, and store what is accepted
+    Calibrate(Calibrate),
+}
+
+/// Where the device is.
+#[derive(Args, Debug)]
+pub(super) struct Place {
+    /// serial:PATH[@BAUD], tcp:HOST:PORT, qemu[:IMAGE] or microbit[:IMAGE]
+    #[arg(long, value_name = "WHERE")]
+    device: Address,
+    /// File that keeps the flash of qemu from one start to the next
+    #[arg(long, value_name = "FILE")]
+    flash: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+struct Get {
+    #[command(flatten)]
+    place: Place,
+    /// The record
+    #[arg(long, value_name = "CAL.bin")]
+    out: PathBuf,
+}
+
+#[derive(Args, Debug)]
+struct Put {
+    #[command(flatten)]
+    place: Place,
+    /// TOML or record
+    calibration: PathBuf,
+    /// Overwrite a record of another sensor or of a newer format
+    #[arg(long)]
+    replace: bool,
+}
+
+#[derive(Args, Debug)]
+struct Stream {
+    #[command(flatten)]
+    place: Place,
+    /// The recording to correct
+    recording: PathBuf,
+    /// The corrected recording
+    #[arg(long, value_name = "REC2")]
+    out: PathBuf,
+    /// Apply a calibration made for another serial
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Args, Debug)]
+struct Calibrate {
+    #[command(flatten)]
+    place: Place,
+    /// The recording
+    recording: PathBuf,
+    /// Search the gyroscope's parameters with the device's swarm of this seed first
+    #[arg(long, value_name = "SEED")]
+    search: Option<u64>,
+    /// Overwrite a record of another sensor or of a newer format
+    #[arg(long)]
+    replace: bool,
+}
+
+impl Place {
+    pub(super) fn open(&self) -> Result<Session, DeviceError> {
+        Session::open(&self.device, self.flash.as_deref())
+    }
+}
+
+/// A device that says no is a refusal; one that cannot be reached, an error.
+pub(super) fn ending(done: anyhow::Result<Ending>) -> anyhow::Result<Ending> {
+    match done {
+        Err(error) => match error.downcast::<DeviceError>() {
+            Ok(refusal @ DeviceError::Refused { .. }) => Ok(refuse(&refusal)),
+            Ok(other) => Err(other.into()),
+            Err(error) => Err(error),
+        },
+        done => done,
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    ending(match &arguments.command {
+        Command::Identify(place) => identify(place),
+        Command::Get(arguments) => get(arguments),
+        Command::Put(arguments) => put(arguments),
+        Command::Stream(arguments) => stream(arguments),
+        Command::Calibrate(arguments) => fit(arguments),
+    })
+}
+
+fn identify(place: &Place) -> anyhow::Result<Ending> {
+    let mut session = place.open()?;
+    let identity = session.identity().clone();
+    let status = session.status()?;
+    let (major, minor, patch) = identity.firmware;
+    say!("{}, serial {}", named(&identity.unit.name), named(&identity.unit.serial));
+    say!(
+        "firmware {major}.{minor}.{patch}, records {}.{}",
+        identity.record_version.0,
+        identity.record_version.1
+    );
+    let capacity = identity.capacity;
+    say!(
+        "fits {} points, {} poses, {} turns of {} blocks; a swarm of {}",
+        capacity.points,
+        capacity.poses,
+        capacity.turns,
+        capacity.blocks,
+        capacity.particles
+    );
+    say!(
+        "record {}: {:?}{}",
+        status.sequence,
+        status.record,
+        if status.unsaved { ", unsaved changes" } else { "" }
+    );
+    if let Some(stack) = status.stack {
+        say!("stack used so far: {stack} B");
+    }
+    Ok(Ending::Done)
+}
+
+fn named(text: &str) -> &str {
+    if text.is_empty() { "unknown" } else { text }
+}
+
+fn get(arguments: &Get) -> anyhow::Result<Ending> {
+    output::check(&[], std::slice::from_ref(&arguments.out))?;
+    let Some(bytes) = arguments.place.open()?.record()? else {
+        return Ok(refuse(&"no record is stored on the device"));
+    };
+    AtomicFile::write_whole(&arguments.out, &bytes)
+        .map_err(|cause| anyhow::anyhow!("{}: cannot be written: {cause}", arguments.out.display()))?;
+    say!("{} bytes into {}", bytes.len(), arguments.out.display());
+    Ok(Ending::Done)
+}
+
+fn put(arguments: &Put) -> anyhow::Result<Ending> {
+    let stored = match load(&arguments.calibration)? {
+        Ok(stored) => stored,
+        Err(damaged) => return Ok(refuse(&damaged)),
+    };
+    let record = stored.to_record(&arguments.calibration)?;
+    let mut page = [0; record::MAX_LEN];
+    let bytes = record::encode(&record, &mut page)?;
+    let sequence = arguments.place.open()?.put_record(bytes, arguments.replace)?;
+    say!("stored as record {sequence}");
+    Ok(Ending::Done)
+}
+
+/// What the device corrects with.
+fn on_device(session: &mut Session) -> anyhow::Result<Option<record::CalibrationRecord>> {
+    let Some(bytes) = session.record()? else { return Ok(None) };
+    Ok(Some(record::decode(&bytes)?))
+}
+
+fn stream(arguments: &Stream) -> anyhow::Result<Ending> {
+    let files = output::files_of(&arguments.out);
+    output::check(&output::files_of(&arguments.recording), &files)?;
+    let recording = read(&arguments.recording)?;
+    let mut session = arguments.place.open()?;
+    let Some(record) = on_device(&mut session)? else {
+        return Ok(refuse(&"no record is stored on the device; put one, or calibrate on board"));
+    };
+    let stored = StoredCalibration::from_record(&record);
+    match apply::check(&recording, &stored, &record, arguments.force) {
+        Ok(warning) => warning.iter().for_each(|w| warn(w)),
+        Err(refusal) => return Ok(refuse(&refusal)),
+    }
+    let corrected = apply::apply_by(&recording, &stored, |sensor, raw, temperature| {
+        session.correct_at(sensor, raw, temperature)
+    })?;
+    corrected.write(&arguments.out)?;
+    say!(
+        "{}: {} rows corrected on the device into {}",
+        recording.name,
+        recording.rows(),
+        arguments.out.display()
+    );
+    Ok(Ending::Done)
+}
+
+fn fit(arguments: &Calibrate) -> anyhow::Result<Ending> {
+    let recording = read(&arguments.recording)?;
+    let options = Options { rig_acc: None, rig_gyr: None, rig_mag: None, ..Options::default() };
+    let calibration = calibrate(&recording, &options, &|_| {});
+    let mut session = arguments.place.open()?;
+    let today = Date::from_unix(std::time::UNIX_EPOCH.elapsed()?.as_secs());
+    let (mut accepted, mut equal) = (0, true);
+    for outcome in &calibration.sensors {
+        let Some(mut fit) = BoardFit::of(outcome, &session.identity().capacity) else { continue };
+        fit.task.search = arguments.search.filter(|_| outcome.kind == SensorKind::Gyr);
+        let report = session.fit(&fit, today)?;
+        accepted += u32::from(report.refusal.is_none());
+        equal &= print(&recording, outcome.kind, &fit, &report)?;
+    }
+    if accepted == 0 {
+        return Ok(refuse(&"no sensor of this recording was accepted on board"));
+    }
+    let sequence = session.store_record(arguments.replace)?;
+    say!("stored as record {sequence}");
+    Ok(if equal { Ending::Done } else { refuse(&"the device and this machine fit differently") })
+}
+
+/// Prints what the device found; false where the same fit here differs.
+fn print(
+    recording: &Recording,
+    kind: SensorKind,
+    fit: &BoardFit,
+    report: &FitReport,
+) -> anyhow::Result<bool> {
+    say!(
+        "{}: {}: {} of {}: {} after {} iterations, condition {:.1}: {}",
+        recording.name,
+        words(kind),
+        report.model.name(),
+        fit.observations.len(),
+        report.termination.name(),
+        report.iterations,
+        report.condition,
+        report
+            .refusal
+            .map_or_else(|| "accepted".into(), |refusal| format!("{}: {refusal}", refusal.reason())),
+    );
+    for (k, value) in report.theta.iter().enumerate() {
+        let std = report.covariance.get(k * (k + 3) / 2).map_or(f32::NAN, |variance| variance.sqrt());
+        say!("  parameter {:>2}  {value:>14.8} ± {std:.1e}", k + 1);
+    }
+    let equal = fit.is_here(report);
+    match equal {
+        Some(equal) => say!("  the same fit here: {}", if equal { "equal bit for bit" } else { "DIFFERENT" }),
+        None => say!("  searched by the device's own generator: not made again here"),
+    }
+    Ok(equal.unwrap_or(true))
+}

@@ -1,0 +1,80 @@
+//! Bytes to and from a device.
+
+use std::{
+    io::{self, Read, Write},
+    net::TcpStream,
+    path::Path,
+    time::Duration,
+};
+
+use super::{Address, DeviceError, qemu::Qemu};
+
+/// A read gives up after this, so that whoever waits can look at the clock.
+const READ_PATIENCE: Duration = Duration::from_millis(50);
+
+/// An open line.
+pub(super) enum Line {
+    Serial(Box<dyn serialport::SerialPort>),
+    /// With the QEMU at its other end, which lives as long.
+    Tcp(TcpStream, #[expect(dead_code, reason = "held for its end")] Option<Qemu>),
+}
+
+impl Line {
+    /// Opens a line; `flash` is the file behind an emulated device's flash.
+    pub(super) fn open(address: &Address, flash: Option<&Path>) -> Result<Self, DeviceError> {
+        let unreachable = |cause: io::Error, advice| DeviceError::Unreachable {
+            address: address.to_string(),
+            cause,
+            advice,
+        };
+        match address {
+            Address::Serial(path, baud) => {
+                serialport::new(path, *baud).timeout(READ_PATIENCE).open().map(Self::Serial).map_err(
+                    |cause| unreachable(cause.into(), "check the port's name and who else has it open"),
+                )
+            }
+            Address::Tcp(place) => TcpStream::connect(place)
+                .and_then(prepare)
+                .map(|stream| Self::Tcp(stream, None))
+                .map_err(|cause| unreachable(cause, "check host, port and that something listens there")),
+            Address::Qemu(machine, image) => Qemu::start(*machine, image, flash)
+                .and_then(|(qemu, stream)| Ok(Self::Tcp(prepare(stream)?, Some(qemu))))
+                .map_err(|cause| {
+                    unreachable(
+                        cause,
+                        "build the image (see README, On the co-processor) and install qemu-system-arm",
+                    )
+                }),
+        }
+    }
+
+    /// What has come, if anything has; nothing after a while.
+    pub(super) fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let read = match self {
+            Self::Serial(port) => port.read(bytes),
+            Self::Tcp(stream, _) => match stream.read(bytes) {
+                Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
+                read => read,
+            },
+        };
+        match read {
+            Err(cause) if matches!(cause.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock) => {
+                Ok(0)
+            }
+            read => read,
+        }
+    }
+
+    pub(super) fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        match self {
+            Self::Serial(port) => port.write_all(bytes).and_then(|()| port.flush()),
+            Self::Tcp(stream, _) => stream.write_all(bytes),
+        }
+    }
+}
+
+fn prepare(stream: TcpStream) -> io::Result<TcpStream> {
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(READ_PATIENCE))?;
+    Ok(stream)
+}

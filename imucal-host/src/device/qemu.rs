@@ -1,0 +1,86 @@
+//! QEMU in place of a board. To end it is to cut the device's power.
+
+use std::{
+    fs::OpenOptions,
+    io::{self, ErrorKind},
+    net::{TcpListener, TcpStream},
+    path::Path,
+    process::{Child, Command, Stdio},
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+use super::address::Machine;
+
+/// QEMU has connected by then, or never will.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// Memory that a file stands behind, bytes: all of the machine's PSRAM.
+const PSRAM: u64 = 16 << 20;
+
+/// A running QEMU; killed when dropped.
+pub(super) struct Qemu(Child);
+
+impl Qemu {
+    /// Starts an image; `flash` is the file that keeps its flash (only on mps2-an386).
+    pub(super) fn start(
+        machine: Machine,
+        image: &Path,
+        flash: Option<&Path>,
+    ) -> io::Result<(Self, TcpStream)> {
+        if !image.is_file() {
+            return Err(io::Error::new(ErrorKind::NotFound, format!("no image {}", image.display())));
+        }
+        // The host listens, so that there is no race for a port.
+        let listener = TcpListener::bind(("127.0.0.1", 0))?;
+        listener.set_nonblocking(true)?;
+        let mut command = Command::new("qemu-system-arm");
+        let mut board = machine.name().to_owned();
+        if let Some(flash) = flash.filter(|_| machine == Machine::Mps2) {
+            let file = OpenOptions::new().create(true).truncate(false).write(true).open(flash)?;
+            file.set_len(PSRAM)?;
+            let backend = format!("memory-backend-file,id=nv,size=16M,mem-path={},share=on", flash.display());
+            command.args(["-object", &backend]);
+            board.push_str(",memory-backend=nv");
+        }
+        let child = command
+            .args(["-machine", &board, "-display", "none", "-monitor", "none"])
+            .args(["-serial", &format!("tcp:{},nodelay=on", listener.local_addr()?)])
+            .arg("-kernel")
+            .arg(image)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()?;
+        let mut qemu = Self(child);
+        let stream = qemu.connected(&listener)?;
+        stream.set_nonblocking(false)?;
+        Ok((qemu, stream))
+    }
+
+    fn connected(&mut self, listener: &TcpListener) -> io::Result<TcpStream> {
+        let end = Instant::now() + PATIENCE;
+        loop {
+            match listener.accept() {
+                Ok((stream, _)) => return Ok(stream),
+                Err(cause) if cause.kind() != ErrorKind::WouldBlock => return Err(cause),
+                Err(_) => {}
+            }
+            if let Some(status) = self.0.try_wait()? {
+                let said = self.0.stderr.take().map(io::read_to_string).transpose()?.unwrap_or_default();
+                return Err(io::Error::other(format!("QEMU ended with {status}: {}", said.trim())));
+            }
+            if Instant::now() > end {
+                return Err(ErrorKind::TimedOut.into());
+            }
+            sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+impl Drop for Qemu {
+    fn drop(&mut self) {
+        // It may have ended by itself; either way nothing is left to do.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}

@@ -1,0 +1,123 @@
+//! The emulated co-processor at the end of its UART, through the program and through its library.
+
+use std::path::{Path, PathBuf};
+
+use firmware_example::{drill, scene::Noise};
+use imucal_core::{
+    link::{FitModel, Observation},
+    record::Date,
+};
+use imucal_host::{
+    device::{Address, Session, fit::BoardFit},
+    recording::Recording,
+};
+use imucal_tests::{
+    data,
+    firmware::{BOARDS, Board, announce, build, ready},
+    program,
+};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_imucal-under-test");
+/// Stack of the whole co-processor, bytes.
+const STACK_BUDGET: u32 = 8 * 1024;
+
+fn address(board: Board) -> String {
+    let image = build(board, "coprocessor", &[]).unwrap_or_else(|refusal| panic!("{refusal}"));
+    let machine = if board.machine == "microbit" { "microbit" } else { "qemu" };
+    format!("{machine}:{}", image.display())
+}
+
+fn session(board: Board, flash: Option<&Path>) -> Session {
+    let address: Address = address(board).parse().expect("an address");
+    Session::open(&address, flash).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A fit of simulated observations.
+fn drilled(model: FitModel, count: usize, seed: u32) -> BoardFit {
+    let mut observations: Vec<Observation> = Vec::new();
+    drill::observe(model, count, &mut Noise(seed), |observation| observations.push(observation));
+    BoardFit { task: drill::task(model), observations }
+}
+
+#[test]
+fn both_boards_fit_store_and_correct_as_this_machine_does() {
+    if !ready() {
+        return;
+    }
+    for board in BOARDS {
+        let mut session = session(board, None);
+        let capacity = session.identity().capacity;
+        for (model, count) in [(FitModel::T9, 40), (FitModel::E9, 40), (FitModel::K12, 4)] {
+            let fit = drilled(model, count, 5);
+            let report = session.fit(&fit, Date::from_days(20_000)).unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(fit.is_here(&report), Some(true), "{model:?} on {}: {report:?}", board.core);
+        }
+        let count = usize::from(capacity.poses).min(16);
+        let report = session.fit(&drilled(FitModel::I14, count, 5), Date::from_days(20_000));
+        assert_eq!(report.unwrap_or_else(|error| panic!("{error}")).refusal, None, "{}", board.core);
+        assert_eq!(session.store_record(false).unwrap_or_else(|error| panic!("{error}")), 1);
+        let stored = session.record().unwrap_or_else(|error| panic!("{error}")).expect("stored");
+        assert!(imucal_core::record::decode(&stored).is_ok_and(|record| record.acc.is_some()));
+        let status = session.status().unwrap_or_else(|error| panic!("{error}"));
+        let stack = status.stack.expect("the machine looks");
+        announce(&format!("stack: {}: the co-processor, after all its fits: {stack} B", board.core));
+        assert!(stack <= STACK_BUDGET, "{}: {stack} B", board.core);
+    }
+}
+
+#[test]
+fn the_loop_of_the_readme_ends_where_it_began_after_each_power_cycle() {
+    if !ready() {
+        return;
+    }
+    let Some(folder) = data::folder() else { return };
+    let recording = folder.join("real/xsens-mti.csv.gz");
+    let scratch = tempfile::tempdir().expect("a scratch folder");
+    let at = |name: &str| scratch.path().join(name);
+    let (device, flash) = (address(BOARDS[0]), at("unit.flash"));
+    let run = |command: &[&str], paths: &[(&str, PathBuf)]| {
+        let mut arguments: Vec<String> = vec!["device".into()];
+        arguments.extend(command.iter().map(|word| (*word).to_owned()));
+        for (option, path) in paths {
+            arguments.extend([(*option).to_owned(), path.display().to_string()]);
+        }
+        // Each call starts the co-processor anew, with nothing but its flash.
+        arguments.extend(["--device".into(), device.clone(), "--flash".into(), flash.display().to_string()]);
+        program::run(PROGRAM, &[], &arguments)
+    };
+    let path = recording.display().to_string();
+    run(&["identify"], &[]).with(0).printing(&["record 0: Empty"]);
+    run(&["stream", &path], &[("--out", at("early.csv"))]).with(1).telling(&["no record is stored"]);
+    run(&["calibrate", &path], &[]).with(0).printing(&[
+        "T9",
+        "K12",
+        "equal bit for bit",
+        "stored as record 1",
+    ]);
+    run(&["identify"], &[]).with(0).printing(&["record 1: Unconfirmed"]);
+    run(&["get"], &[("--out", at("unit.bin"))]).with(0);
+
+    // A second's worth of the recording, or QEMU's UART would take minutes.
+    let mut short = Recording::read(&recording).unwrap_or_else(|error| panic!("{error}"));
+    shorten(&mut short, 2_000);
+    short.write(&at("short.csv")).unwrap_or_else(|error| panic!("{error}"));
+    let short = at("short.csv").display().to_string();
+    run(&["stream", &short], &[("--out", at("device.csv"))]).with(0);
+    let host = ["apply", &short, "--calibration", &at("unit.bin").display().to_string(), "--out"]
+        .map(str::to_owned)
+        .into_iter()
+        .chain([at("host.csv").display().to_string()]);
+    program::run(PROGRAM, &[], &host.collect::<Vec<_>>()).with(0);
+    let read = |name: &str| std::fs::read(at(name)).expect("it was written");
+    assert_eq!(read("device.csv"), read("host.csv"));
+}
+
+fn shorten(recording: &mut Recording, rows: usize) {
+    recording.time.truncate(rows);
+    for triple in [&mut recording.acc, &mut recording.gyr, &mut recording.mag].into_iter().flatten() {
+        triple.values.truncate(rows);
+    }
+    if let Some(temperature) = &mut recording.temperature {
+        temperature.truncate(rows);
+    }
+}
