@@ -27,6 +27,10 @@ pub mod device;
 
 pub mod equivalence;
 
+pub mod diagnosis;
+
+pub mod blind;
+
 pub mod report;
 
 pub mod study;

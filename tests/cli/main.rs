@@ -15,6 +15,7 @@ mod importing;
 mod json_contract;
 mod outputs;
 mod printing;
+mod trials;
 
 /// Runs the program with these arguments.
 fn imucal<A: AsRef<OsStr>>(arguments: &[A]) -> Ended {

@@ -7,9 +7,11 @@ use clap::{Parser, Subcommand};
 use crate::store::{LoadError, StoredCalibration};
 
 mod apply;
+mod blind;
 mod calibrate;
 mod demo;
 mod device;
+mod diagnose;
 mod import;
 mod inspect;
 mod output;
@@ -46,6 +48,10 @@ enum Command {
     Demo(demo::Arguments),
     /// Simulated comparisons of estimators and models, each printed as a table.
     Study(study::Arguments),
+    /// Say where recording and simulator differ, which effect causes it, and how far it closes the gap.
+    Diagnose(diagnose::Arguments),
+    /// Sealed trials of the diagnosis, and how often it was right.
+    Blind(blind::Arguments),
 }
 
 /// How a command ended, when nothing went wrong on the way.
@@ -69,6 +75,8 @@ pub fn run() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
+        Command::Diagnose(arguments) => diagnose::run(&arguments),
+        Command::Blind(arguments) => blind::run(&arguments),
     };
     match result {
         Ok(Ending::Done) => ExitCode::SUCCESS,

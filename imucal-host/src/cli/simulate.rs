@@ -5,14 +5,18 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use serde_json::json;
-use sha2::{Digest, Sha256};
 
-use super::Ending;
+use super::{Ending, output};
 use crate::{
-    effect::{self, Act, CATALOGUE, Effect, Parameter, Role},
+    blind::{
+        case::{Omission, omission},
+        seal::{Nonce, digest},
+    },
+    effect::{self, CATALOGUE, Effect},
     recording::{AtomicFile, Manifest, manifest::Axis, spelling::nearest},
+    report,
     simulator::{
-        Programme, Simulation, UnitKind,
+        Conditions, Programme, Simulation, UnitKind,
         random::{Purpose, Random},
     },
 };
@@ -31,7 +35,7 @@ pub(super) struct Arguments {
     /// The unit: mtx or 3dm-gx2
     #[arg(long, value_name = "UNIT", default_value = "mtx", value_parser = unit)]
     unit: UnitKind,
-    /// What the rig does: multi-position, rates, sinusoids, gyroscope, thermal or full
+    /// What the rig does: multi-position, rates, sinusoids, gyroscope, thermal, full or mixed
     #[arg(long, value_name = "NAME", default_value = "full", value_parser = programme)]
     programme: Programme,
     /// An effect beyond the baseline, e.g. acc.lever_arm or mag.bias_step=3: its size in multiples of its usual one.
@@ -81,7 +85,11 @@ fn dose(text: &str) -> Result<(&'static Effect, f64), String> {
 }
 
 /// What was found, and the nearest name or all there are.
-fn unknown<'a>(what: &str, found: &str, names: impl IntoIterator<Item = &'a str> + Clone) -> String {
+pub(super) fn unknown<'a>(
+    what: &str,
+    found: &str,
+    names: impl IntoIterator<Item = &'a str> + Clone,
+) -> String {
     match nearest(found, names.clone(), NEAR) {
         Some(name) => format!("there is no {what} `{found}`; did you mean `{name}`?"),
         None => {
@@ -107,7 +115,7 @@ fn axes(text: &str) -> Result<[Axis; 3], String> {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let Some(out) = arguments.out.as_deref().filter(|_| !arguments.list) else {
-        CATALOGUE.iter().for_each(|effect| print!("{}", listed(effect)));
+        output::text(&report::catalogue::catalogue())?;
         return Ok(Ending::Done);
     };
     let mut simulation = Simulation {
@@ -119,6 +127,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         seed: arguments.seed,
         unit_seed: None,
         noise: !arguments.no_noise,
+        conditions: Conditions::default(),
         counts: !arguments.si,
         doses: Vec::new(),
     };
@@ -136,26 +145,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         println!("  {}: {}", dose.effect.id, values.join(", "));
     }
     Ok(Ending::Done)
-}
-
-/// An effect for people; parameters of the same size and unit together.
-fn listed(effect: &Effect) -> String {
-    let mut text = format!("{}\n  {}\n", effect.id, effect.words.cause);
-    let alike = |a: &Parameter, b: &Parameter| {
-        (a.prior_scale, &a.unit, a.neutral(1.0)) == (b.prior_scale, &b.unit, b.neutral(1.0))
-    };
-    for group in effect.parameters.chunk_by(alike) {
-        let names: Vec<&str> = group.iter().map(|parameter| parameter.name.as_str()).collect();
-        let first = &group[0];
-        let usual = match first.role {
-            Role::Amplitude => format!("{} {}", first.prior_scale, first.unit),
-            Role::Shape { usual } => format!("{usual} {}", first.unit),
-            Role::Instant { share } => format!("{:.0} % of the run", 100.0 * share),
-            Role::Choice => format!("0 to {}", first.range.1),
-        };
-        text += &format!("  {}: {usual}\n", names.join(", "));
-    }
-    text
 }
 
 fn write(simulation: &Simulation, out: &Path) -> anyhow::Result<()> {
@@ -189,19 +178,14 @@ fn draw(simulation: &mut Simulation) -> anyhow::Result<()> {
 }
 
 fn is_drawn(effect: &Effect) -> bool {
-    let baseline = matches!(effect.act, Act::Triad(..))
-        || ["rig.level_tilt", "rig.heading", "acc.gravity_error", "mag.hard_iron", "mag.soft_iron"]
-            .contains(&effect.id.as_str());
-    !baseline && !effect.id.ends_with(".axis_swap") && !effect.id.ends_with(".unit_error")
+    !matches!(omission(effect), Some(Omission::Baseline | Omission::Convention))
 }
 
 fn sealed(mut simulation: Simulation, out: &Path) -> anyhow::Result<Ending> {
     let label_path = label_beside(out)?;
-    let mut nonce = [0u8; 32];
-    getrandom::fill(&mut nonce).context("the system gave no random numbers")?;
+    let nonce = Nonce::fresh().context("the system gave no random numbers")?;
     // Not the nonce itself, and one way: the recording says nothing of its label.
-    let seed = Sha256::new().chain_update(b"imucal sealed seed").chain_update(nonce).finalize();
-    simulation.seed = seed.iter().take(8).fold(0, |seed, byte| seed << 8 | u64::from(*byte));
+    simulation.seed = nonce.seed("imucal sealed seed");
     draw(&mut simulation)?;
     let effects: Vec<_> = simulation
         .doses
@@ -214,7 +198,7 @@ fn sealed(mut simulation: Simulation, out: &Path) -> anyhow::Result<Ending> {
         .collect();
     let label = json!({
         "format": "imucal-label/1",
-        "salt": hex(&nonce),
+        "salt": nonce.hex(),
         "seed": simulation.seed,
         "unit": simulation.unit.name(),
         "programme": simulation.programme.name(),
@@ -224,7 +208,7 @@ fn sealed(mut simulation: Simulation, out: &Path) -> anyhow::Result<Ending> {
     write(&simulation, out)?;
     AtomicFile::write_whole(&label_path, text.as_bytes())
         .with_context(|| format!("{}: cannot be written; check the folder", label_path.display()))?;
-    println!("{}: SHA-256 {}", label_path.display(), hex(&Sha256::digest(text.as_bytes())));
+    println!("{}: SHA-256 {}", label_path.display(), digest(&text));
     Ok(Ending::Done)
 }
 
@@ -233,10 +217,6 @@ fn label_beside(out: &Path) -> anyhow::Result<PathBuf> {
     let manifest = Manifest::path_beside(out)
         .with_context(|| format!("{}: expected a name that ends in .csv or .csv.gz", out.display()))?;
     Ok(manifest.with_extension("label.json"))
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]
@@ -258,13 +238,6 @@ mod tests {
         for text in ["gyr.warmup=", "gyr.warmup=big", "gyr.warmup=inf"] {
             assert!(dose(text).unwrap_err().contains("no number"), "{text}");
         }
-    }
-
-    #[test]
-    fn the_list_says_what_an_effect_is_and_how_large() {
-        let text = listed(effect::find("acc.warmup").unwrap());
-        assert!(text.starts_with("acc.warmup\n  The unit warms itself"), "{text}");
-        assert!(text.contains("x, y, z: 0.02 m/s^2\n  tau: 150 s\n"), "{text}");
     }
 
     #[test]

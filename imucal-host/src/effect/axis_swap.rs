@@ -1,6 +1,6 @@
 //! Axes taken for one another: `P.axis_swap`.
 
-use nalgebra::Vector3;
+use nalgebra::Matrix3;
 
 use super::{Act, DataRun, Effect, Parameter, SensorKind, Words, member_id};
 
@@ -17,11 +17,18 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         .like(&member_id(kind, "misalignment"), "its size: a swap is a right angle or more")
 }
 
+/// How many codes there are.
+pub const CODES: usize = 8 * ORDERS.len();
+
+/// The signed permutation of a code: from the axes as they are to the axes as they are recorded. `None` from [`CODES`].
+pub fn signed_permutation(code: usize) -> Option<Matrix3<f64>> {
+    let order = ORDERS.get(code / 8)?;
+    let sign = |axis: usize| if (code % 8) >> axis & 1 == 1 { -1.0 } else { 1.0 };
+    Some(Matrix3::from_fn(|axis, from| if order[axis] == from { sign(axis) } else { 0.0 }))
+}
+
 fn alter(values: &[f64], run: &mut DataRun<'_>) {
-    let code = values.first().map_or(0, |code| code.round().clamp(0.0, 47.0) as usize);
-    let (Some(order), signs) = (ORDERS.get(code / 8), code % 8) else { return };
-    let sign = Vector3::from_fn(|axis, _| if signs >> axis & 1 == 1 { -1.0 } else { 1.0 });
-    for sample in run.samples.iter_mut() {
-        *sample = Vector3::from_fn(|axis, _| sample[order[axis]]).component_mul(&sign);
-    }
+    let code = values.first().map_or(0, |code| code.round().clamp(0.0, (CODES - 1) as f64) as usize);
+    let Some(swap) = signed_permutation(code) else { return };
+    run.samples.iter_mut().for_each(|sample| *sample = swap * *sample);
 }

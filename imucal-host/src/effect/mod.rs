@@ -15,18 +15,21 @@ use crate::recording::{SensorKind, Unit};
 
 mod angular_acceleration;
 mod axis_nonorthogonality;
-mod axis_swap;
+pub mod axis_swap;
 mod bandwidth;
 mod bias;
 mod bias_drift;
 mod bias_step;
+pub mod class;
 mod cross_axis_product;
 mod earth_rate;
 mod eddy_current;
 mod encoder_harmonic;
 mod encoder_offset;
+mod field_dip;
 mod field_drift;
 mod field_gradient;
+mod field_strength;
 mod g2_sensitivity;
 mod g_sensitivity;
 mod gimbal_hard_iron;
@@ -41,6 +44,7 @@ mod lever_arm;
 mod machine;
 mod misalignment;
 mod motor_current;
+mod mounting;
 mod noise_burst;
 mod parameter;
 mod rate_error;
@@ -308,6 +312,14 @@ pub static CATALOGUE: LazyLock<Vec<Effect>> = LazyLock::new(|| {
     ] {
         list.extend(SensorKind::ALL.map(family));
     }
+    list
+});
+
+/// Terms that the baseline has where a rig, a surveyed site or a housing does not fix them. They are fitted, never named
+/// as a cause, and not part of the catalogue.
+pub static NUISANCES: LazyLock<Vec<Effect>> = LazyLock::new(|| {
+    let mut list = vec![field_dip::effect(), field_strength::effect()];
+    list.extend(SensorKind::ALL.map(mounting::effect));
     list
 });
 

@@ -1,10 +1,14 @@
-//! Sensors late against the rig: `clk.time_offset`.
+//! Sensors and rig do not share their time's zero: `clk.time_offset`.
+//!
+//! ```text
+//! the row of t shows the rig at t + offset
+//! ```
 
 use super::{Act, Effect, Parameter, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
-        cause: "Samples reach their row later than the encoders: the row of t shows the rig at t - offset.",
+        cause: "The sensors' clock started after the encoders': the row of t shows the rig at t + offset. Negative: samples reach their row late.",
         remedy: "Record a common trigger, or shift the sensors' times by the offset.",
         needs: "Motion with changing rate, such as sinusoids or slews.",
     };
@@ -15,5 +19,5 @@ pub(super) fn effect() -> Effect {
 }
 
 fn alter(values: &[f64], time: f64) -> f64 {
-    time - values.first().copied().unwrap_or(0.0)
+    time + values.first().copied().unwrap_or(0.0)
 }

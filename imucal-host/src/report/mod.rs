@@ -1,5 +1,8 @@
 //! Reports: for people (text) and for programs (JSON).
 
+pub mod catalogue;
+pub mod diagnosis;
 pub mod json;
 pub mod measure;
+pub mod prose;
 pub mod table;

@@ -71,15 +71,19 @@ impl Chain {
     }
 }
 
-/// The pose of a rig.
-pub fn pose(machine: &Machine) -> Pose {
-    let [outer, middle, inner] = &machine.axes;
+/// C_p_n of a rig's base.
+pub fn base(machine: &Machine) -> Matrix3<f64> {
     let [tilt_x, tilt_y] = machine.tilt;
     let mut base = Chain::base();
     base.turn(&Vector3::z(), Swing::still(machine.heading));
     base.turn(&Vector3::y(), Swing::still(tilt_y));
     base.turn(&Vector3::x(), Swing::still(tilt_x));
+    base.c
+}
 
+/// The pose of a rig.
+pub fn pose(machine: &Machine) -> Pose {
+    let [outer, middle, inner] = &machine.axes;
     let mut chain = Chain::base();
     // A level rig without wobble keeps the plain product of three rotations, bit for bit.
     for (axis, wobble) in [cyclic(outer), cyclic(&cyclic(outer))].iter().zip(machine.wobble) {
@@ -95,7 +99,7 @@ pub fn pose(machine: &Machine) -> Pose {
     skew(&mut chain, middle, inner, machine.skew[1]);
     chain.turn(inner, machine.gimbals[2]);
     Pose {
-        c_p_n: base.c,
+        c_p_n: base(machine),
         c_t_p: chain.c,
         c_t_o: c_o_p.tr_mul(&chain.c),
         c_t_m: c_m_p.tr_mul(&chain.c),

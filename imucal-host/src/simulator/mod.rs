@@ -5,6 +5,7 @@
 
 pub mod chain;
 pub mod climate;
+pub mod conditions;
 pub mod course;
 pub mod dose;
 mod error;
@@ -12,16 +13,21 @@ pub mod gimbal;
 pub mod programme;
 pub mod random;
 pub mod recorder;
+pub mod replay;
 pub mod run;
+pub mod tracked;
 pub mod truth;
 pub mod tumble;
 pub mod unit;
 
+pub use conditions::{Conditions, NoiseLevel};
 pub use dose::Dose;
 pub use error::SimulationError;
 pub use programme::Programme;
 pub use recorder::{SimulatedSensor, SimulatedUnit, record};
+pub use replay::Replay;
 pub use run::Simulation;
-pub use truth::{Motion, Place};
+pub use tracked::Tracked;
+pub use truth::{Motion, Place, Recorded};
 pub use tumble::Tumble;
-pub use unit::UnitKind;
+pub use unit::{DriftKind, UnitKind};

@@ -5,10 +5,11 @@ use nalgebra::Vector3;
 use super::{
     SimulationError,
     chain::{Chain, inputs},
+    conditions::Conditions,
     dose::Dose,
     programme::{Programme, Schedule, wrap},
     random::{Purpose, Random},
-    truth::{Motion, Place},
+    truth::Motion,
     unit::{TriadUnderTest, UnitKind, UnitUnderTest},
 };
 use crate::{
@@ -50,6 +51,8 @@ pub struct Simulation {
     /// Noise, drift, scatter of the rests and rounding; without, a recording is a smooth function of the effects'
     /// parameters.
     pub noise: bool,
+    /// Where, how noisy, how exactly the gimbals stand.
+    pub conditions: Conditions,
     /// Raw counts in the file instead of SI units.
     pub counts: bool,
     /// Effects beyond the baseline.
@@ -67,6 +70,7 @@ impl Default for Simulation {
             seed: 1,
             unit_seed: None,
             noise: true,
+            conditions: Conditions::default(),
             counts: true,
             doses: Vec::new(),
         }
@@ -86,18 +90,19 @@ impl Simulation {
         if let Some(found) = self.duration.filter(|duration| *duration > LONGEST) {
             return Err(SimulationError::TooLong { found, longest: LONGEST });
         }
-        let schedule = self.programme.schedule(self.axes, self.seed, self.duration, Place::ankara())?;
+        let schedule = self.programme.schedule(self.axes, self.seed, self.duration, self.conditions.place)?;
         let schedule = schedule.on_base(self.seed);
         if !self.noise {
             return Ok(schedule);
         }
         let mut random = Random::new(self.seed, Purpose::Scatter);
-        Ok(schedule.scattered(0.002f64.to_radians(), &mut random))
+        Ok(schedule.scattered(self.conditions.scatter, &mut random))
     }
 
     /// The unit, without effects.
     pub fn unit_under_test(&self) -> UnitUnderTest {
-        UnitUnderTest::draw(self.unit, self.unit_seed.unwrap_or(self.seed), self.rate)
+        let drawn = UnitUnderTest::draw(self.unit, self.unit_seed.unwrap_or(self.seed), self.rate);
+        self.conditions.applied_to(drawn)
     }
 
     /// Adds an effect of a size, see [`Dose::sized`].

@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::gimbal::pose;
+use super::gimbal::{Pose, pose};
 use crate::{
-    effect::{Machine, Truth},
+    effect::{Machine, Swing, Truth},
     recording::manifest::Rig,
 };
 
@@ -56,11 +56,27 @@ pub trait Motion {
     fn place(&self) -> Place;
 }
 
+/// A movement that was recorded, row by row.
+pub trait Recorded: Motion + Sync {
+    /// Whether it moves, row by row.
+    fn moving(&self) -> &[bool];
+
+    /// Whether the recording tells the attitude, row by row.
+    fn known(&self) -> &[bool];
+
+    /// Swings of the gimbals at each row, outermost first; `None` without gimbals.
+    fn swings(&self) -> Option<&[[Swing; 3]]>;
+}
+
 /// The truth on a three-gimbal rig.
+pub fn on_rig(time: f64, machine: &Machine, place: &Place, temperature: f64) -> Truth {
+    at_pose(time, &pose(machine), machine.gimbals, place, temperature)
+}
+
+/// The truth on a table in a pose.
 ///
 /// Without lever arm: the unit sits where the axes meet. The table does not travel, so that specific force is gravity.
-pub fn on_rig(time: f64, machine: &Machine, place: &Place, temperature: f64) -> Truth {
-    let pose = pose(machine);
+pub fn at_pose(time: f64, pose: &Pose, gimbals: [Swing; 3], place: &Place, temperature: f64) -> Truth {
     let c_t_n = pose.c_p_n * pose.c_t_p;
     let to_t = |v_n: Vector3<f64>| c_t_n.tr_mul(&v_n);
     let w_ie_t = to_t(place.earth_rate_n());
@@ -70,7 +86,7 @@ pub fn on_rig(time: f64, machine: &Machine, place: &Place, temperature: f64) -> 
         c_t_o: pose.c_t_o,
         c_t_m: pose.c_t_m,
         c_p_n: pose.c_p_n,
-        gimbals: machine.gimbals,
+        gimbals,
         w_pt_t: pose.w_pt_t,
         w_ie_t,
         w_it_t: pose.w_pt_t + w_ie_t,
@@ -90,26 +106,20 @@ pub fn in_the_open(
     dw_nt_t: Vector3<f64>,
     place: &Place,
 ) -> Truth {
-    let still = Machine::exact([Vector3::z(), Vector3::y(), Vector3::x()]);
-    let w_ie_t = c_t_n.tr_mul(&place.earth_rate_n());
-    Truth {
+    let pose = Pose {
+        c_p_n: Matrix3::identity(),
         c_t_p: *c_t_n,
         c_t_o: *c_t_n,
         c_t_m: *c_t_n,
         w_pt_t: w_nt_t,
-        w_ie_t,
-        w_it_t: w_nt_t + w_ie_t,
-        dw_it_t: dw_nt_t - w_nt_t.cross(&w_ie_t),
-        f_t: c_t_n.tr_mul(&Vector3::new(0.0, 0.0, -place.gravity)),
-        b_t: c_t_n.tr_mul(&place.field_n),
-        ..on_rig(time, &still, place, 25.0)
-    }
+        dw_pt_t: dw_nt_t,
+    };
+    at_pose(time, &pose, [Swing::default(); 3], place, 25.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::Swing;
 
     #[test]
     fn at_rest_there_is_gravity_and_earth_s_rotation_and_nothing_else() {

@@ -10,6 +10,7 @@ use super::{
 
 mod full;
 mod gyroscope;
+mod mixed;
 mod multi_position;
 mod plan;
 mod rates;
@@ -22,6 +23,10 @@ pub use schedule::{Schedule, Segment};
 
 /// Rests may shrink to this share.
 const LEAST_REST: f64 = 0.3;
+/// Lengths of the mixed programme, s.
+const MIXED: (f64, f64) = (150.0, 600.0);
+/// What the rests at both ends take, s.
+const ENDS: f64 = 18.0;
 
 /// What the rig does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,12 +44,21 @@ pub enum Programme {
     /// All of these.
     #[default]
     Full,
+    /// Drawn item by item, no two alike.
+    Mixed,
 }
 
 impl Programme {
     /// All programmes.
-    pub const ALL: [Self; 6] =
-        [Self::MultiPosition, Self::Rates, Self::Sinusoids, Self::Gyroscope, Self::Thermal, Self::Full];
+    pub const ALL: [Self; 7] = [
+        Self::MultiPosition,
+        Self::Rates,
+        Self::Sinusoids,
+        Self::Gyroscope,
+        Self::Thermal,
+        Self::Full,
+        Self::Mixed,
+    ];
 
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
@@ -55,6 +69,7 @@ impl Programme {
             Self::Gyroscope => "gyroscope",
             Self::Thermal => "thermal",
             Self::Full => "full",
+            Self::Mixed => "mixed",
         }
     }
 
@@ -78,15 +93,20 @@ impl Programme {
         let mut random = Random::new(seed, Purpose::Schedule);
         let mut plan = Plan::default();
         plan.rest(random.between(9.0, 12.0));
-        let add = match self {
-            Self::MultiPosition => multi_position::add,
-            Self::Rates => rates::add,
-            Self::Sinusoids => sinusoids::add,
-            Self::Gyroscope => gyroscope::add,
-            Self::Thermal => thermal::add,
-            Self::Full => full::add,
-        };
-        add(&mut plan, axes, &mut random);
+        let random = &mut random;
+        match self {
+            Self::MultiPosition => multi_position::add(&mut plan, axes, random),
+            Self::Rates => rates::add(&mut plan, axes, random),
+            Self::Sinusoids => sinusoids::add(&mut plan, axes, random),
+            Self::Gyroscope => gyroscope::add(&mut plan, axes, random),
+            Self::Thermal => thermal::add(&mut plan, axes, random),
+            Self::Full => full::add(&mut plan, axes, random),
+            Self::Mixed => {
+                let whole = duration.filter(|duration| duration.is_finite());
+                let whole = whole.unwrap_or_else(|| random.between(MIXED.0, MIXED.1));
+                mixed::add(&mut plan, axes, whole - ENDS, random);
+            }
+        }
         plan.slew([0.0; 3]);
         plan.rest(random.between(5.0, 7.0));
         if let Some(duration) = duration {
@@ -96,7 +116,7 @@ impl Programme {
             }
             plan = plan.stretched(duration);
         }
-        let climate = self.climate(plan.duration(), &mut random);
+        let climate = self.climate(plan.duration(), random);
         Ok(Schedule::new(axes, plan.into_segments(), climate, place))
     }
 
@@ -104,12 +124,17 @@ impl Programme {
     fn climate(self, duration: f64, random: &mut Random) -> Climate {
         let swing = match self {
             Self::Thermal | Self::Full => random.between(5.0, 8.0),
+            Self::Mixed => random.between(0.5, 8.0),
             _ => random.between(1.0, 2.0),
+        };
+        let period = match self {
+            Self::Mixed => (0.4, 1.2),
+            _ => (0.45, 0.65),
         };
         Climate {
             mean: random.between(22.0, 26.0),
             swing,
-            period: duration * random.between(0.45, 0.65),
+            period: duration * random.between(period.0, period.1),
             phase: random.between(-1.5, 1.5),
             lag: random.between(30.0, 60.0),
             self_heating: random.between(1.0, 3.0),

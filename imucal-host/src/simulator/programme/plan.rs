@@ -28,12 +28,17 @@ impl Plan {
 
     /// Goes to these angles, rad, each gimbal the short way, none above the slew rate.
     pub fn slew(&mut self, to: [f64; 3]) {
+        self.slew_at(to, SLEW_RATE);
+    }
+
+    /// Likewise, none above a rate, rad/s.
+    pub fn slew_at(&mut self, to: [f64; 3], rate: f64) {
         self.angles = self.angles.map(wrap);
         let mut target = self.angles;
         let mut duration = SHORTEST_SLEW;
         for (angle, to) in target.iter_mut().zip(to) {
             let way = wrap(to - *angle);
-            duration = f64::max(duration, PEAK * way.abs() / SLEW_RATE);
+            duration = f64::max(duration, PEAK * way.abs() / rate);
             *angle += way;
         }
         self.slew_within(target, duration);

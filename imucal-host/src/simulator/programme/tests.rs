@@ -60,6 +60,28 @@ fn multi_position_has_two_dozen_attitudes_all_faces_and_six_revisits() {
 }
 
 #[test]
+fn a_mixed_programme_shows_every_face_and_turns_every_gimbal_in_whatever_time_it_is_given() {
+    for (seed, duration) in [(1, 120.0), (2, 200.0), (3, 400.0), (4, 650.0), (5, 120.0), (6, 150.0)] {
+        let axes = AXES[seed as usize % 3];
+        let schedule = Programme::Mixed.schedule(axes, seed, Some(duration), Place::ankara()).unwrap();
+        assert!((schedule.duration() - duration).abs() < 1e-9);
+        let downs: Vec<Vector3<f64>> = schedule.rests().iter().map(|t| schedule.down(*t)).collect();
+        for face in [Vector3::x(), Vector3::y(), Vector3::z()] {
+            for face in [face, -face] {
+                assert!(downs.iter().any(|down| down.dot(&face) > 0.99), "{seed} {face:?}");
+            }
+        }
+        let rows = (0..4000).map(|k| schedule.truth(duration * f64::from(k) / 4000.0, &|_| ()));
+        let fastest = rows.fold([0.0f64; 3], |fastest, row| {
+            std::array::from_fn(|k| fastest[k].max(row.gimbals[k].rate.abs()))
+        });
+        assert!(fastest.iter().all(|rate| (0.25..3.3).contains(rate)), "{seed} {fastest:?}");
+    }
+    let rests = |seed| schedule(Programme::Mixed, AXES[0], seed).rests().len();
+    assert!((0..10).any(|seed| rests(seed) != rests(10)));
+}
+
+#[test]
 fn the_gyroscope_s_slews_reach_150_degrees() {
     let schedule = schedule(Programme::Gyroscope, AXES[0], 2);
     let largest = (0..1200)

@@ -130,7 +130,7 @@ fn effects_are_applied_in_the_chain_s_order_whatever_the_order_given() {
 
 #[test]
 fn a_late_clock_shows_the_rig_as_it_was() {
-    let offset = 0.02;
+    let offset = -0.02;
     let mut simulation = short();
     let effect = find("clk.time_offset").unwrap();
     simulation.doses = vec![Dose { effect, values: vec![offset] }];

@@ -1,35 +1,97 @@
-//! Drift of a bias: a sum of first-order Gauss–Markov processes a decade apart, whose spectrum falls as 1/f between
-//! them.
+//! Drift of a bias, of one of several kinds.
 
 use nalgebra::Vector3;
 
 use crate::simulator::random::Random;
 
-/// Correlation times of the processes, s.
-const TIMES: [f64; 3] = [10.0, 100.0, 1000.0];
+/// How a drift moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DriftKind {
+    /// A sum of first-order Gauss–Markov processes a decade apart, whose spectrum falls as 1/f between them.
+    #[default]
+    Flicker,
+    /// One Gauss–Markov process that forgets within half a minute.
+    Quick,
+    /// One Gauss–Markov process that forgets within minutes.
+    Slow,
+    /// A random walk from zero, which reaches the drift's standard deviation within five minutes.
+    Walk,
+}
+
+/// Time in which a random walk goes as far as the drift's standard deviation, s.
+const WALK: f64 = 300.0;
+
+impl DriftKind {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Flicker, Self::Quick, Self::Slow, Self::Walk];
+
+    /// Its name in labels.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Flicker => "flicker",
+            Self::Quick => "quick",
+            Self::Slow => "slow",
+            Self::Walk => "walk",
+        }
+    }
+
+    /// Correlation times of its Gauss–Markov processes, s.
+    fn times(self) -> &'static [f64] {
+        match self {
+            Self::Flicker => &[10.0, 100.0, 1000.0],
+            Self::Quick => &[25.0],
+            Self::Slow => &[200.0],
+            Self::Walk => &[],
+        }
+    }
+}
 
 /// Drift of the three biases of a triad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
     /// Standard deviation of the sum, SI unit.
     pub sigma: f64,
+    /// How it moves.
+    pub kind: DriftKind,
 }
 
 impl Drift {
-    /// One course of the drift, stationary from the beginning.
+    /// One course of the drift; all but a walk are stationary from the beginning.
     pub fn draw(&self, rows: usize, interval: f64, random: &mut Random) -> Vec<Vector3<f64>> {
-        let each = self.sigma / libm::sqrt(TIMES.len() as f64);
-        let kept = TIMES.map(|time| libm::exp(-interval / time));
-        let fresh = kept.map(|kept| each * libm::sqrt(1.0 - kept * kept));
-        let mut states = TIMES.map(|_| random.normals() * each);
+        if self.kind == DriftKind::Walk {
+            let step = self.sigma * libm::sqrt(interval / WALK);
+            let mut state = Vector3::zeros();
+            let mut walk = || {
+                let here = state;
+                state += random.normals() * step;
+                here
+            };
+            return (0..rows).map(|_| walk()).collect();
+        }
+        let times = self.kind.times();
+        let each = self.sigma / libm::sqrt(times.len() as f64);
+        let kept: Vec<f64> = times.iter().map(|time| libm::exp(-interval / time)).collect();
+        let fresh: Vec<f64> = kept.iter().map(|kept| each * libm::sqrt(1.0 - kept * kept)).collect();
+        let mut states: Vec<Vector3<f64>> = times.iter().map(|_| random.normals() * each).collect();
         let mut course = Vec::with_capacity(rows);
         for _ in 0..rows {
-            course.push(states[0] + states[1] + states[2]);
-            for ((state, kept), fresh) in states.iter_mut().zip(kept).zip(fresh) {
-                *state = *state * kept + random.normals() * fresh;
+            course.push(states.iter().fold(Vector3::zeros(), |sum, state| sum + state));
+            for ((state, kept), fresh) in states.iter_mut().zip(&kept).zip(&fresh) {
+                *state = *state * *kept + random.normals() * *fresh;
             }
         }
         course
+    }
+
+    /// Covariance of one axis between two times of the run, s.
+    pub fn covariance(&self, one: f64, other: f64) -> f64 {
+        let variance = self.sigma * self.sigma;
+        if self.kind == DriftKind::Walk {
+            return variance * one.min(other) / WALK;
+        }
+        let times = self.kind.times();
+        let lag = (one - other).abs();
+        variance / times.len() as f64 * times.iter().map(|time| libm::exp(-lag / time)).sum::<f64>()
     }
 }
 
@@ -41,12 +103,27 @@ mod tests {
     #[test]
     fn the_drift_has_its_standard_deviation_and_is_slow() {
         let mut random = Random::new(3, Purpose::Noise);
-        let course = Drift { sigma: 2.0 }.draw(400_000, 1.0, &mut random);
+        let course = Drift { sigma: 2.0, kind: DriftKind::Flicker }.draw(400_000, 1.0, &mut random);
         let rows = course.len() as f64;
         let variance = course.iter().map(|v| v.x * v.x).sum::<f64>() / rows;
         assert!((variance.sqrt() - 2.0).abs() < 0.2, "{variance}");
         let step = course.windows(2).map(|pair| (pair[1].x - pair[0].x).powi(2)).sum::<f64>() / rows;
         // Σ 2 (1 − e^(−1/τ)) σ² / 3
         assert!((step - 0.291).abs() < 0.02, "{step}");
+    }
+
+    #[test]
+    fn the_covariance_is_that_of_the_courses_drawn() {
+        for kind in DriftKind::ALL {
+            let drift = Drift { sigma: 1.5, kind };
+            let mut random = Random::new(8, Purpose::Noise);
+            let courses: Vec<_> = (0..3000).map(|_| drift.draw(61, 2.0, &mut random)).collect();
+            for (one, other) in [(60, 60), (20, 60), (5, 8)] {
+                let products = courses.iter().map(|course| course[one].dot(&course[other]) / 3.0);
+                let found = products.sum::<f64>() / courses.len() as f64;
+                let told = drift.covariance(2.0 * one as f64, 2.0 * other as f64);
+                assert!((found - told).abs() < 0.1 * 2.25, "{kind:?} {one} {other}: {found} {told}");
+            }
+        }
     }
 }

@@ -19,7 +19,7 @@ mod drift;
 mod gx2;
 mod mtx;
 
-pub use drift::Drift;
+pub use drift::{Drift, DriftKind};
 
 /// What a data sheet and raw recordings say of one triad, in SI units (m/s², rad/s, µT).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,6 +151,15 @@ impl UnitUnderTest {
             SensorKind::Mag => &self.mag,
         }
     }
+
+    /// One triad, to be altered.
+    pub(super) fn triad_mut(&mut self, kind: SensorKind) -> &mut TriadUnderTest {
+        match kind {
+            SensorKind::Acc => &mut self.acc,
+            SensorKind::Gyr => &mut self.gyr,
+            SensorKind::Mag => &mut self.mag,
+        }
+    }
 }
 
 fn draw_triad(sheet: &TriadSheet, rate: f64, random: &mut Random) -> TriadUnderTest {
@@ -165,7 +174,7 @@ fn draw_triad(sheet: &TriadSheet, rate: f64, random: &mut Random) -> TriadUnderT
         triad: Triad { gain: sensitivity.try_inverse().unwrap_or_else(Matrix3::identity), bias },
         full_scale: sheet.full_scale,
         noise: sheet.noise_density * f64::min(0.5 * rate, sheet.bandwidth).sqrt(),
-        drift: Drift { sigma: sheet.instability },
+        drift: Drift { sigma: sheet.instability, kind: DriftKind::default() },
         counts: Counts { offset: 32_768.0, per_unit: sheet.counts_per_unit },
     }
 }

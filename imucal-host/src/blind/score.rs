@@ -1,0 +1,286 @@
+//! The frozen scorer: the figures of the contract's table, from judged trials.
+
+use super::{
+    interval::clopper_pearson,
+    judgement::{Closed, Judgement, Truth},
+};
+
+/// What a figure has to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Goal {
+    /// At least this share.
+    AtLeast(f64),
+    /// At most this share.
+    AtMost(f64),
+    /// Between these shares.
+    Within(f64, f64),
+}
+
+impl Goal {
+    /// The figure is as it has to be.
+    pub fn is_met(self, figure: f64) -> bool {
+        match self {
+            Self::AtLeast(least) => figure >= least,
+            Self::AtMost(most) => figure <= most,
+            Self::Within(least, most) => (least..=most).contains(&figure),
+        }
+    }
+}
+
+/// One figure: a share of trials.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Share {
+    /// Of what.
+    pub name: &'static str,
+    /// Trials in which it was so.
+    pub hits: usize,
+    /// Trials.
+    pub trials: usize,
+    /// What it must be.
+    pub must: Option<Goal>,
+    /// What it ought to be.
+    pub aim: Option<Goal>,
+}
+
+impl Share {
+    /// Its estimate; `None` without trials.
+    pub fn estimate(&self) -> Option<f64> {
+        (self.trials > 0).then(|| self.hits as f64 / self.trials as f64)
+    }
+
+    /// Its 95 % interval.
+    pub fn interval(&self) -> [f64; 2] {
+        clopper_pearson(self.hits, self.trials)
+    }
+
+    /// It is what it must be; without trials nothing is.
+    pub fn meets_must(&self) -> bool {
+        self.must.is_none_or(|goal| self.estimate().is_some_and(|figure| goal.is_met(figure)))
+    }
+}
+
+/// How often what was said to be likely was so.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Calibration {
+    /// Probabilities said, from and below; the last bin holds 1.
+    pub bin: (f64, f64),
+    /// Their mean.
+    pub said: f64,
+    /// Causes that were there.
+    pub hits: usize,
+    /// Causes.
+    pub causes: usize,
+}
+
+/// All figures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Score {
+    /// Healthy and afflicted trials.
+    pub trials: [usize; 2],
+    /// The figures of the contract, in its order.
+    pub shares: Vec<Share>,
+    /// Mean of the closed share as said less the true one, its standard error and how many there are.
+    pub closed_bias: Option<(f64, f64, usize)>,
+    /// Figures beside the contract's.
+    pub beside: Vec<Share>,
+    /// Of the causes' probabilities, where all that is there is of the catalogue.
+    pub calibration: Vec<Calibration>,
+    /// Median and largest time of a diagnosis, s.
+    pub seconds: [f64; 2],
+}
+
+/// Largest bias of the closed share.
+pub const CLOSED_BIAS: [f64; 2] = [0.05, 0.02];
+/// Largest upper bound of false alarms.
+pub const ALARM_BOUND: f64 = 0.065;
+const BINS: [f64; 6] = [0.0, 0.5, 0.8, 0.95, 0.99, 1.0];
+
+use Goal::{AtLeast, AtMost, Within};
+
+/// Scores judged trials.
+pub fn score(judged: &[Judgement]) -> Score {
+    let healthy = |j: &Judgement| j.truth == Truth::Healthy;
+    let one = |j: &Judgement| j.truth == Truth::Catalogue(1);
+    let in_catalogue = |j: &Judgement| matches!(j.truth, Truth::Catalogue(_));
+    let outside = |j: &Judgement| j.truth == Truth::Outside;
+    let share = |name, of: &dyn Fn(&Judgement) -> bool, hit: &dyn Fn(&Judgement) -> bool, must, aim| {
+        let trials: Vec<&Judgement> = judged.iter().filter(|j| of(j)).collect();
+        let hits = trials.iter().filter(|j| hit(j)).count();
+        Share { name, hits, trials: trials.len(), must, aim }
+    };
+    let right = |j: &Judgement| j.classes_right;
+    let claimed: Vec<Closed> = judged.iter().filter_map(|j| j.closed).collect();
+    let covered =
+        |closed: &Closed| closed.interval.is_some_and(|[low, high]| (low..=high).contains(&closed.truly));
+    let shares = vec![
+        share(
+            "false alarm on healthy recordings",
+            &healthy,
+            &|j| j.alarmed,
+            Some(AtMost(0.05)),
+            Some(AtMost(0.05)),
+        ),
+        share(
+            "one effect, class-correct, λ ≥ 100",
+            &|j| one(j) && j.lambda >= 100.0,
+            &right,
+            Some(AtLeast(0.95)),
+            None,
+        ),
+        share(
+            "one effect, class-correct, λ ≥ 60",
+            &|j| one(j) && j.lambda >= 60.0,
+            &right,
+            None,
+            Some(AtLeast(0.98)),
+        ),
+        share("one effect, exact or declared equivalent", &one, &|j| j.exact, Some(AtLeast(0.9)), None),
+        share(
+            "one effect, exact or declared equivalent, λ ≥ 100",
+            &|j| one(j) && j.lambda >= 100.0,
+            &|j| j.exact,
+            None,
+            Some(AtLeast(0.97)),
+        ),
+        share(
+            "95 % credible set holds the truth, one effect",
+            &one,
+            &|j| j.credible,
+            Some(AtLeast(0.93)),
+            Some(Within(0.94, 0.98)),
+        ),
+        share(
+            "two effects, exact set of classes",
+            &|j| j.truth == Truth::Catalogue(2),
+            &right,
+            Some(AtLeast(0.85)),
+            Some(AtLeast(0.95)),
+        ),
+        share(
+            "three effects, exact set of classes",
+            &|j| j.truth == Truth::Catalogue(3),
+            &right,
+            Some(AtLeast(0.75)),
+            Some(AtLeast(0.90)),
+        ),
+        share(
+            "an effect asserted that is not there",
+            &in_catalogue,
+            &|j| j.absent_asserted,
+            Some(AtMost(0.10)),
+            Some(AtMost(0.05)),
+        ),
+        share(
+            "outside the catalogue, flagged, λ ≥ 200",
+            &|j| outside(j) && j.lambda >= 200.0,
+            &|j| j.flagged,
+            Some(AtLeast(0.70)),
+            Some(AtLeast(0.85)),
+        ),
+        share(
+            "outside the catalogue, flagged, λ > 800",
+            &|j| outside(j) && j.lambda > 800.0,
+            &|j| j.flagged,
+            None,
+            Some(AtLeast(0.95)),
+        ),
+        share("within the catalogue, flagged", &in_catalogue, &|j| j.flagged, None, Some(AtMost(0.03))),
+        Share {
+            name: "closed share's interval holds the true one",
+            hits: claimed.iter().filter(|closed| covered(closed)).count(),
+            trials: claimed.len(),
+            must: Some(AtLeast(0.90)),
+            aim: Some(Within(0.93, 0.98)),
+        },
+    ];
+    let between = |low: f64, high: f64| move |j: &Judgement| one(j) && (low..high).contains(&j.lambda);
+    let beside = vec![
+        share("one effect, class-correct, λ < 60", &between(0.0, 60.0), &right, None, None),
+        share("one effect, class-correct, λ 60 to 100", &between(60.0, 100.0), &right, None, None),
+        share("one effect, class-correct, λ 100 to 300", &between(100.0, 300.0), &right, None, None),
+        share(
+            "one effect, class-correct, λ 300 and more",
+            &between(300.0, f64::INFINITY),
+            &right,
+            None,
+            None,
+        ),
+        share(
+            "one effect, its class or a declared equivalent's, λ ≥ 100",
+            &|j| one(j) && j.lambda >= 100.0,
+            &|j| j.right_or_equivalent,
+            None,
+            None,
+        ),
+        share("credible set, λ < 100", &between(0.0, 100.0), &|j| j.credible, None, None),
+        share("credible set, λ 100 to 300", &between(100.0, 300.0), &|j| j.credible, None, None),
+        share("credible set, λ 300 and more", &between(300.0, f64::INFINITY), &|j| j.credible, None, None),
+        share(
+            "two effects, each λ ≥ 60 beside the other, exact",
+            &|j| j.truth == Truth::Catalogue(2) && j.lambda_beside >= 60.0,
+            &right,
+            None,
+            None,
+        ),
+        share(
+            "three effects, each λ ≥ 60 beside the others, exact",
+            &|j| j.truth == Truth::Catalogue(3) && j.lambda_beside >= 60.0,
+            &right,
+            None,
+            None,
+        ),
+        share(
+            "outside the catalogue, flagged, λ < 200",
+            &|j| outside(j) && j.lambda < 200.0,
+            &|j| j.flagged,
+            None,
+            None,
+        ),
+        share("without an answer", &|_| true, &|j| j.answer.verdict.is_none(), None, None),
+    ];
+    let mut seconds: Vec<f64> = judged.iter().map(|j| j.seconds).collect();
+    seconds.sort_by(f64::total_cmp);
+    let trials_healthy = judged.iter().filter(|j| healthy(j)).count();
+    Score {
+        trials: [trials_healthy, judged.len() - trials_healthy],
+        shares,
+        closed_bias: bias(&claimed),
+        beside,
+        calibration: calibration(judged),
+        seconds: [seconds.get(seconds.len() / 2), seconds.last()].map(|s| s.copied().unwrap_or(0.0)),
+    }
+}
+
+/// Mean and standard error of what is said less what is true.
+fn bias(claimed: &[Closed]) -> Option<(f64, f64, usize)> {
+    let errors: Vec<f64> = claimed.iter().filter_map(|closed| Some(closed.said? - closed.truly)).collect();
+    let n = errors.len() as f64;
+    let mean = errors.iter().sum::<f64>() / n;
+    let variance = errors.iter().map(|error| (error - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    (!errors.is_empty()).then(|| (mean, (variance / n).sqrt(), errors.len()))
+}
+
+fn calibration(judged: &[Judgement]) -> Vec<Calibration> {
+    let said: Vec<(f64, bool)> = judged
+        .iter()
+        .filter(|j| matches!(j.truth, Truth::Catalogue(_)))
+        .flat_map(|j| j.answer.causes.iter().map(|cause| (cause, j.is_right_of(cause))))
+        .filter_map(|(cause, right)| Some((cause.probability?, right)))
+        .collect();
+    let bin = |bounds: &[f64]| {
+        let (low, high) = (bounds[0], bounds[1]);
+        let last = high >= 1.0;
+        let inside: Vec<&(f64, bool)> =
+            said.iter().filter(|(p, _)| *p >= low && (*p < high || last)).collect();
+        Calibration {
+            bin: (low, high),
+            said: inside.iter().map(|(p, _)| p).sum::<f64>() / inside.len().max(1) as f64,
+            hits: inside.iter().filter(|(_, right)| *right).count(),
+            causes: inside.len(),
+        }
+    };
+    BINS.windows(2).map(bin).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,99 @@
+//! Under what a trial's recording is made: drawn anew for each, wider than the simulator's defaults.
+
+use nalgebra::Vector3;
+
+use crate::{
+    recording::{gravity::normal_gravity, manifest::Axis},
+    simulator::{Conditions, DriftKind, NoiseLevel, Place, Programme, Simulation, UnitKind, random::Random},
+};
+
+/// Orders of the gimbals, outermost first.
+const AXES: [[Axis; 3]; 6] = [
+    [Axis::Z, Axis::Y, Axis::X],
+    [Axis::Z, Axis::X, Axis::Y],
+    [Axis::Y, Axis::Z, Axis::X],
+    [Axis::Y, Axis::X, Axis::Z],
+    [Axis::X, Axis::Y, Axis::Z],
+    [Axis::X, Axis::Z, Axis::Y],
+];
+/// Sampling rates, Hz.
+const RATES: [f64; 5] = [50.0, 75.0, 100.0, 100.0, 128.0];
+/// Lengths, s.
+const DURATION: (f64, f64) = (120.0, 650.0);
+/// White noise against the sheet's.
+const WHITE: (f64, f64) = (0.5, 2.0);
+/// Drift against the sheet's.
+const DRIFT: (f64, f64) = (0.3, 3.0);
+/// Scatter of the rests, degrees.
+const SCATTER: (f64, f64) = (0.0005, 0.004);
+
+/// Evenly in its logarithm.
+pub(super) fn logarithmic((low, high): (f64, f64), random: &mut Random) -> f64 {
+    low * libm::pow(high / low, random.share())
+}
+
+/// A recording without effects.
+pub(super) fn draw(seed: u64, random: &mut Random) -> Simulation {
+    let programme = match random.share() {
+        share if share < 0.75 => Programme::Mixed,
+        share if share < 0.83 => Programme::MultiPosition,
+        share if share < 0.91 => Programme::Thermal,
+        _ => Programme::Full,
+    };
+    // The others last as long as they take, and mixed ones what they are given.
+    let duration = logarithmic(DURATION, random);
+    Simulation {
+        unit: UnitKind::ALL[random.below(UnitKind::ALL.len())],
+        programme,
+        axes: AXES[random.below(AXES.len())],
+        rate: RATES[random.below(RATES.len())],
+        duration: (programme == Programme::Mixed).then_some(duration),
+        seed,
+        conditions: conditions(random),
+        ..Simulation::default()
+    }
+}
+
+fn conditions(random: &mut Random) -> Conditions {
+    let level = |random: &mut Random| NoiseLevel {
+        white: logarithmic(WHITE, random),
+        drift: logarithmic(DRIFT, random),
+        kind: DriftKind::ALL[random.below(DriftKind::ALL.len())],
+    };
+    let noise = [level(random), level(random), level(random)];
+    Conditions { place: place(random), noise, scatter: logarithmic(SCATTER, random).to_radians() }
+}
+
+/// Somewhere on Earth; the field is that of a dipole, give or take.
+fn place(random: &mut Random) -> Place {
+    let latitude_deg = random.between(-60.0, 65.0);
+    let height = random.between(0.0, 1500.0);
+    let (sin, cos) = libm::sincos(f64::to_radians(latitude_deg));
+    let declination = random.between(-0.25, 0.25);
+    let strength = random.between(28.0, 32.0);
+    let level = strength * cos;
+    let field_n =
+        Vector3::new(level * libm::cos(declination), level * libm::sin(declination), 2.0 * strength * sin);
+    Place { latitude_deg, height, gravity: normal_gravity(latitude_deg, height), field_n }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulator::random::Purpose;
+
+    #[test]
+    fn recordings_last_two_to_eleven_minutes_and_differ() {
+        let mut programmes = Vec::new();
+        let mut random = Random::new(4, Purpose::Case);
+        for seed in 0..60 {
+            let simulation = draw(seed, &mut random);
+            let duration = crate::simulator::Motion::duration(&simulation.schedule().unwrap());
+            assert!((119.0..651.0).contains(&duration), "{duration} {simulation:?}");
+            if !programmes.contains(&simulation.programme.name()) {
+                programmes.push(simulation.programme.name());
+            }
+        }
+        assert_eq!(programmes.len(), 4, "{programmes:?}");
+    }
+}

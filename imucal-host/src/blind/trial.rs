@@ -1,0 +1,288 @@
+//! Runs a set of sealed trials, over threads, and goes on where it was interrupted.
+//!
+//! A folder holds `set.json`, which set it is; `seals.jsonl`, a label's hash a line, written before that case's
+//! recording is diagnosed; and `answers.jsonl`, a finished trial a line, with the label opened.
+
+use std::{
+    fs::{self, File, OpenOptions},
+    io::{self, Write},
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::{Path, PathBuf},
+    sync::{
+        Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::Instant,
+};
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    answer::{Answer, Finished, truly_closed},
+    case::{Case, draw},
+    seal::{Nonce, digest},
+};
+use crate::{
+    diagnosis::Diagnosis,
+    recording::{AtomicFile, Recording},
+    simulator::SimulationError,
+};
+
+/// Why there are no trials; its text says what to do.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // The fields are those of each message.
+pub enum TrialError {
+    /// A file of the folder.
+    #[error("{}: {cause}; check the folder", path.display())]
+    File { path: PathBuf, cause: io::Error },
+    /// The folder holds another set.
+    #[error(
+        "{}: found the set of nonce {found}, expected {expected}; choose another folder, or leave the nonce out to go on with it",
+        path.display()
+    )]
+    OtherSet { path: PathBuf, found: String, expected: String },
+    /// A line that cannot be read, and is not the last.
+    #[error("{}, line {line}: found {found}, expected a finished trial; remove the line and run again", path.display())]
+    Damaged { path: PathBuf, line: usize, found: String },
+    /// A label is not the one that was sealed.
+    #[error("{case}: its label's hash is {found}, expected {sealed} as sealed; the set cannot be trusted")]
+    Broken { case: String, found: String, sealed: String },
+    /// A label without a seal.
+    #[error("{case}: found no seal, expected one from before the diagnosis; the set cannot be trusted")]
+    Unsealed { case: String },
+    /// A case cannot be simulated.
+    #[error("{case}: {cause}")]
+    Simulation { case: String, cause: SimulationError },
+}
+
+/// Which set a folder holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Set {
+    format: String,
+    nonce: String,
+}
+
+/// The seal of one case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Seal {
+    case: String,
+    sha256: String,
+}
+
+/// A folder with a set of trials.
+#[derive(Clone, Debug)]
+pub struct Folder {
+    path: PathBuf,
+    nonce: Nonce,
+}
+
+impl Folder {
+    /// Opens a folder or makes it, with this nonce, or its own, or a fresh one.
+    ///
+    /// # Errors
+    ///
+    /// [`TrialError::OtherSet`], [`TrialError::File`].
+    pub fn open(path: &Path, nonce: Option<Nonce>) -> Result<Self, TrialError> {
+        let set_path = path.join("set.json");
+        let failed = |cause| TrialError::File { path: set_path.clone(), cause };
+        if let Some(found) = Self::nonce_of(path)? {
+            return match nonce.filter(|wanted| *wanted != found) {
+                None => Ok(Self { path: path.to_owned(), nonce: found }),
+                Some(wanted) => {
+                    Err(TrialError::OtherSet { path: set_path, found: found.hex(), expected: wanted.hex() })
+                }
+            };
+        }
+        fs::create_dir_all(path).map_err(failed)?;
+        let nonce = match nonce {
+            Some(nonce) => nonce,
+            None => Nonce::fresh().map_err(|cause| failed(io::Error::other(cause.to_string())))?,
+        };
+        let set = Set { format: "imucal-blind/1".to_owned(), nonce: nonce.hex() };
+        let text = serde_json::to_string_pretty(&set).unwrap_or_default() + "\n";
+        AtomicFile::write_whole(&set_path, text.as_bytes()).map_err(failed)?;
+        Ok(Self { path: path.to_owned(), nonce })
+    }
+
+    fn nonce_of(path: &Path) -> Result<Option<Nonce>, TrialError> {
+        let path = path.join("set.json");
+        let text = match fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(cause) if cause.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(cause) => return Err(TrialError::File { path, cause }),
+        };
+        let nonce = serde_json::from_str::<Set>(&text).ok().and_then(|set| Nonce::parse(&set.nonce));
+        match nonce {
+            Some(nonce) => Ok(Some(nonce)),
+            None => Err(TrialError::Damaged { path, line: 1, found: text }),
+        }
+    }
+
+    /// Its nonce.
+    pub fn nonce(&self) -> Nonce {
+        self.nonce
+    }
+
+    /// Trials that are over, in the order of their names, each against its seal.
+    ///
+    /// # Errors
+    ///
+    /// [`TrialError`], but for simulations.
+    pub fn finished(&self) -> Result<Vec<Finished>, TrialError> {
+        let mut finished: Vec<Finished> = lines(&self.path.join("answers.jsonl"))?;
+        finished.sort_by(|a, b| a.case.cmp(&b.case));
+        finished.dedup_by(|a, b| a.case == b.case);
+        let seals: Vec<Seal> = lines(&self.path.join("seals.jsonl"))?;
+        for trial in &finished {
+            let Some(seal) = seals.iter().find(|seal| seal.case == trial.case) else {
+                return Err(TrialError::Unsealed { case: trial.case.clone() });
+            };
+            if seal.sha256 != trial.seal() {
+                let (case, found, sealed) = (trial.case.clone(), trial.seal(), seal.sha256.clone());
+                return Err(TrialError::Broken { case, found, sealed });
+            }
+        }
+        Ok(finished)
+    }
+
+    /// Runs those of the cases that are not over yet, so many at a time; `heard` is told how many of all are over.
+    ///
+    /// # Errors
+    ///
+    /// [`TrialError`].
+    pub fn run(
+        &self,
+        cases: &[Case],
+        jobs: usize,
+        diagnose: &(dyn Fn(&Recording) -> Diagnosis + Sync),
+        heard: &(dyn Fn(usize) + Sync),
+    ) -> Result<(), TrialError> {
+        let over: Vec<String> = self.finished()?.into_iter().map(|trial| trial.case).collect();
+        let left: Vec<Case> = cases.iter().copied().filter(|case| !over.contains(&case.name())).collect();
+        let writer = Writer::open(&self.path)?;
+        let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(cases.len() - left.len()));
+        let failure: Mutex<Option<TrialError>> = Mutex::new(None);
+        let work = || {
+            while let Some(case) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
+                if let Err(error) = trial(&self.nonce, *case, diagnose, &writer) {
+                    next.store(left.len(), Ordering::Relaxed);
+                    failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_or_insert(error);
+                }
+                heard(done.fetch_add(1, Ordering::Relaxed) + 1);
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..jobs.max(1) {
+                // Each in a pool of its own: a worker that waits must not begin another case meanwhile.
+                scope.spawn(|| match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
+                    Ok(pool) => pool.install(work),
+                    Err(_) => work(),
+                });
+            }
+        });
+        match failure.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
+            Some(error) => Err(error),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The cases of a set, healthy and afflicted ones mingled, so that an interrupted set has some of both.
+pub fn mingled(healthy: usize, afflicted: usize) -> Vec<Case> {
+    let share = |index: usize, count: usize| (index as f64 + 0.5) / count as f64;
+    let mut cases: Vec<(f64, Case)> = (0..healthy).map(|k| (share(k, healthy), Case::Healthy(k))).collect();
+    cases.extend((0..afflicted).map(|k| (share(k, afflicted), Case::Afflicted(k))));
+    cases.sort_by(|a, b| a.0.total_cmp(&b.0));
+    cases.into_iter().map(|(_, case)| case).collect()
+}
+
+/// One trial: drawn, sealed, recorded, diagnosed, opened.
+fn trial(
+    nonce: &Nonce,
+    case: Case,
+    diagnose: &(dyn Fn(&Recording) -> Diagnosis + Sync),
+    writer: &Writer,
+) -> Result<(), TrialError> {
+    let name = case.name();
+    let failed = |cause| TrialError::Simulation { case: name.clone(), cause };
+    let drawn = draw(nonce, case).map_err(failed)?;
+    let label = serde_json::to_string(&drawn.label).unwrap_or_default();
+    writer.seals.write(&Seal { case: name.clone(), sha256: digest(&label) })?;
+    let recording = drawn.simulation.record(&format!("{name}.csv")).map_err(failed)?;
+    let start = Instant::now();
+    // A diagnosis that panics has failed this trial, and not the set.
+    let diagnosis = catch_unwind(AssertUnwindSafe(|| diagnose(&recording))).ok();
+    let seconds = start.elapsed().as_secs_f64();
+    let answer = Answer::of(diagnosis.as_ref());
+    let truly_closed = truly_closed(&drawn, &answer).unwrap_or(None);
+    writer.answers.write(&Finished { case: name, label, answer, truly_closed, seconds })
+}
+
+/// The files that grow.
+struct Writer {
+    seals: Lines,
+    answers: Lines,
+}
+
+impl Writer {
+    fn open(folder: &Path) -> Result<Self, TrialError> {
+        Ok(Self {
+            seals: Lines::open(folder.join("seals.jsonl"))?,
+            answers: Lines::open(folder.join("answers.jsonl"))?,
+        })
+    }
+}
+
+/// A file of JSON lines.
+struct Lines {
+    path: PathBuf,
+    file: Mutex<File>,
+}
+
+impl Lines {
+    fn open(path: PathBuf) -> Result<Self, TrialError> {
+        let open = || {
+            // What an interruption left of a line is cut off.
+            let whole = match fs::read(&path) {
+                Ok(bytes) => bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1),
+                Err(cause) if cause.kind() == io::ErrorKind::NotFound => 0,
+                Err(cause) => return Err(cause),
+            };
+            let file = OpenOptions::new().create(true).append(true).open(&path)?;
+            file.set_len(whole as u64)?;
+            Ok(file)
+        };
+        match open() {
+            Ok(file) => Ok(Self { path, file: Mutex::new(file) }),
+            Err(cause) => Err(TrialError::File { path, cause }),
+        }
+    }
+
+    fn write(&self, value: &impl Serialize) -> Result<(), TrialError> {
+        let failed = |cause| TrialError::File { path: self.path.clone(), cause };
+        let line = serde_json::to_string(value).map_err(|cause| failed(io::Error::other(cause)))? + "\n";
+        let mut file = self.file.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        file.write_all(line.as_bytes()).map_err(failed)
+    }
+}
+
+/// All whole lines of a file; none without the file.
+fn lines<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Vec<T>, TrialError> {
+    let text = match fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(cause) if cause.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(cause) => return Err(TrialError::File { path: path.to_owned(), cause }),
+    };
+    let whole = text.rfind('\n').map_or("", |end| &text[..end]);
+    let read = |(at, line): (usize, &str)| {
+        serde_json::from_str(line).map_err(|cause| TrialError::Damaged {
+            path: path.to_owned(),
+            line: at + 1,
+            found: cause.to_string(),
+        })
+    };
+    whole.lines().enumerate().map(read).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,111 @@
+//! `imucal blind`
+
+use std::{
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+};
+
+use anyhow::Context;
+use clap::Args;
+
+use super::{
+    Ending,
+    output::{self, say},
+    progress::Progress,
+};
+use crate::{
+    blind::{
+        case::{Case, draw},
+        judgement::Judgement,
+        score::score,
+        seal::Nonce,
+        trial::{Folder, mingled},
+    },
+    diagnosis::{Options, diagnose},
+};
+
+#[derive(Args, Debug)]
+pub(super) struct Arguments {
+    /// Recordings with one, two or three effects of the catalogue, or with one from outside; 600 tell the figures
+    #[arg(long, value_name = "N", default_value_t = 24)]
+    cases: usize,
+    /// Recordings without an effect; 1000 tell the figures
+    #[arg(long, value_name = "N", default_value_t = 40)]
+    healthy: usize,
+    /// Folder of the set; a set that was interrupted goes on, and more cases may be asked of one that is over
+    #[arg(long, value_name = "DIR", default_value = "imucal-blind")]
+    out: PathBuf,
+    /// Draw the cases of this nonce, up to 64 hexadecimal digits, instead of a fresh one
+    #[arg(long, value_name = "HEX", value_parser = nonce)]
+    nonce: Option<Nonce>,
+    /// Cases at a time; as many as there are cores if not given
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
+    /// Name the cases that were missed, with what was there and what was answered
+    #[arg(long)]
+    misses: bool,
+    /// Only score what the folder DIR holds
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["cases", "healthy", "out", "nonce", "jobs", "open"])]
+    score: Option<PathBuf>,
+    /// Only write the recording of this case, such as afflicted-0003, and its label into --out
+    #[arg(long, value_name = "CASE", value_parser = case, requires = "nonce")]
+    open: Option<Case>,
+}
+
+fn nonce(text: &str) -> Result<Nonce, String> {
+    Nonce::parse(text).ok_or_else(|| format!("`{text}` is no nonce; expected one to 64 hexadecimal digits"))
+}
+
+fn case(text: &str) -> Result<Case, String> {
+    Case::find(text)
+        .ok_or_else(|| format!("there is no case `{text}`; expected such as healthy-0012 or afflicted-0003"))
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    if let (Some(case), Some(nonce)) = (arguments.open, arguments.nonce) {
+        return open(nonce, case, &arguments.out);
+    }
+    let folder = match &arguments.score {
+        Some(path) => {
+            anyhow::ensure!(
+                path.is_dir(),
+                "{}: found no folder, expected one of an earlier run",
+                path.display()
+            );
+            Folder::open(path, None)?
+        }
+        None => trials(arguments)?,
+    };
+    let judged: Vec<Judgement> = folder.finished()?.iter().filter_map(Judgement::of).collect();
+    say!("Set of nonce {}.", folder.nonce().hex());
+    output::text(&score(&judged).table())?;
+    if arguments.misses {
+        for judgement in judged.iter().filter(|judgement| judgement.is_missed()) {
+            say!("{}", judgement.line());
+        }
+    }
+    Ok(Ending::Done)
+}
+
+fn trials(arguments: &Arguments) -> anyhow::Result<Folder> {
+    let folder = Folder::open(&arguments.out, arguments.nonce)?;
+    let cases = mingled(arguments.healthy, arguments.cases);
+    let cores = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    let jobs = arguments.jobs.unwrap_or(cores).get();
+    let progress = Progress::start();
+    let heard = |over: usize| progress.stage(&format!("{over} of {} cases", cases.len()));
+    folder.run(&cases, jobs, &|recording| diagnose(recording, &Options::default(), &|_| ()), &heard)?;
+    Ok(folder)
+}
+
+/// Writes one case for a closer look.
+fn open(nonce: Nonce, case: Case, folder: &Path) -> anyhow::Result<Ending> {
+    let drawn = draw(&nonce, case)?;
+    std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    let name = format!("{}.csv.gz", case.name());
+    drawn.simulation.record(&name)?.write(&folder.join(&name))?;
+    let label = folder.join(format!("{}.label.json", case.name()));
+    output::file(&label, &(serde_json::to_string_pretty(&drawn.label)? + "\n"))?;
+    say!("{}", folder.join(&name).display());
+    Ok(Ending::Done)
+}

@@ -1,0 +1,84 @@
+//! `imucal diagnose`
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::Args;
+
+use super::{Ending, load, output, progress::Progress, read, refuse, simulate::unknown};
+use crate::{
+    diagnosis::{Diagnosis, Options, Verdict, diagnose},
+    effect::{self, CATALOGUE},
+    report,
+};
+
+#[derive(Args, Debug)]
+pub(super) struct Arguments {
+    /// The recording to diagnose: NAME.csv, NAME.csv.gz (or NAME.parquet), with NAME.toml beside it
+    #[arg(required_unless_present = "list")]
+    recording: Option<PathBuf>,
+    /// The unit's present model, as `imucal calibrate` wrote it (default: calibrated from the recording)
+    #[arg(long, value_name = "CAL")]
+    model: Option<PathBuf>,
+    /// Withhold effects from what may explain the gap, or take terms (such as acc.misalignment) out of the baseline
+    #[arg(long, value_name = "EFFECT_OR_TERM", num_args = 1.., value_parser = known)]
+    without: Vec<String>,
+    /// Write everything as JSON; `-` prints it instead of the report
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Say of every effect what it is, how large it usually is, what shows it and what it is mistaken for
+    #[arg(long)]
+    list: bool,
+}
+
+/// An id of the catalogue.
+fn known(id: &str) -> Result<String, String> {
+    let ids = CATALOGUE.iter().map(|effect| effect.id.as_str());
+    effect::find(id).map(|effect| effect.id.clone()).ok_or_else(|| unknown("effect or term", id, ids))
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let Some(path) = arguments.recording.as_deref().filter(|_| !arguments.list) else {
+        output::text(&report::catalogue::catalogue())?;
+        return Ok(Ending::Done);
+    };
+    let outputs: Vec<PathBuf> =
+        arguments.json.iter().filter(|path| path.as_os_str() != "-").cloned().collect();
+    let mut inputs = output::files_of(path);
+    inputs.extend(arguments.model.clone());
+    output::check(&inputs, &outputs)?;
+    let recording = read(path)?;
+    let model = match arguments.model.as_deref().map(load).transpose()? {
+        Some(Err(damaged)) => return Ok(refuse(&damaged)),
+        model => model.and_then(Result::ok),
+    };
+    let options = Options { without: arguments.without.clone(), model };
+    let progress = Progress::start();
+    let diagnosis = diagnose(&recording, &options, &|stage| progress.stage(stage));
+    drop(progress);
+    print(arguments, &diagnosis)?;
+    Ok(if diagnosis.verdict == Verdict::NotTestable { Ending::Refused } else { Ending::Done })
+}
+
+fn print(arguments: &Arguments, diagnosis: &Diagnosis) -> anyhow::Result<()> {
+    if let Some(path) = &arguments.json {
+        let text =
+            serde_json::to_string_pretty(diagnosis).context("the diagnosis cannot be spelt as JSON")? + "\n";
+        if path.as_os_str() == "-" {
+            return output::text(&text);
+        }
+        output::file(path, &text)?;
+    }
+    output::text(&report::diagnosis::page(diagnosis))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_the_catalogue_holds_can_be_left_out() {
+        assert_eq!(known("acc.misalignment").unwrap(), "acc.misalignment");
+        assert!(known("acc.misalinment").unwrap_err().contains("did you mean `acc.misalignment`"));
+    }
+}

@@ -1,0 +1,63 @@
+//! Which other effects could stand in a cause's place.
+
+use super::{
+    noise::NEAR,
+    search::{Judged, Linear},
+};
+use crate::effect::Effect;
+
+/// Alternatives judged with a noise of their own.
+const JUDGED: usize = 5;
+/// Alternatives further below in ln of probability are not judged.
+const FAR: f64 = 25.0;
+/// Probability that a credible set holds.
+const CREDIBLE: f64 = 0.95;
+
+/// A cause among those that could stand in its place.
+#[derive(Clone, Debug)]
+pub struct Standing {
+    /// Its probability.
+    pub probability: f64,
+    /// The others of the credible set, likeliest first.
+    pub equivalents: Vec<&'static Effect>,
+    /// The set, likeliest first, the cause among them.
+    pub set: Vec<&'static Effect>,
+}
+
+/// The standing of one cause of a set.
+pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> Option<Standing> {
+    let rest: Vec<&'static Effect> =
+        best.set.iter().copied().filter(|effect| !std::ptr::eq(*effect, cause)).collect();
+    let (_, ranked) = linear.ranked(&rest, &best.noise)?;
+    let own = ranked.iter().find(|(_, effect)| std::ptr::eq(*effect, cause))?.0;
+    let mut judged: Vec<(f64, &'static Effect)> = vec![(best.log_evidence, cause)];
+    let others = ranked.iter().filter(|(value, effect)| !std::ptr::eq(*effect, cause) && *value > own - FAR);
+    for (_, effect) in others.take(JUDGED) {
+        let mut set = rest.clone();
+        set.push(effect);
+        let anew: Vec<_> = cause.sensors.iter().chain(effect.sensors).copied().collect();
+        if let Some(found) = linear.judge(&set, &best.noise, &anew, &NEAR) {
+            judged.push((found.log_evidence, effect));
+        }
+    }
+    judged.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let most = judged[0].0;
+    let total: f64 = judged.iter().map(|(value, _)| (value - most).exp()).sum();
+    let probability = |value: f64| (value - most).exp() / total;
+    let mut set = Vec::new();
+    let mut held = 0.0;
+    for (value, effect) in &judged {
+        if held < CREDIBLE {
+            set.push(*effect);
+        }
+        held += probability(*value);
+    }
+    if !set.iter().any(|effect| std::ptr::eq(*effect, cause)) {
+        set.push(cause);
+    }
+    Some(Standing {
+        probability: probability(best.log_evidence),
+        equivalents: set.iter().copied().filter(|effect| !std::ptr::eq(*effect, cause)).collect(),
+        set,
+    })
+}

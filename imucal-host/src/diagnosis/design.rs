@@ -1,0 +1,216 @@
+//! Signatures as columns, channel by channel, and the normal equations of any covariance.
+//!
+//! A channel is one axis of one sensor. Columns are in usual sizes of their parameters, so that one means usual.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use rayon::prelude::*;
+
+use super::{
+    scene::{Means, Scene},
+    whitening::Whitening,
+};
+use crate::{effect::Effect, recording::SensorKind};
+
+/// What a column stands for.
+#[derive(Clone, Copy, Debug)]
+pub struct Column {
+    /// The effect.
+    pub effect: &'static Effect,
+    /// Index of its parameter.
+    pub parameter: usize,
+}
+
+impl Column {
+    /// It belongs to this effect.
+    pub fn is_of(&self, effect: &Effect) -> bool {
+        std::ptr::eq(self.effect, effect)
+    }
+}
+
+/// One axis of one sensor: its residual and the columns that reach it.
+#[derive(Clone, Debug)]
+pub struct Channel {
+    /// Sensor.
+    pub kind: SensorKind,
+    /// Axis, 0 to 2.
+    pub axis: usize,
+    /// Indices of the columns that are not zero here.
+    pub ids: Vec<usize>,
+    /// Those columns, a row a block.
+    pub x: DMatrix<f64>,
+    /// Residual of each block.
+    pub y: DVector<f64>,
+}
+
+/// All channels.
+#[derive(Clone, Debug)]
+pub struct Design {
+    /// What the first columns stand for; those behind them belong to no effect.
+    pub columns: Vec<Column>,
+    /// Number of columns.
+    pub size: usize,
+    /// The channels, sensor by sensor.
+    pub channels: Vec<Channel>,
+}
+
+/// Normal equations: Jᵀ Σ⁻¹ J, Jᵀ Σ⁻¹ r, rᵀ Σ⁻¹ r and ln |Σ|, summed over channels.
+#[derive(Clone, Debug)]
+pub struct Normal {
+    /// Jᵀ Σ⁻¹ J.
+    pub information: DMatrix<f64>,
+    /// Jᵀ Σ⁻¹ r.
+    pub score: DVector<f64>,
+    /// rᵀ Σ⁻¹ r.
+    pub energy: f64,
+    /// ln |Σ|.
+    pub log_determinant: f64,
+}
+
+impl Normal {
+    /// Of `size` columns, before any channel.
+    pub fn zeros(size: usize) -> Self {
+        Self {
+            information: DMatrix::zeros(size, size),
+            score: DVector::zeros(size),
+            energy: 0.0,
+            log_determinant: 0.0,
+        }
+    }
+
+    /// Adds a channel's; `ids` tells where its columns stand.
+    pub fn add(&mut self, part: &Self, ids: &[usize]) {
+        for (i, row) in ids.iter().enumerate() {
+            self.score[*row] += part.score[i];
+            for (j, column) in ids.iter().enumerate() {
+                self.information[(*row, *column)] += part.information[(i, j)];
+            }
+        }
+        self.energy += part.energy;
+        self.log_determinant += part.log_determinant;
+    }
+}
+
+impl Channel {
+    /// Its normal equations for some of its columns, by their place in `ids`.
+    pub fn normal(&self, whitening: &Whitening, places: &[usize]) -> Normal {
+        let blocks = self.y.len();
+        let mut x = DMatrix::zeros(blocks, places.len() + 1);
+        for (to, from) in places.iter().enumerate() {
+            x.set_column(to, &self.x.column(*from));
+        }
+        x.set_column(places.len(), &self.y);
+        let mut u = DMatrix::zeros(blocks, places.len() + 1);
+        for (column, out) in x.as_slice().chunks_exact(blocks).zip(u.as_mut_slice().chunks_exact_mut(blocks))
+        {
+            whitening.apply(column, out);
+        }
+        let all = x.transpose() * &u;
+        let n = places.len();
+        Normal {
+            information: all.view((0, 0), (n, n)).into_owned(),
+            score: all.view((0, n), (n, 1)).column(0).into_owned(),
+            energy: all[(n, n)],
+            log_determinant: whitening.log_determinant,
+        }
+    }
+}
+
+impl Design {
+    /// Channels of the sensors that are there, with columns and a residual.
+    pub fn new(scene: &Scene<'_>, columns: Vec<Column>, signatures: &[Means], residual: &Means) -> Self {
+        let places: Vec<(SensorKind, usize)> =
+            scene.kinds.iter().flat_map(|kind| (0..3).map(move |axis| (*kind, axis))).collect();
+        let channels = places
+            .into_par_iter()
+            .map(|(kind, axis)| channel(kind, axis, scene.blocks.len(), signatures, residual))
+            .collect();
+        Self { size: columns.len(), columns, channels }
+    }
+
+    /// Some of its columns, by index, and further ones behind them; `columns` names the first of these.
+    pub fn extended(&self, kept: &[usize], columns: Vec<Column>, further: &[Means]) -> Self {
+        let channels = self
+            .channels
+            .par_iter()
+            .map(|channel| {
+                let (mut ids, mut data) = (Vec::new(), Vec::new());
+                for (to, from) in kept.iter().enumerate() {
+                    if let Some(at) = channel.ids.iter().position(|id| id == from) {
+                        ids.push(to);
+                        data.extend_from_slice(channel.x.column(at).as_slice());
+                    }
+                }
+                append(channel.kind, channel.axis, kept.len(), further, &mut ids, &mut data);
+                let x = DMatrix::from_vec(channel.y.len(), ids.len(), data);
+                Channel { kind: channel.kind, axis: channel.axis, ids, x, y: channel.y.clone() }
+            })
+            .collect();
+        Self { columns, size: kept.len() + further.len(), channels }
+    }
+
+    /// With the residual as it would be without some effects: their columns times `amplitudes` added, usual sizes.
+    pub fn restore(&mut self, amplitudes: &[(usize, f64)]) {
+        for channel in &mut self.channels {
+            for (id, amplitude) in amplitudes {
+                if let Some(at) = channel.ids.iter().position(|own| own == id) {
+                    channel.y.axpy(*amplitude, &channel.x.column(at), 1.0);
+                }
+            }
+        }
+    }
+
+    /// Indices of an effect's columns.
+    pub fn of(&self, effect: &Effect) -> Vec<usize> {
+        (0..self.columns.len()).filter(|index| self.columns[*index].is_of(effect)).collect()
+    }
+
+    /// Normal equations of some columns, given each channel's whitening.
+    pub fn normal(&self, whitenings: &[Whitening], wanted: &[usize]) -> Normal {
+        let mut place = vec![None; self.size];
+        wanted.iter().enumerate().for_each(|(to, index)| place[*index] = Some(to));
+        let parts: Vec<(Normal, Vec<usize>)> = self
+            .channels
+            .par_iter()
+            .zip(whitenings)
+            .map(|(channel, whitening)| {
+                let (from, to): (Vec<usize>, Vec<usize>) =
+                    (0..channel.ids.len()).filter_map(|at| place[channel.ids[at]].map(|to| (at, to))).unzip();
+                (channel.normal(whitening, &from), to)
+            })
+            .collect();
+        let mut normal = Normal::zeros(wanted.len());
+        parts.iter().for_each(|(part, ids)| normal.add(part, ids));
+        normal
+    }
+}
+
+fn channel(kind: SensorKind, axis: usize, blocks: usize, signatures: &[Means], residual: &Means) -> Channel {
+    let (mut ids, mut data) = (Vec::new(), Vec::new());
+    append(kind, axis, 0, signatures, &mut ids, &mut data);
+    let x = DMatrix::from_vec(blocks, ids.len(), data);
+    let y = DVector::from_vec(along(residual, kind, axis).unwrap_or_else(|| vec![0.0; blocks]));
+    Channel { kind, axis, ids, x, y }
+}
+
+/// Appends the signatures that reach a channel; they are numbered from `first` on.
+fn append(
+    kind: SensorKind,
+    axis: usize,
+    first: usize,
+    signatures: &[Means],
+    ids: &mut Vec<usize>,
+    data: &mut Vec<f64>,
+) {
+    for (id, signature) in signatures.iter().enumerate() {
+        let reaching = along(signature, kind, axis).filter(|column| column.iter().any(|v| *v != 0.0));
+        if let Some(column) = reaching {
+            ids.push(first + id);
+            data.extend(column);
+        }
+    }
+}
+
+fn along(means: &Means, kind: SensorKind, axis: usize) -> Option<Vec<f64>> {
+    let values: &Vec<Vector3<f64>> = means[kind as usize].as_ref()?;
+    Some(values.iter().map(|v| v[axis]).collect())
+}

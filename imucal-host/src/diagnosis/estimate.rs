@@ -1,0 +1,66 @@
+//! Parameters of the causes with their standard errors.
+
+use nalgebra::DMatrix;
+
+use super::{
+    design::Column,
+    finding::Amount,
+    scene::{Means, shapes},
+    search::Explained,
+};
+use crate::{
+    effect::{Effect, Role},
+    simulator::Dose,
+};
+
+/// Prior standard deviation in usual sizes: so loose that it only keeps what the data do not show finite.
+const LOOSE: f64 = 1e3;
+
+/// Parameters of each effect of the best set, shapes among them.
+pub fn amounts(explained: &Explained<'_>) -> Option<Vec<Vec<Amount>>> {
+    let (linear, set) = (&explained.linear, &explained.best.set);
+    let reference = linear.scene.reference(explained.fit.doses.clone(), &linear.scene.fine)?;
+    let dose = |effect: &Effect| explained.fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, effect));
+    let shaped = |dose: &Dose| -> Vec<Column> {
+        let effect = dose.effect;
+        shapes(effect, &dose.values).map(|parameter| Column { effect, parameter }).collect()
+    };
+    let shape_columns: Vec<Column> = set.iter().filter_map(|effect| dose(effect)).flat_map(shaped).collect();
+    let means: Vec<Means> = shape_columns
+        .iter()
+        .map(|column| reference.signature(column.effect, column.parameter, &[]))
+        .collect::<Option<_>>()?;
+    let fitted = linear.fitted(set);
+    let columns: Vec<Column> =
+        fitted.iter().map(|id| linear.design.columns[*id]).chain(shape_columns.iter().copied()).collect();
+    let design = linear.design.extended(&fitted, columns.clone(), &means);
+    let every: Vec<usize> = (0..design.size).collect();
+    let normal = design.normal(&linear.whitenings(&explained.best.noise), &every);
+    let n = every.len();
+    let information = normal.information + DMatrix::identity(n, n) / (LOOSE * LOOSE);
+    let covariance = information.cholesky()?.inverse();
+    let error = |effect: &Effect, parameter: usize| {
+        let at = columns.iter().position(|c| c.is_of(effect) && c.parameter == parameter)?;
+        Some(covariance[(at, at)].sqrt() * effect.parameters[parameter].prior_scale)
+    };
+    set.iter()
+        .map(|effect| {
+            let values = &dose(effect)?.values;
+            let amount = |(at, value): (usize, &f64)| Amount {
+                name: effect.parameters[at].name.clone(),
+                value: value.is_finite().then_some(*value),
+                std_error: error(effect, at),
+                unit: effect.parameters[at].unit.clone(),
+            };
+            Some(values.iter().enumerate().map(amount).collect())
+        })
+        .collect()
+}
+
+/// An effect is large enough to matter: one of its amplitudes is.
+pub fn is_material(effect: &Effect, amounts: &[Amount]) -> bool {
+    effect.parameters.iter().zip(amounts).any(|(parameter, amount)| {
+        parameter.role == Role::Amplitude
+            && amount.value.is_some_and(|value| value.abs() >= parameter.material)
+    })
+}

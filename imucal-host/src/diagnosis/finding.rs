@@ -1,0 +1,157 @@
+//! What a diagnosis says, in the words and order of the contract.
+
+use serde::{Deserialize, Serialize};
+
+/// The contract's name of what [`Diagnosis`] is serialised to.
+pub const FORMAT: &str = "imucal-diagnosis/1";
+
+/// The answer in one word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// A gap, and effects that explain it.
+    Explained,
+    /// Explained by one of several effects that this recording cannot tell apart.
+    Ambiguous,
+    /// Effects explain a part; a material remainder is located, its cause unknown.
+    Partly,
+    /// A gap, and no effect of the catalogue explains it.
+    Unknown,
+    /// No gap beyond noise.
+    None,
+    /// The recording lacks what the question needs.
+    NotTestable,
+}
+
+/// A diagnosis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Diagnosis {
+    /// [`FORMAT`].
+    pub format: String,
+    /// Name of the recording's samples file.
+    pub recording: String,
+    /// The answer in one word.
+    pub verdict: Verdict,
+    /// Why there is no better answer, where there is none; else what a reader should know besides.
+    pub remarks: Vec<String>,
+    /// How large the gap is, channel by channel.
+    pub gap: Vec<Gap>,
+    /// Where it lies, the largest share first.
+    #[serde(rename = "where")]
+    pub places: Vec<Place>,
+    /// Effects that are asserted, most certain first.
+    pub causes: Vec<Cause>,
+    /// Effects that hold each cause with 95 % probability, most probable first.
+    pub credible_set: Vec<String>,
+    /// Share of the explainable gap that all causes close, on held-out blocks; `None` without causes.
+    pub gap_closed_total: Option<f64>,
+    /// Its 95 % interval.
+    pub gap_closed_total_ci95: Option<[f64; 2]>,
+    /// The shares are of data that the fit has not seen.
+    pub held_out: bool,
+    /// Effects that would have been seen at a size that matters.
+    pub absent: Vec<Absent>,
+    /// Effects that this recording cannot show.
+    pub not_testable: Vec<NotTestable>,
+    /// What to record next to part causes from their equivalents.
+    pub next_experiment: Vec<Experiment>,
+}
+
+/// The gap of one channel: root mean squares of block means.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Gap {
+    /// `acc`, `gyr` or `mag`.
+    pub sensor: String,
+    /// `x`, `y` or `z`.
+    pub axis: String,
+    /// Unit of the figures.
+    pub unit: String,
+    /// What the baseline leaves.
+    pub rms_before: f64,
+    /// What is left with the causes added.
+    pub rms_after: f64,
+    /// What noise alone would leave.
+    pub noise_floor: f64,
+}
+
+/// A driver that the gap of a sensor follows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// `acc`, `gyr` or `mag`.
+    pub sensor: String,
+    /// What it follows, such as `gimbal_outer`.
+    pub driver: String,
+    /// Share of the explainable gap that follows it; shares of drivers overlap.
+    pub share: f64,
+    /// Probability of as much without a gap, all tests counted.
+    pub p_value: f64,
+    /// How it follows.
+    pub detail: String,
+}
+
+/// An effect that is asserted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cause {
+    /// Its id.
+    pub effect: String,
+    /// Probability among the effects that could stand in its place.
+    pub probability: f64,
+    /// Effects that this recording cannot tell from it, likeliest first.
+    pub equivalents: Vec<String>,
+    /// Its parameters.
+    pub parameters: Vec<Amount>,
+    /// It is large enough to matter.
+    pub material: bool,
+    /// Share of the explainable gap that it closes, on held-out blocks; `None` for a fault of the recording itself, which
+    /// is undone or left out before any gap is measured.
+    pub gap_closed: Option<f64>,
+    /// Its 95 % interval.
+    pub gap_closed_ci95: Option<[f64; 2]>,
+}
+
+/// A fitted parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Amount {
+    /// Its name within the effect.
+    pub name: String,
+    /// Value; `None` for an episode that has not ended.
+    pub value: Option<f64>,
+    /// Standard error.
+    pub std_error: Option<f64>,
+    /// Unit of both.
+    pub unit: String,
+}
+
+/// An effect that is not there.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Absent {
+    /// Its id.
+    pub effect: String,
+    /// The smallest amplitude that would have been seen.
+    pub minimum_detectable: f64,
+    /// Its unit.
+    pub unit: String,
+}
+
+/// An effect that the recording cannot show.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NotTestable {
+    /// Its id.
+    pub effect: String,
+    /// Why.
+    pub because: String,
+}
+
+/// A segment to be recorded.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Experiment {
+    /// The effects that it parts.
+    pub separates: Vec<String>,
+    /// What to do.
+    #[serde(rename = "do")]
+    pub instruction: String,
+    /// Whitened distance between them in this recording.
+    pub distinguishability_from: f64,
+    /// With the segment added.
+    pub to: f64,
+}

@@ -1,0 +1,268 @@
+//! What a diagnosis stands on: the movement, rows that can be used, and triads to start from.
+//!
+//! Faults of the recording itself are undone or left out here, so that the search sees none of them.
+
+use imucal_core::triad::Triad;
+use nalgebra::{Matrix3, Vector3};
+
+use super::{
+    convention::{self, Conventions, Finding},
+    model::Model,
+    revisits,
+};
+use crate::{
+    effect::{Act, DataRun, Effect, axis_swap},
+    observe::motion::{self, Attitudes},
+    recording::{
+        Recording, SensorKind, Triple,
+        integrity::{self, Integrity},
+        manifest::Axis,
+        median,
+        unit::STANDARD_GRAVITY,
+    },
+    simulator::{Place, Recorded, Replay, Tracked},
+    store::StoredCalibration,
+};
+
+/// Recordings are at least this long, s.
+const SHORTEST: f64 = 30.0;
+
+/// Samples closer to a limit than this many standard deviations of their noise are not used.
+const CLIPPED: f64 = 5.0;
+
+/// What a diagnosis stands on.
+pub struct Footing {
+    /// The recorded movement.
+    pub movement: Box<dyn Recorded>,
+    /// Rows of each sensor that can be used, by [`SensorKind::ALL`].
+    pub usable: [Vec<bool>; 3],
+    /// Triads to start from, nominal SI to SI: those of the model, or such as put axes and units right.
+    pub triads: [Triad<f64>; 3],
+    /// Sensors whose triad is the model's.
+    pub calibrated: Vec<SensorKind>,
+    /// Faults of the recording that are effects of the catalogue.
+    pub findings: Vec<Finding>,
+    /// What else a reader ought to know.
+    pub remarks: Vec<String>,
+}
+
+impl Footing {
+    /// Of a recording, with the model of its unit where there is one.
+    ///
+    /// # Errors
+    ///
+    /// Why the recording cannot be diagnosed, for a reader.
+    pub fn new(recording: &Recording, model: Option<&StoredCalibration>) -> Result<Self, String> {
+        let model = model.map(|model| Model::new(recording, model)).transpose()?.unwrap_or_default();
+        let integrity = integrity::inspect(recording);
+        let movement = movement(recording, &integrity, &model)?;
+        let conventions = convention::check(recording, &integrity, &*movement);
+        if let Some(contradiction) = conventions.contradiction {
+            return Err(contradiction);
+        }
+        let mut usable = SensorKind::ALL.map(|kind| usable_rows(recording, &integrity, &conventions, kind));
+        for usable in &mut usable {
+            usable.iter_mut().zip(movement.known()).for_each(|(usable, known)| *usable &= known);
+        }
+        let mut triads = model.triads;
+        if let Some(turn) = conventions.turned.and_then(axis_swap::signed_permutation) {
+            triads.iter_mut().for_each(|triad| triad.gain = turn.tr_mul(&triad.gain));
+        }
+        for finding in &conventions.findings {
+            let Some(kind) = finding.effect.sensors.first().copied() else { continue };
+            leave_out(finding, recording, kind, &mut usable[kind as usize]);
+            if let Some(matrix) = finding.dose().and_then(|dose| response(finding.effect, &dose.values)) {
+                let triad = &mut triads[kind as usize];
+                // The samples are M v: what undoes M comes first.
+                triad.gain *= matrix.try_inverse().unwrap_or_else(Matrix3::identity);
+            }
+        }
+        let Some(measured) =
+            SensorKind::ALL.iter().find(|kind| usable[**kind as usize].iter().any(|row| *row))
+        else {
+            return Err("no sensor has a usable row".to_owned());
+        };
+        debug_assert!(recording.sensor(*measured).is_some());
+        let mut remarks = conventions.remarks;
+        remarks.extend(model.remark);
+        remarks.extend(revisits::remark(&*movement));
+        remarks.extend(shortcomings(recording));
+        let findings = conventions.findings;
+        Ok(Self { movement, usable, triads, calibrated: model.calibrated, findings, remarks })
+    }
+}
+
+/// Rows of a sensor that can be used. In a wrong unit every sample may seem to lie beyond the range: then those count
+/// that were measured and are not stuck.
+fn usable_rows(
+    recording: &Recording,
+    integrity: &Integrity,
+    conventions: &Conventions,
+    kind: SensorKind,
+) -> Vec<bool> {
+    let (Some(sensor), Some(triple)) = (integrity.sensor(kind), recording.sensor(kind)) else {
+        return Vec::new();
+    };
+    let id = format!("{kind}.unit_error");
+    if !conventions.findings.iter().any(|finding| finding.effect.id == id) {
+        return sensor.usable.clone();
+    }
+    let mut usable: Vec<bool> =
+        triple.values.iter().map(|value| value.iter().all(|component| component.is_finite())).collect();
+    sensor.stuck.iter().for_each(|rows| usable[rows.clone()].fill(false));
+    usable
+}
+
+/// Noise of a triad's samples, SI unit: the largest of the axes', from neighbouring samples.
+fn noise(triple: &Triple) -> f64 {
+    let of = |axis: usize| {
+        let steps = triple.values.windows(2).map(|pair| (pair[1][axis] - pair[0][axis]).abs());
+        // The median of |x| is 0.674 of its standard deviation; a step has that of a sample, times √2.
+        median(steps.filter(|step| step.is_finite()).collect()).unwrap_or(0.0) / (0.674 * 2.0f64.sqrt())
+    };
+    (0..3).map(of).fold(0.0, f64::max)
+}
+
+/// What the samples of a data effect are of those before it, where that is linear: a column an axis.
+fn response(effect: &Effect, values: &[f64]) -> Option<Matrix3<f64>> {
+    let Act::Data(_, alter) = effect.act else { return None };
+    let linear = effect.id.ends_with(".axis_swap") || effect.id.ends_with(".unit_error");
+    linear.then(|| {
+        let mut samples = [Vector3::x(), Vector3::y(), Vector3::z()];
+        alter(values, &mut DataRun { samples: &mut samples });
+        Matrix3::from_columns(&samples)
+    })
+}
+
+/// Rows that a fault has spoilt are not used.
+fn leave_out(finding: &Finding, recording: &Recording, kind: SensorKind, usable: &mut [bool]) {
+    let Some(triple) = recording.sensor(kind) else { return };
+    if finding.effect.id.ends_with(".stuck_samples") {
+        for (usable, pair) in usable.iter_mut().skip(1).zip(triple.values.windows(2)) {
+            *usable &= pair[0] != pair[1];
+        }
+    }
+    if finding.effect.id.ends_with(".saturation")
+        && let (Some(shortfall), Some(full_scale)) =
+            (finding.parameters.first().and_then(|amount| amount.value), triple.full_scale_si())
+    {
+        // Just below the limit noise is clipped on one side.
+        let limit = full_scale / (1.0 + shortfall);
+        let noise = noise(triple);
+        for (usable, value) in usable.iter_mut().zip(&triple.values) {
+            *usable &= value.amax() < limit - CLIPPED * noise;
+        }
+    }
+    if finding.effect.id.ends_with(".noise_burst") {
+        let time = |name: &str| {
+            let amount = finding.parameters.iter().find(|amount| amount.name == name);
+            amount.and_then(|amount| amount.value)
+        };
+        if let Some(start) = time("t_start") {
+            // Without an end it goes on to that of the recording.
+            let end = time("t_end").unwrap_or(f64::INFINITY);
+            for (usable, time) in usable.iter_mut().zip(&recording.time) {
+                *usable &= !(start..end).contains(time);
+            }
+        }
+    }
+}
+
+/// The rig's axes, outermost first.
+///
+/// # Errors
+///
+/// What the manifest lacks, for a reader.
+pub fn axes(recording: &Recording) -> Result<[Axis; 3], String> {
+    let axes = recording.manifest.rig.as_ref().and_then(|rig| rig.axes.clone());
+    axes.and_then(|axes| axes.try_into().ok()).ok_or_else(|| {
+        "the manifest's [rig] names no three axes, outermost first, such as [\"z\", \"y\", \"x\"]".to_owned()
+    })
+}
+
+/// The recorded movement, or why there is none.
+fn movement(
+    recording: &Recording,
+    integrity: &Integrity,
+    model: &Model,
+) -> Result<Box<dyn Recorded>, String> {
+    let site = &recording.manifest.site;
+    let mut place = Place {
+        latitude_deg: site.latitude_deg.unwrap_or(0.0),
+        height: site.height_m.unwrap_or(0.0),
+        gravity: site.gravity().unwrap_or(STANDARD_GRAVITY),
+        field_n: site.field_ned_ut.unwrap_or_default().into(),
+    };
+    let temperature = recording.temperature.clone().unwrap_or_else(|| vec![25.0; recording.rows()]);
+    let movement: Box<dyn Recorded> = match (recording.gimbal.as_deref(), recording.reference.as_deref()) {
+        (Some(gimbal), _) => {
+            let axes = axes(recording)?;
+            if recording.mag.is_some() && site.field_ned_ut.is_none() {
+                return Err(
+                    "the manifest's [site] lacks field_ned_ut, against which the magnetometer is compared"
+                        .into(),
+                );
+            }
+            let replay = Replay::new(&recording.time, gimbal, temperature, axes, place);
+            Box::new(replay.ok_or("no row has a reading of all three encoders")?)
+        }
+        (None, Some(reference)) => {
+            let attitudes = motion::of_reference(reference);
+            if site.field_ned_ut.is_none() {
+                place.field_n = field(recording, integrity, &attitudes, model).unwrap_or_default();
+            }
+            let tracked = Tracked::new(&recording.time, &attitudes, temperature, place);
+            Box::new(tracked.ok_or("no row has a reference attitude")?)
+        }
+        (None, None) => {
+            return Err("there are neither encoder columns (gimbal_outer, gimbal_middle, gimbal_inner) nor a \
+                        reference attitude (ref_qw, ref_qx, ref_qy, ref_qz): the simulator cannot be given the \
+                        movement"
+                .into());
+        }
+    };
+    let length = movement.duration() - recording.time.first().copied().unwrap_or(0.0);
+    if length < SHORTEST {
+        return Err(format!(
+            "{length:.0} s are too short to tell drift from anything else; {SHORTEST:.0} s at least"
+        ));
+    }
+    if !movement.moving().iter().any(|moves| *moves) {
+        return Err("the rig stands still: nothing tells an effect from a bias".to_owned());
+    }
+    Ok(movement)
+}
+
+/// The field in the frame of a reference, µT: the median of what the magnetometer shows there, component by component.
+fn field(
+    recording: &Recording,
+    integrity: &Integrity,
+    attitudes: &Attitudes,
+    model: &Model,
+) -> Option<Vector3<f64>> {
+    let triad = &model.triads[SensorKind::Mag as usize];
+    let (samples, usable) = (&recording.mag.as_ref()?.values, &integrity.sensor(SensorKind::Mag)?.usable);
+    let shown: Vec<Vector3<f64>> = attitudes
+        .iter()
+        .zip(samples)
+        .zip(usable)
+        .filter_map(|((c_t_n, b), usable)| usable.then_some((*c_t_n)? * triad.correct(b)))
+        .collect();
+    let along = |axis: usize| median(shown.iter().map(|b| b[axis]).collect());
+    Some(Vector3::new(along(0)?, along(1)?, along(2)?))
+}
+
+/// What the recording lacks, and what that costs.
+fn shortcomings(recording: &Recording) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if recording.temperature.is_none() {
+        remarks.push("there is no temperature: what follows it looks like drift".to_owned());
+    }
+    if recording.manifest.site.gravity().is_none() && recording.acc.is_some() {
+        remarks.push(
+            "the site's gravity is not given: standard gravity stands in, and the scale takes up the rest"
+                .to_owned(),
+        );
+    }
+    remarks
+}

@@ -1,0 +1,247 @@
+//! Where the gap between simulator and recording lies, which unmodelled effect causes it, and how far it shrinks.
+
+pub mod block;
+pub mod candidates;
+pub mod convention;
+pub mod credible;
+pub mod design;
+pub mod driver;
+pub mod estimate;
+pub mod evidence;
+pub mod experiment;
+pub mod finding;
+pub mod footing;
+pub mod gap;
+pub mod model;
+pub mod noise;
+pub mod orientation;
+pub mod refit;
+pub mod revisits;
+pub mod scene;
+pub mod search;
+pub mod shape;
+mod skyline;
+pub mod testable;
+pub mod whitening;
+
+pub use self::finding::{Diagnosis, Verdict};
+use self::{
+    candidates::{Candidates, Setting},
+    driver::Following,
+    finding::{Cause, Place as Driven},
+    footing::Footing,
+    scene::Scene,
+    search::Explained,
+};
+use crate::{effect::Effect, recording::Recording, store::StoredCalibration};
+
+/// A driver is followed when noise alone would do as much less often than this, all tests counted.
+const FOLLOWED: f64 = 0.01;
+/// A remainder below this share of the explainable gap does not matter.
+const REMAINDER: f64 = 0.05;
+/// Causes that close less than this share of it explain nothing.
+const EXPLAINS: f64 = 0.2;
+/// A cause as probable as this has no rival.
+const CERTAIN: f64 = 0.95;
+
+/// What a diagnosis may be told beforehand.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Catalogue entries to be withheld from the candidates, and terms to be taken out of the baseline.
+    pub without: Vec<String>,
+    /// The simulator's present model of the unit; without it, the baseline is calibrated from the recording.
+    pub model: Option<StoredCalibration>,
+}
+
+/// Diagnoses a recording; `progress` hears of each stage.
+pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str)) -> Diagnosis {
+    let footing = match Footing::new(recording, options.model.as_ref()) {
+        Ok(footing) => footing,
+        Err(why) => return untestable(recording, why),
+    };
+    let scene = Scene::new(recording, footing.usable.clone(), &*footing.movement, footing.triads);
+    let setting = Setting {
+        kinds: &scene.kinds,
+        thermometer: recording.temperature.is_some(),
+        calibrated: &footing.calibrated,
+        gimbals: scene.swings.is_some(),
+        field_known: recording.manifest.site.field_ned_ut.is_some(),
+    };
+    let candidates = Candidates::new(&setting, &options.without);
+    let explained = search::search(&scene, &candidates, progress);
+    let answer = explained.as_ref().and_then(|explained| answer(recording, explained, progress));
+    match answer {
+        Some(answer) => with_faults(answer, &footing),
+        None => untestable(recording, "the baseline cannot be fitted to this recording".to_owned()),
+    }
+}
+
+/// Adds what was wrong with the recording itself: that is certain, and comes first.
+fn with_faults(mut diagnosis: Diagnosis, footing: &Footing) -> Diagnosis {
+    for finding in footing.findings.iter().rev() {
+        diagnosis.causes.insert(
+            0,
+            Cause {
+                effect: finding.effect.id.clone(),
+                probability: 1.0 - finding.p_value,
+                equivalents: Vec::new(),
+                parameters: finding.parameters.clone(),
+                material: true,
+                gap_closed: None,
+                gap_closed_ci95: None,
+            },
+        );
+        diagnosis.credible_set.insert(0, finding.effect.id.clone());
+    }
+    if !footing.findings.is_empty() && diagnosis.verdict == Verdict::None {
+        diagnosis.verdict = Verdict::Explained;
+    }
+    diagnosis.remarks.extend(footing.remarks.iter().cloned());
+    diagnosis
+}
+
+fn untestable(recording: &Recording, why: String) -> Diagnosis {
+    Diagnosis {
+        format: finding::FORMAT.to_owned(),
+        recording: recording.name.clone(),
+        verdict: Verdict::NotTestable,
+        remarks: vec![why],
+        gap: Vec::new(),
+        places: Vec::new(),
+        causes: Vec::new(),
+        credible_set: Vec::new(),
+        gap_closed_total: None,
+        gap_closed_total_ci95: None,
+        held_out: false,
+        absent: Vec::new(),
+        not_testable: Vec::new(),
+        next_experiment: Vec::new(),
+    }
+}
+
+fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&str)) -> Option<Diagnosis> {
+    let (linear, best) = (&explained.linear, &explained.best);
+    let drivers = driver::drivers(linear.scene, &linear.weighing.given);
+    let before = driver::following(linear, &[], &best.noise, &drivers)?;
+    let after = driver::following_anew(linear, &best.set, &best.noise, &drivers)?;
+    progress("drivers tested");
+    let left = after.iter().find(|f| is_followed(f, after.len()));
+    let closed = gap::closed(linear, &best.set, &best.noise, left.map_or(0.0, |f| f.size))?;
+    progress("held out");
+    let standings: Vec<credible::Standing> =
+        best.set.iter().map(|cause| credible::standing(linear, best, cause)).collect::<Option<_>>()?;
+    progress("alternatives judged");
+    let amounts = estimate::amounts(explained)?;
+    let mut causes: Vec<Cause> = Vec::new();
+    for (((effect, standing), amounts), share) in
+        best.set.iter().zip(&standings).zip(amounts).zip(&closed.each)
+    {
+        causes.push(Cause {
+            effect: effect.id.clone(),
+            probability: standing.probability,
+            equivalents: standing.equivalents.iter().map(|other| other.id.clone()).collect(),
+            material: estimate::is_material(effect, &amounts),
+            parameters: amounts,
+            gap_closed: Some(share.value),
+            gap_closed_ci95: Some(share.interval),
+        });
+    }
+    let remarks = if linear.scene.swings.is_none() { unborne(&mut causes) } else { Vec::new() };
+    causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    let mut credible_set: Vec<String> = Vec::new();
+    for effect in standings.iter().flat_map(|standing| &standing.set) {
+        if !credible_set.contains(&effect.id) {
+            credible_set.push(effect.id.clone());
+        }
+    }
+    let pairs: Vec<(&'static Effect, &'static Effect)> = best
+        .set
+        .iter()
+        .zip(&standings)
+        .flat_map(|(cause, standing)| standing.equivalents.iter().map(|other| (*cause, *other)))
+        .collect();
+    let next_experiment = match footing::axes(recording) {
+        Ok(axes) => experiment::next(explained, axes, &pairs)?,
+        Err(_) => Vec::new(),
+    };
+    let (absent, not_testable) = testable::testable(linear, &best.set, &best.noise)?;
+    let found = !causes.is_empty();
+    if !remarks.is_empty() {
+        credible_set
+            .retain(|id| causes.iter().any(|cause| cause.effect == *id || cause.equivalents.contains(id)));
+    }
+    let verdict = match (remarks.is_empty(), found) {
+        (true, _) => verdict(&causes, left, &closed),
+        (false, true) => Verdict::Partly,
+        (false, false) => Verdict::Unknown,
+    };
+    Some(Diagnosis {
+        verdict,
+        remarks,
+        gap: gap::table(linear, &best.set, &best.noise)?,
+        places: places(if found { &before } else { &after }, gap::size(linear, &best.set, &best.noise)?),
+        causes,
+        credible_set,
+        gap_closed_total: found.then_some(closed.total.value),
+        gap_closed_total_ci95: found.then_some(closed.total.interval),
+        held_out: true,
+        absent,
+        not_testable,
+        next_experiment,
+        ..untestable(recording, String::new())
+    })
+}
+
+/// Takes out causes that no held-out block bears out, or that are too small to matter: where no rig guides the sensor,
+/// what hand and reference add is no noise of any kind that is estimated, and evidence alone is too sure.
+fn unborne(causes: &mut Vec<Cause>) -> Vec<String> {
+    let borne = |cause: &Cause| {
+        cause.material
+            && cause.gap_closed.is_some_and(|share| share > REMAINDER)
+            && cause.gap_closed_ci95.is_some_and(|[from, _]| from > 0.0)
+    };
+    let (kept, out): (Vec<Cause>, Vec<Cause>) = causes.drain(..).partition(borne);
+    *causes = kept;
+    if out.is_empty() {
+        return Vec::new();
+    }
+    let names: Vec<&str> = out.iter().map(|cause| cause.effect.as_str()).collect();
+    vec![format!("not asserted, since held-out data do not bear them out: {}", names.join(", "))]
+}
+
+fn is_followed(following: &Following, tests: usize) -> bool {
+    following.p_value * tests as f64 <= FOLLOWED
+}
+
+fn verdict(causes: &[Cause], left: Option<&Following>, closed: &gap::Closed) -> Verdict {
+    let remainder = left.map_or(0.0, |f| f.size) / closed.explainable;
+    match (causes, left) {
+        ([], None) => Verdict::None,
+        ([], Some(_)) => Verdict::Unknown,
+        (_, Some(_)) if closed.total.value < EXPLAINS => Verdict::Unknown,
+        (_, Some(_)) if remainder > REMAINDER => Verdict::Partly,
+        _ if causes.iter().any(|cause| cause.probability < CERTAIN) => Verdict::Ambiguous,
+        _ => Verdict::Explained,
+    }
+}
+
+/// Drivers that are followed; `explained` is the size of what the causes explain.
+fn places(following: &[Following], explained: f64) -> Vec<Driven> {
+    let explainable = following.iter().map(|f| f.size).fold(explained.max(f64::MIN_POSITIVE), f64::max);
+    let mut places: Vec<Driven> = following
+        .iter()
+        .filter(|f| is_followed(f, following.len()))
+        .map(|f| Driven {
+            sensor: f.kind.prefix().to_owned(),
+            driver: f.driver.clone(),
+            share: (f.size / explainable).min(1.0),
+            p_value: (f.p_value * following.len() as f64).min(1.0),
+            detail: f.detail.clone(),
+        })
+        .collect();
+    places.sort_by(|a, b| b.share.total_cmp(&a.share));
+    places
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,91 @@
+//! The simulator's present model of a unit: a calibration made elsewhere.
+
+use imucal_core::triad::Triad;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::{
+    apply,
+    recording::{Nominal, Recording, SensorKind},
+    store::{StoredCalibration, StoredTriad},
+};
+
+/// Triads that a simulation starts from.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Nominal SI to SI, by [`SensorKind::ALL`]; identity where the calibration does not hold the sensor.
+    pub triads: [Triad<f64>; 3],
+    /// Sensors that it holds and the recording has.
+    pub calibrated: Vec<SensorKind>,
+    /// What a reader ought to know of it.
+    pub remark: Option<String>,
+}
+
+impl Default for Model {
+    /// Knows nothing: every triad is nominal.
+    fn default() -> Self {
+        Self { triads: [Triad::identity(); 3], calibrated: Vec::new(), remark: None }
+    }
+}
+
+impl Model {
+    /// A calibration, for a recording of the same unit.
+    ///
+    /// # Errors
+    ///
+    /// Why it does not fit the recording, for a reader.
+    pub fn new(recording: &Recording, stored: &StoredCalibration) -> Result<Self, String> {
+        let record = stored.to_record(&recording.path).map_err(|error| error.to_string())?;
+        let remark = apply::check(recording, stored, &record, false).map_err(|error| error.to_string())?;
+        let mut model = Self { remark, ..Self::default() };
+        for kind in SensorKind::ALL {
+            if let (Some(triple), Some(triad)) = (recording.sensor(kind), stored.triad(kind)) {
+                model.triads[kind as usize] = si(triad, triple.nominal);
+                model.calibrated.push(kind);
+            }
+        }
+        Ok(model)
+    }
+}
+
+/// `gain · (raw − bias)` as a triad from nominal SI values to SI ones.
+fn si(stored: &StoredTriad, nominal: Nominal) -> Triad<f64> {
+    let gain = Matrix3::from_fn(|row, column| stored.gain[row][column]);
+    let raw = Triad { gain, bias: Vector3::from(stored.bias) };
+    // A nominal value is (raw − offset) / per_unit; a calibrated one has no offset.
+    let nominal_in = raw.in_unit(-nominal.offset / nominal.per_unit, 1.0 / nominal.per_unit);
+    let per_si = stored.unit_out.per_si().unwrap_or(nominal.per_unit);
+    Triad { gain: nominal_in.gain / per_si, ..nominal_in }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Unit;
+
+    #[test]
+    fn counts_become_what_the_calibration_makes_of_them() {
+        let nominal = Nominal { offset: 32768.0, per_unit: 415.0 };
+        let stored = StoredTriad {
+            unit_in: Unit::Counts,
+            unit_out: Unit::Gravity,
+            gain: [[2.5e-4, 1e-6, 0.0], [0.0, 2.4e-4, 0.0], [0.0, 2e-6, 2.6e-4]],
+            bias: [33_000.0, 32_500.0, 32_800.0],
+            model: "T9".to_owned(),
+            gain_std: [[0.0; 3]; 3],
+            bias_std: [0.0; 3],
+            rms: 0.0,
+            held_out_rms: None,
+            observations: 20,
+            parameters: 9,
+            condition: 2.0,
+            coverage: 1.0,
+            field_norm: None,
+            temperature: None,
+        };
+        let raw = Vector3::new(37_000.0, 29_000.0, 33_123.0);
+        let gain = Matrix3::from_fn(|i, j| stored.gain[i][j]);
+        let expected = gain * (raw - Vector3::from(stored.bias)) * 9.80665;
+        let found = si(&stored, nominal).correct(&raw.map(|x| nominal.to_si(x)));
+        assert!((found - expected).norm() < 1e-9, "{found} {expected}");
+    }
+}

@@ -1,0 +1,273 @@
+//! A recording beside the simulator's account of it: residuals, and what each parameter would change.
+//!
+//! Residuals are means over blocks of recorded less simulated samples, at the recording's full rate. A signature is the
+//! simulator's own derivative, from a run at nodes a few rows apart, since it need not hold what a residual must.
+
+use imucal_core::triad::Triad;
+use nalgebra::{Matrix3, Vector3};
+
+use super::block::{Block, cut};
+use crate::{
+    effect::{Act, Effect, Input, Parameter, Role, Swing, Truth},
+    recording::{Recording, SensorKind},
+    simulator::{
+        Dose, Recorded,
+        chain::{Chain, inputs},
+    },
+};
+
+/// Nodes of signatures are this far apart, s; where no rig guides the sensor, which moves briskly then, the latter.
+const NODES: (f64, f64) = (0.045, 0.0175);
+
+/// Rows at which a run is simulated.
+#[derive(Clone, Debug, Default)]
+pub struct Nodes {
+    times: Vec<f64>,
+    blocks: Vec<usize>,
+}
+
+impl Nodes {
+    fn choose(time: &[f64], blocks: &[Block], wanted: impl Fn(&Block, usize) -> bool) -> Self {
+        let mut nodes = Self::default();
+        for (index, block) in blocks.iter().enumerate() {
+            for row in block.rows.clone().filter(|row| wanted(block, *row)) {
+                nodes.times.push(time[row]);
+                nodes.blocks.push(index);
+            }
+        }
+        nodes
+    }
+
+    /// Means over the blocks; a block without a node takes the value before it.
+    fn averaged(&self, values: &[Vector3<f64>], blocks: usize) -> Vec<Vector3<f64>> {
+        let mut sums = vec![(Vector3::zeros(), 0.0); blocks];
+        for (block, value) in self.blocks.iter().zip(values) {
+            sums[*block].0 += value;
+            sums[*block].1 += 1.0;
+        }
+        let mut last = Vector3::zeros();
+        sums.iter()
+            .map(|(sum, count)| {
+                if *count > 0.0 {
+                    last = sum / *count;
+                }
+                last
+            })
+            .collect()
+    }
+}
+/// A derivative's step along an amplitude, as a share of its usual size; along a shape, of its usual value; of an
+/// instant, s.
+const STEP: (f64, f64, f64) = (0.1, 0.02, 0.25);
+
+/// Block means of each sensor, by [`SensorKind::ALL`]; `None` without the sensor.
+pub type Means = [Option<Vec<Vector3<f64>>>; 3];
+
+/// What is simulated beside a recording.
+pub struct Scene<'a> {
+    /// The recording.
+    pub recording: &'a Recording,
+    /// Its blocks.
+    pub blocks: Vec<Block>,
+    /// Sensors that are there.
+    pub kinds: Vec<SensorKind>,
+    /// Swings of the gimbals at each row; `None` without gimbals.
+    pub swings: Option<&'a [[Swing; 3]]>,
+    /// Usable rows of each block, by sensor.
+    pub counts: [Vec<usize>; 3],
+    motion: &'a dyn Recorded,
+    /// Rows of each sensor that are used, by [`SensorKind::ALL`].
+    pub usable: [Vec<bool>; 3],
+    /// The triads that the simulator starts from, by [`SensorKind::ALL`].
+    pub triads: [Triad<f64>; 3],
+    /// Nodes for signatures.
+    pub fine: Nodes,
+    /// One node a block: to look where in time an effect without memory lies.
+    pub coarse: Nodes,
+}
+
+impl<'a> Scene<'a> {
+    /// Beside `recording`, the rows of each sensor that are to be used, a movement, and the triads that the simulator starts from, by [`SensorKind::ALL`].
+    pub fn new(
+        recording: &'a Recording,
+        usable: [Vec<bool>; 3],
+        motion: &'a dyn Recorded,
+        triads: [Triad<f64>; 3],
+    ) -> Self {
+        let interval = recording.median_interval().unwrap_or(0.01);
+        let blocks = cut(&recording.time, motion.moving(), interval);
+        let counts = usable.each_ref().map(|usable| {
+            let count = |block: &Block| usable.get(block.rows.clone()).unwrap_or_default();
+            blocks.iter().map(|block| count(block).iter().filter(|usable| **usable).count()).collect()
+        });
+        let kinds = SensorKind::ALL.into_iter().filter(|kind| recording.sensor(*kind).is_some()).collect();
+        let apart = if motion.swings().is_some() { NODES.0 } else { NODES.1 };
+        let stride = ((apart / interval).round() as usize).max(1);
+        let fine = Nodes::choose(&recording.time, &blocks, |_, row| row % stride == stride / 2);
+        let centre = |block: &Block, row: usize| row == (block.rows.start + block.rows.end) / 2;
+        let coarse = Nodes::choose(&recording.time, &blocks, centre);
+        Self {
+            recording,
+            blocks,
+            kinds,
+            swings: motion.swings(),
+            counts,
+            motion,
+            usable,
+            triads,
+            fine,
+            coarse,
+        }
+    }
+
+    /// Length of the recording, s.
+    pub fn duration(&self) -> f64 {
+        self.motion.duration()
+    }
+
+    fn truth(&self, doses: &[Dose], nodes: &Nodes) -> Vec<Truth> {
+        Chain::new(doses).truth(self.motion, &nodes.times)
+    }
+
+    /// The truth in the middle of each block, without any effect.
+    pub fn plain(&self) -> Vec<Truth> {
+        self.truth(&[], &self.coarse)
+    }
+
+    /// Recorded less simulated, block by block. `None` where a triad is singular.
+    pub fn residual(&self, doses: &[Dose]) -> Option<Means> {
+        let chain = Chain::new(doses);
+        let input = inputs(&chain.truth(self.motion, &self.recording.time), &Matrix3::identity());
+        let mut means: Means = Default::default();
+        for kind in &self.kinds {
+            let output = chain.output(*kind, &self.triads[*kind as usize], &input)?;
+            means[*kind as usize] = self.difference(*kind, &output);
+        }
+        Some(means)
+    }
+
+    fn difference(&self, kind: SensorKind, output: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
+        let samples = &self.recording.sensor(kind)?.values;
+        let usable = &self.usable[kind as usize];
+        let mean = |block: &Block| {
+            let mut sum = Vector3::zeros();
+            let mut count = 0.0;
+            for row in block.rows.clone().filter(|row| usable[*row]) {
+                sum += samples[row] - output[row];
+                count += 1.0;
+            }
+            if count > 0.0 { sum / count } else { sum }
+        };
+        Some(self.blocks.iter().map(mean).collect())
+    }
+
+    /// What each sensor puts out at the nodes.
+    fn outputs(
+        &self,
+        doses: &[Dose],
+        kinds: &[SensorKind],
+        input: &[Input],
+    ) -> Option<[Vec<Vector3<f64>>; 3]> {
+        let chain = Chain::new(doses);
+        let mut outputs: [Vec<Vector3<f64>>; 3] = Default::default();
+        for kind in kinds.iter().filter(|kind| self.kinds.contains(kind)) {
+            outputs[*kind as usize] = chain.output(*kind, &self.triads[*kind as usize], input)?;
+        }
+        Some(outputs)
+    }
+
+    /// A run that signatures are taken against.
+    pub fn reference<'s>(&'s self, doses: Vec<Dose>, nodes: &'s Nodes) -> Option<Reference<'s>> {
+        let truth = self.truth(&doses, nodes);
+        let input = inputs(&truth, &Matrix3::identity());
+        let outputs = self.outputs(&doses, &SensorKind::ALL, &input)?;
+        Some(Reference { scene: self, nodes, doses, truth, input, outputs })
+    }
+}
+
+/// A simulated run at the nodes, to be differentiated.
+pub struct Reference<'s> {
+    scene: &'s Scene<'s>,
+    nodes: &'s Nodes,
+    /// Effects of the run, the baseline among them.
+    pub doses: Vec<Dose>,
+    truth: Vec<Truth>,
+    input: Vec<Input>,
+    outputs: [Vec<Vector3<f64>>; 3],
+}
+
+impl Reference<'_> {
+    /// What a sensor puts out, block by block.
+    pub fn output(&self, kind: SensorKind) -> Vec<Vector3<f64>> {
+        self.nodes.averaged(&self.outputs[kind as usize], self.scene.blocks.len())
+    }
+
+    /// The truth at each block's last node, in the order of the nodes.
+    pub fn truth(&self) -> &[Truth] {
+        &self.truth
+    }
+
+    /// What a usual size of one parameter changes, block by block, by the simulator's difference quotient. Where the
+    /// run holds the effect already, its own parameter is altered; else `neutral` with this parameter switched on.
+    pub fn signature(&self, effect: &'static Effect, parameter: usize, neutral: &[f64]) -> Option<Means> {
+        let scale = effect.parameters.get(parameter)?.prior_scale;
+        let mut doses = self.doses.clone();
+        let step = step(effect.parameters.get(parameter)?);
+        match doses.iter_mut().find(|dose| std::ptr::eq(dose.effect, effect)) {
+            Some(dose) => *dose.values.get_mut(parameter)? += step,
+            None => {
+                let mut values = neutral.to_vec();
+                *values.get_mut(parameter)? += step;
+                doses.push(Dose { effect, values });
+            }
+        }
+        let outputs = match effect.act {
+            Act::Rig(_) | Act::Clock(_) => {
+                let truth = self.scene.truth(&doses, self.nodes);
+                let input = inputs(&truth, &Matrix3::identity());
+                self.scene.outputs(&doses, effect.sensors, &input)?
+            }
+            Act::Field(alter) if !self.doses.iter().any(|dose| std::ptr::eq(dose.effect, effect)) => {
+                // Field effects come after all that moves the rig; their order among themselves is of second order.
+                let mut truth = self.truth.clone();
+                alter(&doses.last()?.values, &mut truth);
+                let input = inputs(&truth, &Matrix3::identity());
+                self.scene.outputs(&doses, effect.sensors, &input)?
+            }
+            Act::Field(_) => {
+                let input = inputs(&self.scene.truth(&doses, self.nodes), &Matrix3::identity());
+                self.scene.outputs(&doses, effect.sensors, &input)?
+            }
+            Act::Triad(..) | Act::Sensor(..) | Act::Signal(..) | Act::Data(..) => {
+                self.scene.outputs(&doses, effect.sensors, &self.input)?
+            }
+        };
+        let mut means: Means = Default::default();
+        for kind in effect.sensors.iter().filter(|kind| self.scene.kinds.contains(kind)) {
+            let (with, without) = (&outputs[*kind as usize], &self.outputs[*kind as usize]);
+            let change: Vec<_> = with.iter().zip(without).map(|(a, b)| (a - b) * (scale / step)).collect();
+            means[*kind as usize] = Some(self.nodes.averaged(&change, self.scene.blocks.len()));
+        }
+        Some(means)
+    }
+}
+
+fn step(parameter: &Parameter) -> f64 {
+    match parameter.role {
+        Role::Amplitude | Role::Choice => STEP.0 * parameter.prior_scale,
+        Role::Shape { usual } => STEP.1 * usual.abs(),
+        Role::Instant { .. } => STEP.2,
+    }
+}
+
+/// Parameters of an effect that its signature is linear in.
+pub fn amplitudes(effect: &Effect) -> impl Iterator<Item = usize> {
+    effect.parameters.iter().enumerate().filter(|(_, p)| p.role == Role::Amplitude).map(|(index, _)| index)
+}
+
+/// Parameters that say how or when, at these values; an instant that never comes has none.
+pub fn shapes<'e>(effect: &'e Effect, values: &'e [f64]) -> impl Iterator<Item = usize> + 'e {
+    let is_shape = |role: &Role| matches!(role, Role::Shape { .. } | Role::Instant { .. });
+    let known = effect.parameters.iter().zip(values).enumerate();
+    known.filter(move |(_, (p, value))| is_shape(&p.role) && value.is_finite()).map(|(index, _)| index)
+}

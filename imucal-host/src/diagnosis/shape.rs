@@ -1,0 +1,232 @@
+//! Where to look for effects whose signature has a shape: time constants, instants, arms.
+//!
+//! A menu of shapes for each, the best by evidence, and from there a search by halved steps.
+
+use rayon::prelude::*;
+
+use super::{
+    design::{Column, Design},
+    evidence::Projected,
+    scene::{Means, Reference, Scene, amplitudes},
+    whitening::Whitening,
+};
+use crate::effect::{Effect, Role};
+
+/// Distance of instants in a menu, s, and as a share of the recording where that is more.
+const GRID: (f64, f64) = (5.0, 1.0 / 60.0);
+/// Signatures judged at once.
+const BATCH: usize = 12;
+
+/// What a shape is judged against: the columns fitted in any case, and the noise.
+pub struct Backdrop<'a> {
+    /// The recording's scene.
+    pub scene: &'a Scene<'a>,
+    /// Columns fitted in any case, and the residual.
+    pub design: &'a Design,
+    /// Indices of those columns.
+    pub fitted: &'a [usize],
+    /// Σ⁻¹ of each channel.
+    pub whitenings: &'a [Whitening],
+}
+
+/// The most evident shape of an effect: all its parameters, amplitudes zero. `None` where no shape can be judged.
+pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backdrop<'_>) -> Option<Vec<f64>> {
+    let duration = backdrop.scene.duration();
+    let is_episode = effect.parameters.iter().filter(|p| matches!(p.role, Role::Instant { .. })).count() == 2;
+    if is_episode {
+        return episode(effect, reference, backdrop, duration);
+    }
+    let menu = menu(effect, duration);
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for shapes in menu.chunks(BATCH) {
+        let judged = judge(effect, shapes, reference, backdrop)?;
+        for (value, shape) in judged.into_iter().zip(shapes) {
+            if best.as_ref().is_none_or(|(most, _)| value > *most) {
+                best = Some((value, shape.clone()));
+            }
+        }
+    }
+    best.map(|(_, shape)| shape)
+}
+
+/// Number of shapes that an effect's menu holds in a recording of `duration` s: a choice among them that costs evidence.
+pub fn choices(effect: &Effect, duration: f64) -> usize {
+    let single = menu(effect, duration).len();
+    let instants = effect.parameters.iter().filter(|p| matches!(p.role, Role::Instant { .. })).count();
+    // Of two instants the second comes after the first.
+    if instants == 2 { single / 2 } else { single }
+}
+
+/// ln BF of each shape.
+pub fn judge(
+    effect: &'static Effect,
+    shapes: &[Vec<f64>],
+    reference: &Reference<'_>,
+    backdrop: &Backdrop<'_>,
+) -> Option<Vec<f64>> {
+    let (projected, each) = project(effect, shapes, reference, backdrop)?;
+    Some((0..shapes.len()).map(|k| projected.log_bayes_factor(&[&places(k, each)])).collect())
+}
+
+fn places(shape: usize, each: usize) -> Vec<usize> {
+    (shape * each..(shape + 1) * each).collect()
+}
+
+fn project(
+    effect: &'static Effect,
+    shapes: &[Vec<f64>],
+    reference: &Reference<'_>,
+    backdrop: &Backdrop<'_>,
+) -> Option<(Projected, usize)> {
+    let own: Vec<usize> = amplitudes(effect).collect();
+    let mut columns: Vec<Column> = backdrop.fitted.iter().map(|at| backdrop.design.columns[*at]).collect();
+    let fitted: Vec<usize> = (0..columns.len()).collect();
+    let asked: Vec<(&Vec<f64>, usize)> =
+        shapes.iter().flat_map(|shape| own.iter().map(move |parameter| (shape, *parameter))).collect();
+    let means: Option<Vec<Means>> =
+        asked.par_iter().map(|(shape, parameter)| reference.signature(effect, *parameter, shape)).collect();
+    columns.extend(asked.iter().map(|(_, parameter)| Column { effect, parameter: *parameter }));
+    let design = backdrop.design.extended(backdrop.fitted, columns, &means?);
+    let every: Vec<usize> = (0..design.columns.len()).collect();
+    let normal = design.normal(backdrop.whitenings, &every);
+    let others: Vec<usize> = every[fitted.len()..].to_vec();
+    Some((Projected::new(&normal, &fitted, &others)?, own.len()))
+}
+
+/// Shapes to try: positive ones by factors, others along their axes, instants along the recording.
+fn menu(effect: &Effect, duration: f64) -> Vec<Vec<f64>> {
+    let mut menu = vec![effect.neutral(duration)];
+    let timed = effect.parameters.iter().any(|p| matches!(p.role, Role::Instant { .. }));
+    let either: Vec<usize> = (0..effect.parameters.len())
+        .filter(|at| {
+            matches!(effect.parameters[*at].role, Role::Shape { .. }) && effect.parameters[*at].range.0 < 0.0
+        })
+        .collect();
+    if !either.is_empty() {
+        // An arm along each axis: its signature is linear in the arm, and the axes span all of them.
+        menu = either
+            .iter()
+            .map(|at| {
+                let mut shape = effect.neutral(duration);
+                either.iter().filter(|other| *other != at).for_each(|other| shape[*other] = 0.0);
+                shape
+            })
+            .collect();
+    }
+    for (at, parameter) in effect.parameters.iter().enumerate() {
+        menu = match parameter.role {
+            Role::Shape { usual } if parameter.range.0 >= 0.0 => {
+                // What is placed in time as well is scanned broadly and refined afterwards.
+                let factors: &[f64] = if timed { &[0.7, 2.0] } else { &[0.2, 0.5, 1.0, 2.0, 5.0] };
+                let values: Vec<f64> = factors.iter().map(|factor| usual * factor).collect();
+                vary(&menu, at, &values)
+            }
+            Role::Instant { .. } => {
+                let step = GRID.0.max(GRID.1 * duration);
+                let instants: Vec<f64> = (1..(duration / step) as usize).map(|k| step * k as f64).collect();
+                vary(&menu, at, &instants)
+            }
+            _ => menu,
+        };
+    }
+    menu
+}
+
+fn vary(menu: &[Vec<f64>], at: usize, values: &[f64]) -> Vec<Vec<f64>> {
+    menu.iter()
+        .flat_map(|shape| {
+            values.iter().map(move |value| {
+                let mut varied = shape.clone();
+                varied[at] = *value;
+                varied
+            })
+        })
+        .collect()
+}
+
+/// An episode is what began less what began at its end: one signature for each beginning serves all pairs.
+fn episode(
+    effect: &'static Effect,
+    reference: &Reference<'_>,
+    backdrop: &Backdrop<'_>,
+    duration: f64,
+) -> Option<Vec<f64>> {
+    let instants: Vec<usize> = (0..effect.parameters.len())
+        .filter(|at| matches!(effect.parameters[*at].role, Role::Instant { .. }))
+        .collect();
+    let [start, end] = *instants else { return None };
+    let step = GRID.0.max(GRID.1 * duration);
+    let times: Vec<f64> = (1..(duration / step) as usize).map(|k| step * k as f64).collect();
+    let from = |time: f64| {
+        let mut shape = effect.neutral(duration);
+        (shape[start], shape[end]) = (time, f64::INFINITY);
+        shape
+    };
+    let shapes: Vec<Vec<f64>> = times.iter().map(|time| from(*time)).collect();
+    let (projected, each) = project(effect, &shapes, reference, backdrop)?;
+    let mut best: Option<(f64, usize, Option<usize>)> = None;
+    for i in 0..times.len() {
+        for j in (i + 1..times.len()).map(Some).chain([None]) {
+            let pair = projected.combined(&places(i, each), j.map(|j| places(j, each)).as_deref());
+            let own: Vec<usize> = (0..each).collect();
+            let value = pair.log_bayes_factor(&[&own]);
+            if best.is_none_or(|(most, ..)| value > most) {
+                best = Some((value, i, j));
+            }
+        }
+    }
+    best.map(|(_, i, j)| {
+        let mut shape = from(times[i]);
+        shape[end] = j.map_or(f64::INFINITY, |j| times[j]);
+        shape
+    })
+}
+
+/// Improves a shape by steps that are halved, and tells how far each parameter may move before the evidence falls by a
+/// half: its standard error. Both in the order of the effect's parameters; zero for amplitudes.
+pub fn refine(
+    effect: &'static Effect,
+    start: &[f64],
+    reference: &Reference<'_>,
+    backdrop: &Backdrop<'_>,
+) -> Option<(Vec<f64>, Vec<f64>)> {
+    let duration = backdrop.scene.duration();
+    let steps: Vec<f64> = effect
+        .parameters
+        .iter()
+        .zip(start)
+        .map(|(parameter, value)| match parameter.role {
+            Role::Instant { .. } if value.is_finite() => 0.5 * GRID.0.max(GRID.1 * duration),
+            Role::Shape { usual } => 0.5 * if parameter.range.0 < 0.0 { usual.abs() } else { value.abs() },
+            _ => 0.0,
+        })
+        .collect();
+    let mut best = start.to_vec();
+    let mut most = judge(effect, std::slice::from_ref(&best), reference, backdrop)?[0];
+    let mut errors = vec![0.0; best.len()];
+    for halving in 0..6 {
+        for at in (0..best.len()).filter(|at| steps[*at] > 0.0) {
+            let step = steps[at] * 0.5f64.powi(halving);
+            let tried: Vec<Vec<f64>> = [-step, step]
+                .into_iter()
+                .map(|by| {
+                    let mut tried = best.clone();
+                    tried[at] = (tried[at] + by)
+                        .clamp(effect.parameters[at].range.0, effect.parameters[at].range.1.min(1e9));
+                    tried
+                })
+                .collect();
+            let values = judge(effect, &tried, reference, backdrop)?;
+            let fall = most - 0.5 * (values[0] + values[1]);
+            if fall > 0.0 {
+                errors[at] = step / (2.0 * fall).sqrt();
+            }
+            for (value, tried) in values.into_iter().zip(tried) {
+                if value > most {
+                    (most, best) = (value, tried);
+                }
+            }
+        }
+    }
+    Some((best, errors))
+}

@@ -1,0 +1,157 @@
+use std::sync::LazyLock;
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::{
+    Options, Verdict,
+    candidates::{Candidates, Setting},
+    design::Normal,
+    diagnose,
+    evidence::Projected,
+    footing::Footing,
+    noise::FAR,
+    refit::refit,
+    scene::{Means, Scene},
+    search::Linear,
+};
+use crate::{
+    effect::find,
+    recording::{Recording, SensorKind},
+    simulator::{Dose, Programme, Simulation, UnitKind},
+};
+
+fn simulation(seed: u64) -> Simulation {
+    Simulation { programme: Programme::Full, rate: 25.0, seed, ..Simulation::default() }
+}
+
+static HEALTHY: LazyLock<Recording> = LazyLock::new(|| simulation(11).record("healthy").unwrap());
+
+/// The problem about a healthy recording's baseline.
+fn with_linear<T>(check: impl FnOnce(&Linear<'_>) -> T) -> T {
+    let footing = Footing::new(&HEALTHY, None).unwrap();
+    let scene = Scene::new(&HEALTHY, footing.usable.clone(), &*footing.movement, footing.triads);
+    let setting =
+        Setting { kinds: &scene.kinds, thermometer: true, calibrated: &[], gimbals: true, field_known: true };
+    let candidates = Candidates::new(&setting, &[]);
+    let doses = candidates
+        .baseline
+        .iter()
+        .map(|effect| Dose { effect, values: vec![0.0; effect.parameters.len()] })
+        .collect();
+    let fit = refit(&scene, doses, None).unwrap();
+    check(&Linear::new(&scene, &candidates, &fit, None).unwrap())
+}
+
+#[test]
+fn a_healthy_residual_whitened_by_its_own_noise_has_the_energy_of_noise() {
+    with_linear(|linear| {
+        let white = linear.weighing.white(&linear.scene.residual(&[]).unwrap());
+        let judged = linear.judge(&[], &white, &SensorKind::ALL, &FAR).unwrap();
+        let normal = linear.design.normal(&linear.whitenings(&judged.noise), &linear.baseline);
+        let n = normal.score.len();
+        let information = normal.information.clone() + DMatrix::identity(n, n) * 1e-8;
+        let left = normal.energy - normal.score.dot(&information.cholesky().unwrap().solve(&normal.score));
+        let counts = linear.scene.counts.iter().flatten().filter(|count| **count > 0).count();
+        let freedom = (3 * counts - n) as f64;
+        assert!((left / freedom - 1.0).abs() < 0.05, "{left} of {freedom}");
+    });
+}
+
+/// The change that usual sizes of all of an effect's parameters make, turned round in the second half of the time.
+fn twin(linear: &Linear<'_>, own: &[usize]) -> Means {
+    let blocks = &linear.scene.blocks;
+    let middle = 0.5 * linear.scene.duration();
+    let mut means: Means = Default::default();
+    for channel in &linear.design.channels {
+        let column = means[channel.kind as usize].get_or_insert_with(|| vec![Vector3::zeros(); blocks.len()]);
+        for id in own {
+            if let Some(at) = channel.ids.iter().position(|other| other == id) {
+                for (block, value) in column.iter_mut().enumerate() {
+                    let sign = if blocks[block].time < middle { 1.0 } else { -1.0 };
+                    value[channel.axis] += sign * channel.x[(block, at)];
+                }
+            }
+        }
+    }
+    means
+}
+
+#[test]
+fn the_twin_of_an_effect_with_its_sign_broken_is_not_explained_by_it() {
+    with_linear(|linear| {
+        let white = linear.weighing.white(&linear.scene.residual(&[]).unwrap());
+        let whitenings = linear.whitenings(&white);
+        for effect in &linear.candidates.effects {
+            let own = linear.design.of(effect);
+            let kept: Vec<usize> = linear.baseline.iter().chain(&own).copied().collect();
+            let columns = kept.iter().map(|id| linear.design.columns[*id]).collect();
+            let design = linear.design.extended(&kept, columns, &[twin(linear, &own)]);
+            let every: Vec<usize> = (0..design.size).collect();
+            let normal = design.normal(&whitenings, &every);
+            let left = |fitted: usize| {
+                let projected = Projected::new(&normal, &every[..fitted], &every[kept.len()..]).unwrap();
+                projected.information[(0, 0)]
+            };
+            let (before, after) = (left(linear.baseline.len()), left(kept.len()));
+            // What the baseline takes up of the twin is no part of the question.
+            assert!(after > 0.1 * before, "{}: {:.3} is left", effect.id, after / before);
+        }
+    });
+}
+
+#[test]
+fn an_effect_is_named_with_its_size_and_closes_the_gap() {
+    for (id, size, parameter) in [("mag.gimbal_hard_iron_outer", 1.0, "x"), ("gyr.scale_cubic", 3.0, "z")] {
+        let mut simulation = simulation(5);
+        simulation.unit = UnitKind::Gx2;
+        simulation.add(find(id).unwrap(), size).unwrap();
+        let recording = simulation.record("afflicted").unwrap();
+        let diagnosis = diagnose(&recording, &Options::default(), &|_| ());
+        let names: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.effect.as_str()).collect();
+        assert_eq!((names.as_slice(), diagnosis.verdict), ([id].as_slice(), Verdict::Explained));
+        let amount = diagnosis.causes[0].parameters.iter().find(|p| p.name == parameter).unwrap();
+        let at = simulation.doses[0].effect.parameters.iter().position(|p| p.name == parameter).unwrap();
+        let truth = simulation.doses[0].values[at];
+        let (value, error) = (amount.value.unwrap(), amount.std_error.unwrap());
+        assert!((value - truth).abs() < 4.0 * error, "{id}: {value} ± {error}, truly {truth}");
+        assert!(diagnosis.gap_closed_total.unwrap() > 0.95, "{id}");
+    }
+}
+
+#[test]
+fn a_projection_is_what_is_left_of_a_column_after_least_squares() {
+    let x = DMatrix::from_fn(40, 3, |i, j| ((i * (j + 2)) as f64 * 0.7).sin());
+    let y = DVector::from_fn(40, |i, _| (i as f64 * 0.31).cos());
+    let normal = Normal {
+        information: x.transpose() * &x,
+        score: x.transpose() * &y,
+        energy: y.dot(&y),
+        log_determinant: 0.0,
+    };
+    let projected = Projected::new(&normal, &[0, 1], &[2]).unwrap();
+    let baseline = x.columns(0, 2).into_owned();
+    let fit = baseline.clone().svd(true, true).solve(&x.column(2), 1e-12).unwrap();
+    let left = x.column(2) - baseline * fit;
+    assert!((projected.information[(0, 0)] - left.dot(&left)).abs() < 1e-6);
+    assert!((projected.score[0] - left.dot(&y)).abs() < 1e-6);
+    let (amplitude, variance) = projected.estimate(&[0]).unwrap();
+    assert!((amplitude[0] - left.dot(&y) / left.dot(&left)).abs() < 1e-6);
+    assert!((variance[(0, 0)] - 1.0 / left.dot(&left)).abs() < 1e-6);
+}
+
+#[test]
+fn the_evidence_of_one_amplitude_is_the_closed_form_at_its_best_scale() {
+    let (score, information) = (30.0, 16.0);
+    let projected = Projected {
+        score: DVector::from_vec(vec![score]),
+        information: DMatrix::from_vec(1, 1, vec![information]),
+        before: DVector::from_vec(vec![information]),
+    };
+    // N(y | 0, V + V² a²) against N(y | 0, V) of the score y.
+    let of = |a: f64| {
+        let grown = 1.0 + a * a * information;
+        0.5 * (score * score * a * a / grown - f64::ln(grown))
+    };
+    let expected = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0].map(of).into_iter().fold(f64::MIN, f64::max);
+    assert!((projected.log_bayes_factor(&[&[0]]) - (expected - 8f64.ln())).abs() < 1e-9);
+}

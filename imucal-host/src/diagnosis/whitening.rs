@@ -1,0 +1,246 @@
+//! The covariance of a channel's block means, and its inverse.
+//!
+//! ```text
+//! Σ = D + Σ_r v_r 1_r 1_rᵀ + Z K Zᵀ
+//! ```
+//!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | D | white noise of each block mean |
+//! | v_r | variance of what a rest r has in common: the table stands off its encoders |
+//! | K | drift: first-order Gauss–Markov processes, at knots |
+//! | Z | straight lines between knots |
+//!
+//! By Woodbury's identity, twice: what a rest has in common first, the knots after it. Not modelled: drift within the
+//! distance of two knots, what the axes of a triad have in common.
+
+use std::ops::Range;
+
+use super::skyline::{Factor, Skyline};
+
+/// Distance between knots, s.
+const SPACING: f64 = 2.5;
+
+/// A first-order Gauss–Markov process.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Process {
+    /// Correlation time, s.
+    pub time: f64,
+    /// Standard deviation, unit of the channel; positive.
+    pub sigma: f64,
+}
+
+/// Blocks of one rest and the variance of what they share.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shared {
+    /// Blocks, consecutive.
+    pub blocks: Range<usize>,
+    /// Variance, channel's unit squared.
+    pub variance: f64,
+}
+
+/// Σ⁻¹ of one channel.
+#[derive(Clone, Debug)]
+pub struct Whitening {
+    weights: Vec<f64>,
+    knots: Vec<(usize, f64)>,
+    shared: Vec<(Range<usize>, f64)>,
+    processes: usize,
+    states: usize,
+    factor: Option<Factor>,
+    /// Natural logarithm of Σ's determinant, over blocks with a weight.
+    pub log_determinant: f64,
+}
+
+impl Whitening {
+    /// From the blocks' times, s, increasing; their inverse white variances, zero where a block holds nothing; what
+    /// rests share; and drifts. Drifts that make the matrix indefinite by rounding are left out.
+    pub fn new(times: &[f64], weights: Vec<f64>, rests: &[Shared], drifts: &[Process]) -> Self {
+        let start = times.first().copied().unwrap_or(0.0);
+        let length = times.last().copied().unwrap_or(0.0) - start;
+        let count = (length / SPACING).ceil() as usize + 1;
+        let knots: Vec<(usize, f64)> = times
+            .iter()
+            .map(|time| {
+                let at = (time - start) / SPACING;
+                let knot = (at.floor() as usize).min(count.saturating_sub(2));
+                (knot, at - knot as f64)
+            })
+            .collect();
+        let mut log_determinant: f64 = weights.iter().filter(|w| **w > 0.0).map(|w| -w.ln()).sum();
+        let shared: Vec<(Range<usize>, f64)> = rests
+            .iter()
+            .filter(|rest| rest.variance > 0.0)
+            .map(|rest| {
+                let sum: f64 = weights[rest.blocks.clone()].iter().sum();
+                log_determinant += (1.0 + rest.variance * sum).ln();
+                (rest.blocks.clone(), 1.0 / (1.0 / rest.variance + sum))
+            })
+            .collect();
+        let mut whitening = Self {
+            weights,
+            knots,
+            shared,
+            processes: drifts.len(),
+            states: count.max(2) * drifts.len(),
+            factor: None,
+            log_determinant,
+        };
+        whitening.factor = whitening.factorise(count.max(2), drifts);
+        if let Some(factor) = &whitening.factor {
+            whitening.log_determinant += factor.log_determinant;
+            for drift in drifts {
+                let q = innovation(drift);
+                whitening.log_determinant += (count.max(2) - 1) as f64 * q.ln() + 2.0 * drift.sigma.ln();
+            }
+        }
+        whitening
+    }
+
+    fn factorise(&self, count: usize, drifts: &[Process]) -> Option<Factor> {
+        let p = self.processes;
+        if p == 0 {
+            return None;
+        }
+        let mut first: Vec<usize> = (0..count * p).map(|state| (state / p).saturating_sub(1) * p).collect();
+        for (blocks, _) in &self.shared {
+            let (from, to) = (self.knots[blocks.start].0, self.knots[blocks.end - 1].0 + 1);
+            for reach in &mut first[from * p..(to + 1) * p] {
+                *reach = (*reach).min(from * p);
+            }
+        }
+        let mut matrix = Skyline::new(first);
+        for (process, drift) in drifts.iter().enumerate() {
+            let (kept, q) = (libm::exp(-SPACING / drift.time), innovation(drift));
+            for knot in 0..count {
+                let inner = if knot == 0 || knot + 1 == count { 1.0 } else { 1.0 + kept * kept };
+                matrix.add(knot * p + process, knot * p + process, inner / q);
+                if knot > 0 {
+                    matrix.add(knot * p + process, (knot - 1) * p + process, -kept / q);
+                }
+            }
+        }
+        let mut spread = |a: usize, b: usize, value: f64| {
+            for (i, j) in (0..p).flat_map(|i| (0..p).map(move |j| (i, j))) {
+                let (row, column) = (a * p + i, b * p + j);
+                // Each pair once: the matrix mirrors what is off its diagonal.
+                if row >= column {
+                    matrix.add(row, column, value);
+                }
+            }
+        };
+        for ((knot, share), w) in self.knots.iter().zip(&self.weights) {
+            spread(*knot, *knot, w * (1.0 - share) * (1.0 - share));
+            spread(knot + 1, *knot, w * share * (1.0 - share));
+            spread(knot + 1, knot + 1, w * share * share);
+        }
+        for (blocks, factor) in &self.shared {
+            let base = self.knots[blocks.start].0;
+            let mut q = vec![0.0; self.knots[blocks.end - 1].0 + 2 - base];
+            for k in blocks.clone() {
+                let (knot, share) = self.knots[k];
+                q[knot - base] += self.weights[k] * (1.0 - share);
+                q[knot + 1 - base] += self.weights[k] * share;
+            }
+            for (i, a) in q.iter().enumerate() {
+                for (j, b) in q.iter().enumerate().take(i + 1) {
+                    spread(base + i, base + j, -factor * a * b);
+                }
+            }
+        }
+        matrix.factorised()
+    }
+
+    /// Σ⁻¹ x of one column over the blocks.
+    pub fn apply(&self, x: &[f64], out: &mut [f64]) {
+        for ((out, x), w) in out.iter_mut().zip(x).zip(&self.weights) {
+            *out = x * w;
+        }
+        self.share(out);
+        let Some(factor) = &self.factor else { return };
+        let p = self.processes;
+        let mut state = vec![0.0; self.states];
+        for ((knot, share), out) in self.knots.iter().zip(out.iter()) {
+            state[knot * p] += out * (1.0 - share);
+            state[(knot + 1) * p] += out * share;
+        }
+        for knot in state.chunks_exact_mut(p) {
+            let value = knot[0];
+            knot.fill(value);
+        }
+        factor.solve(&mut state);
+        let mut drift: Vec<f64> = self
+            .knots
+            .iter()
+            .zip(&self.weights)
+            .map(|((knot, share), w)| {
+                let sum = |knot: usize| state[knot * p..(knot + 1) * p].iter().sum::<f64>();
+                w * (sum(*knot) * (1.0 - share) + sum(knot + 1) * share)
+            })
+            .collect();
+        self.share(&mut drift);
+        out.iter_mut().zip(drift).for_each(|(out, drift)| *out -= drift);
+    }
+
+    /// From D⁻¹ x to (D + shared)⁻¹ x.
+    fn share(&self, weighted: &mut [f64]) {
+        for (blocks, factor) in &self.shared {
+            let sum: f64 = weighted[blocks.clone()].iter().sum();
+            for (value, w) in weighted[blocks.clone()].iter_mut().zip(&self.weights[blocks.clone()]) {
+                *value -= w * factor * sum;
+            }
+        }
+    }
+}
+
+/// Variance of what is new in a process from one knot to the next.
+fn innovation(drift: &Process) -> f64 {
+    let kept = libm::exp(-SPACING / drift.time);
+    drift.sigma * drift.sigma * (1.0 - kept * kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    /// Σ by its definition.
+    fn dense(times: &[f64], weights: &[f64], rests: &[Shared], drifts: &[Process]) -> DMatrix<f64> {
+        let n = times.len();
+        let count = ((times[n - 1] - times[0]) / SPACING).ceil() as usize + 1;
+        let z = DMatrix::from_fn(n, count, |row, knot| {
+            (1.0 - ((times[row] - times[0]) / SPACING - knot as f64).abs()).max(0.0)
+        });
+        let mut sigma = DMatrix::from_diagonal(&DVector::from_iterator(n, weights.iter().map(|w| 1.0 / w)));
+        for drift in drifts {
+            let k = DMatrix::from_fn(count, count, |a, b| {
+                drift.sigma.powi(2) * (-SPACING * (a as f64 - b as f64).abs() / drift.time).exp()
+            });
+            sigma += &z * k * z.transpose();
+        }
+        for rest in rests {
+            for (a, b) in rest.blocks.clone().flat_map(|a| rest.blocks.clone().map(move |b| (a, b))) {
+                sigma[(a, b)] += rest.variance;
+            }
+        }
+        sigma
+    }
+
+    #[test]
+    fn it_is_the_inverse_of_the_covariance_it_stands_for() {
+        let times: Vec<f64> = (0..60).map(|k| 0.37 * f64::from(k)).collect();
+        let weights: Vec<f64> = (0..60).map(|k| 1.0 + 0.5 * f64::from(k % 3)).collect();
+        let rests = [Shared { blocks: 3..9, variance: 0.4 }, Shared { blocks: 20..41, variance: 1.3 }];
+        let drifts = [Process { time: 8.0, sigma: 0.9 }, Process { time: 150.0, sigma: 2.0 }];
+        for drifts in [&drifts[..], &drifts[..1], &[]] {
+            let sigma = dense(&times, &weights, &rests, drifts);
+            let whitening = Whitening::new(&times, weights.clone(), &rests, drifts);
+            let log_determinant = sigma.clone().cholesky().unwrap().ln_determinant();
+            assert!((whitening.log_determinant - log_determinant).abs() < 1e-8);
+            let x = DVector::from_fn(60, |k, _| ((k * k) as f64).sin());
+            let mut found = vec![0.0; 60];
+            whitening.apply(x.as_slice(), &mut found);
+            assert!((sigma * DVector::from_vec(found) - x).amax() < 1e-9);
+        }
+    }
+}

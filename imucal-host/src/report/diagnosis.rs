@@ -1,0 +1,383 @@
+//! A diagnosis for people: one page, the answer first.
+
+use std::fmt::{self, Write};
+
+use super::{
+    measure::{measure, plain},
+    prose::{hanging, listed},
+};
+use crate::{
+    diagnosis::{
+        Diagnosis, Verdict,
+        finding::{Amount, Cause, Gap, Place},
+    },
+    effect::{self, Effect},
+};
+
+/// Drivers that are printed; the JSON has all.
+const PLACES: usize = 6;
+
+/// The whole page.
+pub fn page(diagnosis: &Diagnosis) -> String {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let _ = write_page(&mut text, diagnosis);
+    text
+}
+
+fn write_page(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
+    writeln!(text, "{}: {}", diagnosis.recording, verdict_name(diagnosis.verdict).to_uppercase())?;
+    text.push_str(&hanging("", &sentence(diagnosis)));
+    // The first remark is the sentence itself where there is no answer.
+    let said = usize::from(diagnosis.verdict == Verdict::NotTestable);
+    for remark in diagnosis.remarks.iter().skip(said).filter(|remark| !remark.is_empty()) {
+        text.push_str(&hanging("note: ", remark));
+    }
+    write_gap(text, &diagnosis.gap)?;
+    write_places(text, &diagnosis.places)?;
+    write_causes(text, diagnosis)?;
+    write_experiments(text, diagnosis)?;
+    write_absent(text, diagnosis)?;
+    write_not_testable(text, diagnosis)
+}
+
+/// The contract's word for a verdict.
+fn verdict_name(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Explained => "explained",
+        Verdict::Ambiguous => "ambiguous",
+        Verdict::Partly => "partly explained",
+        Verdict::Unknown => "unknown",
+        Verdict::None => "no gap",
+        Verdict::NotTestable => "not testable",
+    }
+}
+
+fn sentence(diagnosis: &Diagnosis) -> String {
+    let names: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.effect.as_str()).collect();
+    let (causes, one) = (listed(&names), names.len() == 1);
+    let closed = closed(diagnosis);
+    let place =
+        diagnosis.places.first().map(|place| format!(", most of it following {}", place_words(place)));
+    match diagnosis.verdict {
+        Verdict::Explained => format!("The gap is explained by {causes}{closed}."),
+        Verdict::Ambiguous => format!(
+            "The gap is explained{closed}, but this recording cannot tell {causes} from what else would explain it as \
+             well."
+        ),
+        Verdict::Partly => format!(
+            "{causes} {} the gap in part{closed}; what is left matters, and its cause is unknown.",
+            if one { "explains" } else { "explain" }
+        ),
+        Verdict::Unknown => format!(
+            "There is a gap{}, and no effect of the catalogue explains it.",
+            place.unwrap_or_default()
+        ),
+        Verdict::None => "There is no gap beyond the noise of this recording.".to_owned(),
+        Verdict::NotTestable => {
+            let why = diagnosis.remarks.first().filter(|why| !why.is_empty());
+            let why = why.map_or("the recording lacks what the question needs", String::as_str);
+            format!("Nothing can be said: {why}.")
+        }
+    }
+}
+
+/// What all causes close, as the end of a clause.
+fn closed(diagnosis: &Diagnosis) -> String {
+    let Some(share) = diagnosis.gap_closed_total.filter(|share| share.is_finite()) else {
+        return String::new();
+    };
+    let of = if diagnosis.held_out { ", on data that the fit has not seen" } else { "" };
+    let [low, high] = diagnosis.gap_closed_total_ci95.unwrap_or([f64::NAN; 2]);
+    format!(", closing {} of what repeats{of}", share_words(share, [low, high]))
+}
+
+/// `97 % (95 to 98 %)`; without an interval, the share alone.
+fn share_words(share: f64, [low, high]: [f64; 2]) -> String {
+    let percent = |share: f64| 100.0 * share;
+    if !share.is_finite() {
+        return "an unknown share".to_owned();
+    }
+    match low.is_finite() && high.is_finite() {
+        true => format!("{:.0} % ({:.0} to {:.0} %)", percent(share), percent(low), percent(high)),
+        false => format!("{:.0} %", percent(share)),
+    }
+}
+
+fn place_words(place: &Place) -> String {
+    match place.detail.is_empty() {
+        true => format!("{} of {}", place.driver, place.sensor),
+        false => format!("{} of {} ({})", place.driver, place.sensor, place.detail),
+    }
+}
+
+fn write_gap(text: &mut String, gap: &[Gap]) -> fmt::Result {
+    if gap.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        text,
+        "\n{:<30} {:>10} {:>10} {:>10}",
+        "gap, rms of means over blocks", "before", "after", "noise"
+    )?;
+    for channel in gap {
+        let name = format!("{} {}, {}", channel.sensor, channel.axis, channel.unit);
+        let [before, after, floor] =
+            [channel.rms_before, channel.rms_after, channel.noise_floor].map(|rms| finite(rms, plain));
+        writeln!(text, "  {name:<28} {before:>10} {after:>10} {floor:>10}")?;
+    }
+    Ok(())
+}
+
+fn write_places(text: &mut String, places: &[Place]) -> fmt::Result {
+    if places.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "\n{:<62} {:>6} {:>8}", "where it lies: shares overlap", "share", "chance")?;
+    for place in places.iter().take(PLACES) {
+        let share = finite(place.share, |share| format!("{:.0} %", 100.0 * share));
+        writeln!(text, "  {:<60} {share:>6} {:>8}", place_words(place), chance(place.p_value))?;
+    }
+    Ok(())
+}
+
+fn write_causes(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
+    for (index, cause) in diagnosis.causes.iter().enumerate() {
+        let heading =
+            if diagnosis.causes.len() == 1 { "cause".to_owned() } else { format!("cause {}", index + 1) };
+        writeln!(text, "\n{heading}: {}", cause.effect)?;
+        let certain = finite(cause.probability, certainty);
+        let share =
+            share_words(cause.gap_closed.unwrap_or(f64::NAN), cause.gap_closed_ci95.unwrap_or([f64::NAN; 2]));
+        let material = if cause.material { "" } else { "; too small to matter" };
+        text.push_str(&hanging("  ", &format!("probability {certain}; closes {share} of the gap{material}")));
+        let amounts: Vec<String> = cause.parameters.iter().map(amount).collect();
+        text.push_str(&hanging("  how much:  ", &amounts.join("; ")));
+        if let Some(effect) = effect::find(&cause.effect) {
+            text.push_str(&hanging("  what:      ", effect.words.cause));
+            text.push_str(&hanging("  to do:     ", effect.words.remedy));
+            write_equivalents(text, effect, cause);
+        }
+    }
+    let asserted = |id: &String| diagnosis.causes.iter().any(|cause| cause.effect == **id);
+    let others: Vec<&str> =
+        diagnosis.credible_set.iter().filter(|id| !asserted(id)).map(String::as_str).collect();
+    if !others.is_empty() && !diagnosis.causes.is_empty() {
+        text.push_str(&hanging("credible besides, at 95 %: ", &others.join(", ")));
+    }
+    Ok(())
+}
+
+fn write_equivalents(text: &mut String, effect: &Effect, cause: &Cause) {
+    for other in &cause.equivalents {
+        let parted = effect.confusables.iter().find(|confusable| confusable.id == *other);
+        let parted = parted.map_or(String::new(), |known| format!("; what parts them: {}", known.parted_by));
+        text.push_str(&hanging("  or else:   ", &format!("{other}{parted}")));
+    }
+}
+
+/// `x 1.90 ± 0.02 uT`.
+fn amount(amount: &Amount) -> String {
+    let unit = if amount.unit == "-" { String::new() } else { format!(" {}", amount.unit) };
+    let value = match (amount.value, amount.std_error) {
+        (None, _) => return format!("{} open", amount.name),
+        (Some(value), Some(std)) if std.is_finite() && std > 0.0 => measure(value, std),
+        (Some(value), _) => plain(value),
+    };
+    format!("{} {value}{unit}", amount.name)
+}
+
+fn write_experiments(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
+    if diagnosis.next_experiment.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "\nwhat to record next")?;
+    for experiment in &diagnosis.next_experiment {
+        let names: Vec<&str> = experiment.separates.iter().map(String::as_str).collect();
+        let [from, to] = [experiment.distinguishability_from, experiment.to].map(|d| finite(d, plain));
+        let words = format!(
+            "{}: tells {} apart, by a whitened distance of {to} instead of {from}",
+            experiment.instruction,
+            listed(&names)
+        );
+        text.push_str(&hanging("  - ", &words));
+    }
+    Ok(())
+}
+
+fn write_absent(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
+    if diagnosis.absent.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "\nabsent, and would have been seen from these sizes on")?;
+    let one = |absent: &crate::diagnosis::finding::Absent| {
+        let size = finite(absent.minimum_detectable, |size| format!("{size:.1e}"));
+        let unit = if absent.unit == "-" { "" } else { absent.unit.as_str() };
+        format!("{} {size} {unit}", absent.effect).trim_end().to_owned()
+    };
+    let all: Vec<String> = diagnosis.absent.iter().map(one).collect();
+    text.push_str(&hanging("  ", &all.join("; ")));
+    Ok(())
+}
+
+fn write_not_testable(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
+    if diagnosis.not_testable.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "\nnot testable with this recording")?;
+    // Effects with one reason stand together.
+    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    for effect in &diagnosis.not_testable {
+        match reasons.iter_mut().find(|(because, _)| *because == effect.because) {
+            Some((_, effects)) => effects.push(&effect.effect),
+            None => reasons.push((&effect.because, vec![&effect.effect])),
+        }
+    }
+    for (because, effects) in reasons {
+        text.push_str(&hanging("  ", &format!("{}: {because}", effects.join(", "))));
+    }
+    Ok(())
+}
+
+/// A probability in percent that does not round to certainty.
+fn certainty(probability: f64) -> String {
+    if probability > 0.9995 { "> 99.9 %".to_owned() } else { format!("{:.1} %", 100.0 * probability) }
+}
+
+/// A small probability.
+fn chance(p_value: f64) -> String {
+    match p_value {
+        p if !p.is_finite() => "unknown".to_owned(),
+        p if p < 1e-99 => "<1e-99".to_owned(),
+        p => format!("{p:.0e}"),
+    }
+}
+
+/// A figure, or a dash where there is none.
+fn finite(value: f64, words: impl Fn(f64) -> String) -> String {
+    if value.is_finite() { words(value) } else { "–".to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::finding::{Absent, Experiment, FORMAT, NotTestable};
+
+    fn diagnosis(verdict: Verdict) -> Diagnosis {
+        let amount = |name: &str, value: Option<f64>, std_error: Option<f64>, unit: &str| Amount {
+            name: name.to_owned(),
+            value,
+            std_error,
+            unit: unit.to_owned(),
+        };
+        Diagnosis {
+            format: FORMAT.to_owned(),
+            recording: "case-0007.csv".to_owned(),
+            verdict,
+            remarks: Vec::new(),
+            gap: vec![Gap {
+                sensor: "mag".into(),
+                axis: "x".into(),
+                unit: "uT".into(),
+                rms_before: 0.41,
+                rms_after: 0.052,
+                noise_floor: f64::NAN,
+            }],
+            places: vec![Place {
+                sensor: "mag".into(),
+                driver: "gimbal_outer".into(),
+                share: 0.83,
+                p_value: 0.0,
+                detail: "first harmonic".into(),
+            }],
+            causes: vec![Cause {
+                effect: "mag.bias_step".into(),
+                probability: 0.9998,
+                equivalents: vec!["mag.bias_drift".into()],
+                parameters: vec![
+                    amount("x", Some(1.9), Some(0.02), "uT"),
+                    amount("t_start", Some(12.5), None, "s"),
+                    amount("t_end", None, None, "s"),
+                ],
+                material: true,
+                gap_closed: Some(0.97),
+                gap_closed_ci95: Some([0.95, 0.98]),
+            }],
+            credible_set: vec!["mag.bias_step".into(), "mag.bias_drift".into()],
+            gap_closed_total: Some(0.97),
+            gap_closed_total_ci95: Some([0.95, 0.98]),
+            held_out: true,
+            absent: vec![Absent {
+                effect: "acc.scale_cubic".into(),
+                minimum_detectable: 2.1e-5,
+                unit: "1/(m/s^2)^2".into(),
+            }],
+            not_testable: vec![NotTestable {
+                effect: "acc.gravity_error".into(),
+                because: "same as scale".into(),
+            }],
+            next_experiment: vec![Experiment {
+                separates: vec!["mag.bias_step".into(), "mag.bias_drift".into()],
+                instruction: "hold the first pose again, 120 s".into(),
+                distinguishability_from: 2.1,
+                to: 60.0,
+            }],
+        }
+    }
+
+    #[test]
+    fn the_page_holds_the_answer_the_gap_the_cause_and_what_to_do() {
+        let text = page(&diagnosis(Verdict::Explained));
+        for part in [
+            "case-0007.csv: EXPLAINED\n",
+            "explained by mag.bias_step, closing 97 % (95 to 98 %) of what repeats",
+            "mag x, uT",
+            "gimbal_outer of mag (first harmonic)",
+            "<1e-99",
+            "probability > 99.9 %; closes 97 % (95 to 98 %)",
+            "x 1.900 ± 0.020 uT; t_start 12.50 s; t_end open",
+            "what:      A shock, a change of supply",
+            "to do:     Split the recording there",
+            "or else:   mag.bias_drift; what parts them: the same attitude several times",
+            "hold the first pose again, 120 s: tells mag.bias_step and mag.bias_drift apart",
+            "acc.scale_cubic 2.1e-5 1/(m/s^2)^2",
+            "acc.gravity_error: same as scale",
+        ] {
+            assert!(text.contains(part), "{part} is missing in\n{text}");
+        }
+        assert!(!text.contains("NaN"), "{text}");
+    }
+
+    #[test]
+    fn each_verdict_has_its_own_sentence() {
+        let first = |verdict| {
+            let mut diagnosis = diagnosis(verdict);
+            diagnosis.remarks = vec!["there is no rig".into(), "and no revisit".into()];
+            page(&diagnosis).split_whitespace().collect::<Vec<_>>().join(" ")
+        };
+        assert!(first(Verdict::None).contains("no gap beyond the noise"));
+        assert!(first(Verdict::Unknown).contains("no effect of the catalogue explains it"));
+        assert!(first(Verdict::Partly).contains("mag.bias_step explains the gap in part"));
+        assert!(first(Verdict::Ambiguous).contains("cannot tell mag.bias_step from"));
+        let refused = first(Verdict::NotTestable);
+        assert!(
+            refused.contains("Nothing can be said: there is no rig.") && refused.contains("note: and no")
+        );
+    }
+
+    #[test]
+    fn a_page_is_not_wider_than_a_terminal() {
+        let mut wide = diagnosis(Verdict::Explained);
+        wide.absent = vec![wide.absent[0].clone(); 40];
+        assert!(page(&wide).lines().all(|line| line.chars().count() <= 100));
+    }
+
+    #[test]
+    fn what_is_no_number_is_null_in_the_json() {
+        let mut odd = diagnosis(Verdict::Partly);
+        odd.gap_closed_total = Some(f64::INFINITY);
+        let json = serde_json::to_value(&odd).unwrap();
+        assert!(json["gap"][0]["noise_floor"].is_null() && json["gap_closed_total"].is_null());
+        assert_eq!((&json["verdict"], &json["where"][0]["share"]), (&"partly".into(), &0.83.into()));
+    }
+}

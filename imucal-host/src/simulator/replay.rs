@@ -1,0 +1,287 @@
+//! A recorded movement: what the encoders of a rig said, as a source of truth.
+//!
+//! Angle, rate and acceleration of each gimbal are those of a cubic through the readings about a row, by least squares:
+//! a reading's noise is averaged, and a movement whose angle is a cubic over that time stays as it is. The noisier the
+//! readings, the more of them: a rate that is as noisy as a gyroscope would be taken for one that is filtered.
+//! Where a wider cubic tells another rate, the gimbal has jerked, and its rate there is not known.
+//! Between rows the nearest row's swing goes on with constant acceleration. Where readings change no more than their
+//! noise would make them, the cubic goes through those of a fifth of a second. Not modelled: readings that lag the gimbal.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix4, Vector4};
+
+use super::{
+    gimbal::direction,
+    truth::{Motion, Place, Recorded, on_rig},
+};
+use crate::{
+    effect::{Machine, Swing, Truth},
+    recording::{
+        manifest::{Axis, Rig, RigKind},
+        median,
+    },
+};
+
+/// Readings within so long of a row tell its swing, s: least and most.
+const REACH: (f64, f64) = (0.03, 0.12);
+/// A rate may be as noisy as this, rad/s.
+const RATE_NOISE: f64 = 5e-4;
+/// A gimbal moves if its reading changes over twice this time, s,
+const WINDOW: f64 = 0.1;
+/// by more than this rate would make it, rad/s,
+const CREEP: f64 = 3e-3;
+/// and by more than this many standard deviations of a reading's noise.
+const NOISES: f64 = 8.0;
+/// Two rates further apart than this, rad/s, and than their noise are those of a jerk.
+const JERK: f64 = 1e-3;
+/// At least this many readings to each side.
+const FEWEST: usize = 2;
+
+/// The movement of a recorded rig.
+#[derive(Clone, Debug)]
+pub struct Replay {
+    time: Vec<f64>,
+    swings: Vec<[Swing; 3]>,
+    moving: Vec<bool>,
+    known: Vec<bool>,
+    temperature: Vec<f64>,
+    axes: [Axis; 3],
+    place: Place,
+}
+
+impl Replay {
+    /// The movement that encoders tell, rad, wrapped or not; rows without a reading follow their neighbours.
+    /// `temperature` in °C, one a row. Times strictly increase. `None` where no row has a reading of all three.
+    pub fn new(
+        time: &[f64],
+        encoders: &[[f64; 3]],
+        temperature: Vec<f64>,
+        axes: [Axis; 3],
+        place: Place,
+    ) -> Option<Self> {
+        let angles = unwrapped(encoders)?;
+        let interval = (time.last()? - time.first()?) / (time.len().max(2) - 1) as f64;
+        let noise = noise(&angles);
+        let reach = ((reach(&noise, interval) / interval).round() as usize).max(FEWEST);
+        let moving = moving(time, &angles, &noise);
+        let mut known = known(encoders, reach);
+        // What hardly moves does so slowly: more readings tell its rate.
+        let patient = ((WINDOW / interval).round() as usize).max(reach);
+        let mut swings = Vec::with_capacity(time.len());
+        for row in 0..time.len() {
+            if !moving[row] {
+                swings.push(swing(time, &angles, row, patient));
+                continue;
+            }
+            let near = swing(time, &angles, row, reach);
+            let wide = swing(time, &angles, row, reach + 1);
+            // Noise of a rate is about that of a reading in the time between two.
+            let jerked = (0..3).any(|gimbal| {
+                let apart = (near[gimbal].rate - wide[gimbal].rate).abs();
+                apart > JERK + NOISES * noise[gimbal] / interval
+            });
+            if jerked {
+                let to = (row + reach + 1).min(known.len());
+                known[row.saturating_sub(reach)..to].fill(false);
+            }
+            swings.push(near);
+        }
+        Some(Self { time: time.to_vec(), swings, moving, known, temperature, axes, place })
+    }
+}
+
+impl Motion for Replay {
+    fn duration(&self) -> f64 {
+        self.time.last().copied().unwrap_or(0.0)
+    }
+
+    fn truth(&self, time: f64, rig: &dyn Fn(&mut Machine)) -> Truth {
+        let row = nearest(&self.time, time);
+        let since = time - self.time.get(row).copied().unwrap_or(time);
+        let mut machine = Machine::exact(self.axes.map(direction));
+        machine.gimbals = self.swings.get(row).copied().unwrap_or_default().map(|swing| Swing {
+            angle: swing.angle + since * (swing.rate + 0.5 * since * swing.acceleration),
+            rate: swing.rate + since * swing.acceleration,
+            acceleration: swing.acceleration,
+        });
+        rig(&mut machine);
+        on_rig(time, &machine, &self.place, self.temperature.get(row).copied().unwrap_or_default())
+    }
+
+    fn encoders(&self, time: f64) -> Option<[f64; 3]> {
+        self.swings.get(nearest(&self.time, time)).map(|swings| swings.map(|swing| swing.angle))
+    }
+
+    fn rig(&self) -> Rig {
+        Rig { kind: RigKind::FlightMotionSimulator, axes: Some(self.axes.to_vec()) }
+    }
+
+    fn place(&self) -> Place {
+        self.place
+    }
+}
+
+impl Recorded for Replay {
+    fn moving(&self) -> &[bool] {
+        &self.moving
+    }
+
+    /// All readings that tell a row's swing were measured, and no gimbal jerked.
+    fn known(&self) -> &[bool] {
+        &self.known
+    }
+
+    fn swings(&self) -> Option<&[[Swing; 3]]> {
+        Some(&self.swings)
+    }
+}
+
+/// The row nearest to a time, s.
+pub fn nearest(times: &[f64], time: f64) -> usize {
+    let after = times.partition_point(|t| *t < time).min(times.len().saturating_sub(1));
+    let before = after.saturating_sub(1);
+    match (times.get(before), times.get(after)) {
+        (Some(b), Some(a)) if time - b < a - time => before,
+        _ => after,
+    }
+}
+
+/// Readings without the wrap at ±π; missing ones repeat the last. `None` where there is none at all.
+fn unwrapped(encoders: &[[f64; 3]]) -> Option<Vec<[f64; 3]>> {
+    let measured = |row: &&[f64; 3]| row.iter().all(|angle| angle.is_finite());
+    let mut last = *encoders.iter().find(measured)?;
+    let unwrap = |row: &[f64; 3]| {
+        if measured(&row) {
+            for (last, angle) in last.iter_mut().zip(row) {
+                let step = angle - *last;
+                *last += step - TAU * (step / TAU).round();
+            }
+        }
+        last
+    };
+    Some(encoders.iter().map(unwrap).collect())
+}
+
+/// How far the readings that tell a swing reach, s. The slope of a cubic through n readings of noise σ has the variance
+/// 75 σ² / (n³ Δt²).
+fn reach(noise: &[f64; 3], interval: f64) -> f64 {
+    let sigma = noise.iter().fold(0.0f64, |most, sigma| most.max(*sigma));
+    let span = libm::pow(sigma * libm::sqrt(75.0 * interval) / RATE_NOISE, 2.0 / 3.0);
+    (0.5 * span).clamp(REACH.0, REACH.1)
+}
+
+/// Rows about which all readings were measured.
+fn known(encoders: &[[f64; 3]], reach: usize) -> Vec<bool> {
+    let mut known = vec![true; encoders.len()];
+    for (row, _) in encoders.iter().enumerate().filter(|(_, row)| row.iter().any(|angle| !angle.is_finite()))
+    {
+        let to = (row + 2 * reach + 1).min(known.len());
+        known[row.saturating_sub(2 * reach)..to].fill(false);
+    }
+    known
+}
+
+/// Standard deviation of each encoder's readings, rad.
+fn noise(angles: &[[f64; 3]]) -> [f64; 3] {
+    [0, 1, 2].map(|axis| {
+        let bends = angles.windows(3).map(|w| (w[0][axis] - 2.0 * w[1][axis] + w[2][axis]).abs()).collect();
+        // The median of |x| is 0.674 of its standard deviation; a bend has that of a reading, times √6.
+        median(bends).unwrap_or(0.0) / (0.674 * 6.0f64.sqrt())
+    })
+}
+
+/// Rows at which a gimbal moves.
+fn moving(time: &[f64], angles: &[[f64; 3]], noise: &[f64; 3]) -> Vec<bool> {
+    let (mut before, mut after) = (0, 0);
+    (0..time.len())
+        .map(|row| {
+            while time[before] < time[row] - WINDOW {
+                before += 1;
+            }
+            while after + 1 < time.len() && time[after] < time[row] + WINDOW {
+                after += 1;
+            }
+            let span = time[after] - time[before];
+            (0..3).any(|axis| {
+                let change = (angles[after][axis] - angles[before][axis]).abs();
+                change > CREEP * span + NOISES * noise[axis]
+            })
+        })
+        .collect()
+}
+
+/// The cubic through the readings about a row, by least squares.
+fn swing(time: &[f64], angles: &[[f64; 3]], row: usize, reach: usize) -> [Swing; 3] {
+    let from = row.saturating_sub(reach).min(time.len().saturating_sub(2 * reach + 1));
+    let to = (from + 2 * reach + 1).min(time.len());
+    let scale = 1.0 / (time[to - 1] - time[from]).max(f64::MIN_POSITIVE);
+    let mut normal = Matrix4::zeros();
+    let mut right = [Vector4::zeros(); 3];
+    for k in from..to {
+        let s = (time[k] - time[row]) * scale;
+        let powers = Vector4::new(1.0, s, s * s, s * s * s);
+        normal += powers * powers.transpose();
+        for (axis, right) in right.iter_mut().enumerate() {
+            // From the row's own reading, so that many turns cost no digits.
+            *right += powers * (angles[k][axis] - angles[row][axis]);
+        }
+    }
+    let inverse = normal.try_inverse().unwrap_or_else(Matrix4::zeros);
+    std::array::from_fn(|axis| {
+        let cubic = inverse * right[axis];
+        Swing {
+            angle: angles[row][axis] + cubic[0],
+            rate: cubic[1] * scale,
+            acceleration: 2.0 * cubic[2] * scale * scale,
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    fn replayed(angle: impl Fn(f64) -> f64) -> Replay {
+        let time: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
+        let wrap = |a: f64| a - TAU * (a / TAU).round();
+        let encoders: Vec<[f64; 3]> = time.iter().map(|t| [wrap(angle(*t)), 0.3, -PI]).collect();
+        let axes = [Axis::Z, Axis::Y, Axis::X];
+        Replay::new(&time, &encoders, vec![25.0; 1000], axes, Place::ankara()).unwrap()
+    }
+
+    #[test]
+    fn a_sinusoid_through_many_turns_keeps_its_rate_and_acceleration() {
+        let (amplitude, w) = (20.0, 2.0);
+        let replay = replayed(|t| amplitude * (w * t).sin());
+        for k in 0..90 {
+            let t = 0.5 + 0.1 * f64::from(k) + 0.004;
+            let truth = replay.truth(t, &|_| ());
+            assert!((truth.gimbals[0].angle - amplitude * (w * t).sin()).abs() < 1e-5, "{t}");
+            assert!((truth.gimbals[0].rate - amplitude * w * (w * t).cos()).abs() < 2e-3, "{t}");
+            assert!((truth.gimbals[0].acceleration + amplitude * w * w * (w * t).sin()).abs() < 1.0, "{t}");
+        }
+    }
+
+    #[test]
+    fn noisy_readings_of_a_rig_that_stands_still_are_no_movement() {
+        let time: Vec<f64> = (0..600).map(|k| 0.01 * f64::from(k)).collect();
+        let angle = |k: usize| if k < 300 { 0.0 } else { 0.2 * (time[k] - 3.0) };
+        let encoders: Vec<[f64; 3]> =
+            (0..600).map(|k| [angle(k) + 1e-4 * ((k * k) as f64).sin(), 0.0, 0.0]).collect();
+        let axes = [Axis::Z, Axis::Y, Axis::X];
+        let replay = Replay::new(&time, &encoders, vec![25.0; 600], axes, Place::ankara()).unwrap();
+        assert!(replay.moving()[..285].iter().all(|moves| !moves));
+        assert!(replay.moving()[300..].iter().all(|moves| *moves));
+        assert!(replay.swings().unwrap()[100][0].rate.abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_missing_reading_repeats_the_one_before_it() {
+        let encoders = [[f64::NAN; 3], [1.0, 2.0, 3.0], [f64::NAN; 3], [1.1, 2.0, 3.0]];
+        let angles = unwrapped(&encoders).unwrap();
+        assert_eq!(angles, [[1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [1.1, 2.0, 3.0]]);
+        assert!(unwrapped(&[[f64::NAN; 3]]).is_none());
+    }
+}
