@@ -53,7 +53,8 @@ fn a_healthy_residual_whitened_by_its_own_noise_has_the_energy_of_noise() {
         let left = normal.energy - normal.score.dot(&information.cholesky().unwrap().solve(&normal.score));
         let counts = linear.scene.counts.iter().flatten().filter(|count| **count > 0).count();
         let freedom = (3 * counts - n) as f64;
-        assert!((left / freedom - 1.0).abs() < 0.05, "{left} of {freedom}");
+        // Noise in motion is the larger of two estimates: too much of it costs power, too little would cost honesty.
+        assert!((0.9..1.03).contains(&(left / freedom)), "{left} of {freedom}");
     });
 }
 

@@ -22,7 +22,7 @@ fn alter(values: &[f64], rows: &mut [Truth]) {
         let b_n = c_t_n * row.b_t;
         // About a horizontal axis across the field; a vertical field has none.
         if let Some(across) = b_n.cross(&Vector3::z()).try_normalize(0.0) {
-            row.add_field(&c_t_n, &(rotation::exp(&(across * -angle)) * b_n - b_n));
+            row.add_field(&c_t_n, &(rotation::exp(&(across * angle)) * b_n - b_n));
         }
     }
 }

@@ -185,9 +185,12 @@ fn known(encoders: &[[f64; 3]], reach: usize) -> Vec<bool> {
 /// Standard deviation of each encoder's readings, rad.
 fn noise(angles: &[[f64; 3]]) -> [f64; 3] {
     [0, 1, 2].map(|axis| {
-        let bends = angles.windows(3).map(|w| (w[0][axis] - 2.0 * w[1][axis] + w[2][axis]).abs()).collect();
-        // The median of |x| is 0.674 of its standard deviation; a bend has that of a reading, times √6.
-        median(bends).unwrap_or(0.0) / (0.674 * 6.0f64.sqrt())
+        let bend = |w: &[[f64; 3]]| {
+            (w[0][axis] - 4.0 * w[1][axis] + 6.0 * w[2][axis] - 4.0 * w[3][axis] + w[4][axis]).abs()
+        };
+        // Fourth differences, since movements are smooth. The median of |x| is 0.674 of its standard deviation; the
+        // difference has that of a reading, times √70.
+        median(angles.windows(5).map(bend).collect()).unwrap_or(0.0) / (0.674 * 70.0f64.sqrt())
     })
 }
 

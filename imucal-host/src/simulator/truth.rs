@@ -130,7 +130,8 @@ mod tests {
             let angle = 0.37 * f64::from(k);
             machine.gimbals = [angle, 1.7 * angle, -2.3 * angle].map(Swing::still);
             let truth = on_rig(0.0, &machine, &place, 25.0);
-            assert!((truth.f_t.norm() - place.gravity).abs() < 1e-13);
+            // Angles to 40 rad, of which each doubling beyond one costs a bit.
+            assert!((truth.f_t.norm() - place.gravity).abs() < 1e-12);
             assert!((truth.w_it_t.norm() - EARTH_RATE).abs() < 1e-18);
             // Up and Earth's axis: sine of the latitude.
             let sine = truth.f_t.dot(&truth.w_it_t) / (place.gravity * EARTH_RATE);
