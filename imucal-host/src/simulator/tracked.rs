@@ -1,6 +1,7 @@
 //! A recorded attitude: what an optical reference said, as a source of truth.
 //!
-//! About each row the turn from its attitude is a cubic in time, by least squares over the rows within [`REACH`]:
+//! About each row the turn from its attitude is a cubic in time, by least squares over rows some hundredths of
+//! a second away:
 //!
 //! ```text
 //! Log(C_kᵀ C_j) ≈ c₀ + c₁ τ + c₂ τ² + c₃ τ³      C = C_k Exp(c₀),  w = c₁,  ẇ = 2 c₂      τ = t_j − t_k
