@@ -126,7 +126,7 @@ impl<'a> Scene<'a> {
     }
 
     fn truth(&self, doses: &[Dose], nodes: &Nodes) -> Vec<Truth> {
-        Chain::new(doses).truth(self.motion, &nodes.times)
+        Chain::new(doses).truth(self.motion.steady(), &nodes.times)
     }
 
     /// The truth in the middle of each block, without any effect.

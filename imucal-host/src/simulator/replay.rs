@@ -1,8 +1,10 @@
 //! A recorded movement: what the encoders of a rig said, as a source of truth.
 //!
 //! Angle, rate and acceleration of each gimbal are those of a cubic through the readings about a row, by least squares:
-//! a reading's noise is averaged, and a movement whose angle is a cubic over that time stays as it is. The noisier the
-//! readings, the more of them: a rate that is as noisy as a gyroscope would be taken for one that is filtered.
+//! a movement whose angle is a cubic over that time stays as it is. The cubic is short: a mean over many rows rids their
+//! rates of nearly all the readings' noise, since what one has too much its neighbour lacks, but of no bend that the
+//! cubic has cut. What must not be noisy row by row, as the movement of which an effect's size is told, comes from
+//! longer cubics, the longer the noisier the readings ([`Recorded::steady`]).
 //! Where a wider cubic tells another rate, the gimbal has jerked, and its rate there is not known.
 //! Between rows the nearest row's swing goes on with constant acceleration. Where readings change no more than their
 //! noise would make them, the cubic goes through those of a fifth of a second. Not modelled: readings that lag the gimbal.
@@ -48,6 +50,7 @@ pub struct Replay {
     temperature: Vec<f64>,
     axes: [Axis; 3],
     place: Place,
+    steady: Option<Box<Replay>>,
 }
 
 impl Replay {
@@ -63,31 +66,17 @@ impl Replay {
         let angles = unwrapped(encoders)?;
         let interval = (time.last()? - time.first()?) / (time.len().max(2) - 1) as f64;
         let noise = noise(&angles);
-        let reach = ((reach(&noise, interval) / interval).round() as usize).max(FEWEST);
+        let rows = |reach: f64| ((reach / interval).round() as usize).max(FEWEST);
+        let (short, long) = (rows(REACH.0), rows(reach(&noise, interval)));
         let moving = moving(time, &angles, &noise);
-        let mut known = known(encoders, reach);
-        // What hardly moves does so slowly: more readings tell its rate.
-        let patient = ((WINDOW / interval).round() as usize).max(reach);
-        let mut swings = Vec::with_capacity(time.len());
-        for row in 0..time.len() {
-            if !moving[row] {
-                swings.push(swing(time, &angles, row, patient));
-                continue;
-            }
-            let near = swing(time, &angles, row, reach);
-            let wide = swing(time, &angles, row, reach + 1);
-            // Noise of a rate is about that of a reading in the time between two.
-            let jerked = (0..3).any(|gimbal| {
-                let apart = (near[gimbal].rate - wide[gimbal].rate).abs();
-                apart > JERK + NOISES * noise[gimbal] / interval
-            });
-            if jerked {
-                let to = (row + reach + 1).min(known.len());
-                known[row.saturating_sub(reach)..to].fill(false);
-            }
-            swings.push(near);
-        }
-        Some(Self { time: time.to_vec(), swings, moving, known, temperature, axes, place })
+        let known = known(encoders, long);
+        let of = |reach: usize| {
+            let (swings, known) = swings(time, &angles, &noise, &moving, known.clone(), reach);
+            let (time, moving, temperature) = (time.to_vec(), moving.clone(), temperature.clone());
+            Self { time, swings, moving, known, temperature, axes, place, steady: None }
+        };
+        let steady = (long > short).then(|| Box::new(of(long)));
+        Some(Self { steady, ..of(short) })
     }
 }
 
@@ -133,7 +122,14 @@ impl Recorded for Replay {
     }
 
     fn swings(&self) -> Option<&[[Swing; 3]]> {
-        Some(&self.swings)
+        Some(self.steady.as_ref().map_or(&self.swings, |steady| &steady.swings))
+    }
+
+    fn steady(&self) -> &dyn Motion {
+        match &self.steady {
+            Some(steady) => &**steady,
+            None => self,
+        }
     }
 }
 
@@ -212,6 +208,40 @@ fn moving(time: &[f64], angles: &[[f64; 3]], noise: &[f64; 3]) -> Vec<bool> {
             })
         })
         .collect()
+}
+
+/// Each row's swing by cubics through so many readings to each side, and at which of the rows it is known.
+fn swings(
+    time: &[f64],
+    angles: &[[f64; 3]],
+    noise: &[f64; 3],
+    moving: &[bool],
+    mut known: Vec<bool>,
+    reach: usize,
+) -> (Vec<[Swing; 3]>, Vec<bool>) {
+    let interval = (time[time.len() - 1] - time[0]) / (time.len().max(2) - 1) as f64;
+    // What hardly moves does so slowly: more readings tell its rate.
+    let patient = ((WINDOW / interval).round() as usize).max(reach);
+    let mut swings = Vec::with_capacity(time.len());
+    for row in 0..time.len() {
+        if !moving[row] {
+            swings.push(swing(time, angles, row, patient));
+            continue;
+        }
+        let near = swing(time, angles, row, reach);
+        let wide = swing(time, angles, row, reach + 1);
+        // Noise of a rate is about that of a reading in the time between two.
+        let jerked = (0..3).any(|gimbal| {
+            let apart = (near[gimbal].rate - wide[gimbal].rate).abs();
+            apart > JERK + NOISES * noise[gimbal] / interval
+        });
+        if jerked {
+            let to = (row + reach + 1).min(known.len());
+            known[row.saturating_sub(reach)..to].fill(false);
+        }
+        swings.push(near);
+    }
+    (swings, known)
 }
 
 /// The cubic through the readings about a row, by least squares.

@@ -146,6 +146,10 @@ impl Recorded for Tracked {
     fn swings(&self) -> Option<&[[Swing; 3]]> {
         None
     }
+
+    fn steady(&self) -> &dyn Motion {
+        self
+    }
 }
 
 /// Attitudes with the missing ones filled in.

@@ -64,8 +64,11 @@ pub trait Recorded: Motion + Sync {
     /// Whether the recording tells the attitude, row by row.
     fn known(&self) -> &[bool];
 
-    /// Swings of the gimbals at each row, outermost first; `None` without gimbals.
+    /// Swings of the gimbals at each row, outermost first, those of [`steady`](Self::steady); `None` without gimbals.
     fn swings(&self) -> Option<&[[Swing; 3]]>;
+
+    /// The same movement told from more readings at a time, where they are noisy: less noise row by row, and bends cut.
+    fn steady(&self) -> &dyn Motion;
 }
 
 /// The truth on a three-gimbal rig.
