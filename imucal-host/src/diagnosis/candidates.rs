@@ -87,6 +87,17 @@ impl Candidates {
         }
         candidates
     }
+
+    /// Whether an effect is fitted always.
+    pub fn has_term(&self, effect: &Effect) -> bool {
+        self.baseline.iter().any(|term| std::ptr::eq(*term, effect))
+    }
+
+    /// An effect's parameters among those of all candidates, in their order; none for a term of the baseline.
+    pub fn shape(&self, shapes: &[Vec<f64>], effect: &Effect) -> Vec<f64> {
+        let at = self.effects.iter().position(|other| std::ptr::eq(*other, effect));
+        at.and_then(|at| shapes.get(at).cloned()).unwrap_or_default()
+    }
 }
 
 /// It acts through a gimbal.

@@ -24,6 +24,15 @@ pub struct Standing {
     pub set: Vec<&'static Effect>,
 }
 
+/// Effects that were not asserted where nothing was, and cannot be excluded: beside none at all, each has more than what a
+/// credible set leaves out. Likeliest first.
+pub fn suspects(linear: &Linear<'_>, none: &Judged) -> Option<Vec<&'static Effect>> {
+    let (own, ranked) = linear.ranked(&none.set, &none.noise)?;
+    let odds = |value: f64| (value - own).exp();
+    let likely = ranked.into_iter().take_while(|(value, _)| odds(*value) > 1.0 - CREDIBLE);
+    Some(likely.map(|(_, effect)| effect).collect())
+}
+
 /// The standing of one cause of a set.
 pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> Option<Standing> {
     let rest: Vec<&'static Effect> =

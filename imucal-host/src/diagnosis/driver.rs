@@ -6,22 +6,10 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{DMatrix, SymmetricEigen, Vector3};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use nalgebra::Vector3;
 
-use super::{
-    block::Block,
-    design::Design,
-    evidence::Projected,
-    noise::{NEAR, Noise},
-    orientation,
-    scene::{Means, Scene},
-    search::Linear,
-};
-use crate::{
-    effect::{Effect, Swing},
-    recording::SensorKind,
-};
+use super::{block::Block, orientation, scene::Scene};
+use crate::{effect::Swing, recording::SensorKind};
 
 /// Harmonics of a gimbal's angle.
 const HARMONICS: [&str; 3] = ["first", "second", "third"];
@@ -29,15 +17,8 @@ const HARMONICS: [&str; 3] = ["first", "second", "third"];
 const WAVES: usize = 8;
 /// A temperature's rate is taken over this time, s.
 const WARMING: f64 = 30.0;
-/// The χ² of a test is divided by this: white noise is known to a few per cent.
-const CAUTION: f64 = 1.1;
-/// A driver that would be followed by chance less often than this in a quieter noise is tested again.
-const SUSPECT: f64 = 1e-9;
-/// Drivers tested again.
-const SUSPECTS: usize = 4;
-/// Directions that keep less than this share of their information do not count.
-const RETAINED: f64 = 1e-4;
-
+/// Times over which what a motion leaves behind fades, s.
+const FADING: [f64; 3] = [5.0, 20.0, 60.0];
 /// A driver and its functions, by block.
 #[derive(Clone, Debug)]
 pub struct Driver {
@@ -67,7 +48,7 @@ impl Function {
 
 impl Driver {
     /// Places of its columns for a sensor: function and axis.
-    fn columns(&self, kind: SensorKind) -> Vec<(usize, usize)> {
+    pub fn columns(&self, kind: SensorKind) -> Vec<(usize, usize)> {
         let axes = (0..self.functions.len()).flat_map(|function| (0..3).map(move |axis| (function, axis)));
         let wanted = |(function, axis): &(usize, usize)| {
             self.functions[*function].of.is_none_or(|of| of == (kind, *axis))
@@ -76,27 +57,15 @@ impl Driver {
     }
 }
 
-/// How a sensor's residual follows a driver.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Following {
-    /// Sensor.
-    pub kind: SensorKind,
-    /// Driver.
-    pub driver: String,
-    /// The function and axis that it follows most.
-    pub detail: String,
-    /// Whitened squared size of what follows it, less what noise alone would give.
-    pub size: f64,
-    /// Probability of as much by noise, this test alone.
-    pub p_value: f64,
-}
-
 /// The drivers of a scene: those that vary in it. `given` is what each sensor puts out, block by block.
 pub fn drivers(scene: &Scene<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Driver> {
     let mut drivers = match scene.swings {
         Some(swings) => {
             let middle = |b: &Block| swings.get((b.rows.start + b.rows.end) / 2).copied().unwrap_or_default();
-            of_gimbals(&scene.blocks.iter().map(middle).collect::<Vec<_>>())
+            let swings: Vec<[Swing; 3]> = scene.blocks.iter().map(middle).collect();
+            let mut drivers = of_gimbals(&swings);
+            drivers.push(recent_motion(&swings, &scene.blocks));
+            drivers
         }
         None => orientation::drivers(&scene.plain(), &scene.kinds),
     };
@@ -110,11 +79,13 @@ pub fn drivers(scene: &Scene<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Driver>
         let square = temperature.iter().map(|t| t * t).collect();
         let rate = rates(scene, &temperature);
         let functions = vec![Function::new("linear", temperature), Function::new("quadratic", square)];
+        drivers.push(leaning(given, &functions[0].values));
         drivers.push(Driver { name: "temperature".into(), functions });
         drivers
             .push(Driver { name: "temperature_rate".into(), functions: vec![Function::new("linear", rate)] });
     }
     drivers.push(input(given));
+    drivers.push(other_input(given));
     drivers.retain_mut(|driver| {
         driver.functions.retain_mut(|function| standardise(&mut function.values));
         !driver.functions.is_empty()
@@ -182,26 +153,90 @@ fn approach(swings: &[[Swing; 3]]) -> Driver {
     Driver { name: "direction_of_approach".into(), functions: functions.collect() }
 }
 
+/// What motion has left behind, fading: heat of the drives, a body that swings out.
+fn recent_motion(swings: &[[Swing; 3]], blocks: &[Block]) -> Driver {
+    let fading = |time: f64| {
+        let mut left = 0.0;
+        let mut last = blocks.first().map_or(0.0, |block| block.time);
+        let values = swings
+            .iter()
+            .zip(blocks)
+            .map(|(swings, block)| {
+                let kept = libm::exp(-(block.time - last) / time);
+                last = block.time;
+                left = kept * left + (1.0 - kept) * swings.iter().map(|s| s.rate * s.rate).sum::<f64>();
+                left
+            })
+            .collect();
+        Function::new(format!("fading over {time} s"), values)
+    };
+    Driver { name: "recent_motion".into(), functions: FADING.map(fading).into() }
+}
+
 /// What each axis itself senses, by the Legendre polynomials of degree two to six: none of the affine part.
 fn input(given: &[Vec<Vector3<f64>>; 3]) -> Driver {
+    let of = |kind: SensorKind, axis: usize| {
+        let degrees = legendre(&sensed(given, kind, axis), 6).into_iter().enumerate().skip(2);
+        degrees.map(move |(degree, values)| {
+            let detail = format!("degree {degree}");
+            Function { detail, values, of: Some((kind, axis)) }
+        })
+    };
+    let axes = SensorKind::ALL.into_iter().flat_map(|kind| (0..3).map(move |axis| (kind, axis)));
+    Driver { name: "input".into(), functions: axes.flat_map(|(kind, axis)| of(kind, axis)).collect() }
+}
+
+/// What the other axes of a triad sense, likewise, to the third degree, and their product.
+fn other_input(given: &[Vec<Vector3<f64>>; 3]) -> Driver {
     let mut functions = Vec::new();
     for (kind, axis) in SensorKind::ALL.into_iter().flat_map(|kind| (0..3).map(move |axis| (kind, axis))) {
-        let sensed: Vec<f64> = given[kind as usize].iter().map(|value| value[axis]).collect();
-        let largest = sensed.iter().fold(f64::MIN_POSITIVE, |most, value| most.max(value.abs()));
-        let (mut before, mut here) = (vec![1.0; sensed.len()], sensed);
-        here.iter_mut().for_each(|value| *value /= largest);
-        let x = here.clone();
-        for degree in 1..6 {
-            let n = f64::from(degree);
-            let next: Vec<f64> = (0..x.len())
-                .map(|k| ((2.0 * n + 1.0) * x[k] * here[k] - n * before[k]) / (n + 1.0))
-                .collect();
-            (before, here) = (here, next.clone());
-            let detail = format!("degree {}", degree + 1);
-            functions.push(Function { detail, values: next, of: Some((kind, axis)) });
+        let others = [(axis + 1) % 3, (axis + 2) % 3];
+        let own = others.map(|other| sensed(given, kind, other));
+        for (other, sensed) in others.iter().zip(&own) {
+            let name = ["x", "y", "z"][*other];
+            for (degree, values) in legendre(sensed, 3).into_iter().enumerate().skip(2) {
+                let detail = format!("of axis {name}, degree {degree}");
+                functions.push(Function { detail, values, of: Some((kind, axis)) });
+            }
+        }
+        let values = own[0].iter().zip(&own[1]).map(|(a, b)| a * b).collect();
+        functions.push(Function { detail: "product of two".into(), values, of: Some((kind, axis)) });
+    }
+    Driver { name: "other_input".into(), functions }
+}
+
+/// What the axes of a triad sense, by the temperature.
+fn leaning(given: &[Vec<Vector3<f64>>; 3], temperature: &[f64]) -> Driver {
+    let mean = temperature.iter().sum::<f64>() / temperature.len().max(1) as f64;
+    let mut functions = Vec::new();
+    for (kind, axis) in SensorKind::ALL.into_iter().flat_map(|kind| (0..3).map(move |axis| (kind, axis))) {
+        for (input, name) in ["x", "y", "z"].iter().enumerate() {
+            let sensed = sensed(given, kind, input);
+            let values = sensed.iter().zip(temperature).map(|(x, t)| x * (t - mean)).collect();
+            let detail = format!("with the input of axis {name}");
+            functions.push(Function { detail, values, of: Some((kind, axis)) });
         }
     }
-    Driver { name: "input".into(), functions }
+    Driver { name: "temperature_and_input".into(), functions }
+}
+
+/// What an axis senses, as a share of the most that it does.
+fn sensed(given: &[Vec<Vector3<f64>>; 3], kind: SensorKind, axis: usize) -> Vec<f64> {
+    let sensed: Vec<f64> = given[kind as usize].iter().map(|value| value[axis]).collect();
+    let largest = sensed.iter().fold(f64::MIN_POSITIVE, |most, value| most.max(value.abs()));
+    sensed.into_iter().map(|value| value / largest).collect()
+}
+
+/// Legendre's polynomials of degree 0 to `most`.
+fn legendre(x: &[f64], most: usize) -> Vec<Vec<f64>> {
+    let mut degrees = vec![vec![1.0; x.len()], x.to_vec()];
+    for degree in 1..most {
+        let n = degree as f64;
+        let next =
+            |k: usize| ((2.0 * n + 1.0) * x[k] * degrees[degree][k] - n * degrees[degree - 1][k]) / (n + 1.0);
+        degrees.push((0..x.len()).map(next).collect());
+    }
+    degrees
 }
 
 fn temperature(scene: &Scene<'_>) -> Option<Vec<f64>> {
@@ -240,138 +275,4 @@ fn standardise(values: &mut [f64]) -> bool {
     let sigma = (values.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
     values.iter_mut().for_each(|v| *v /= sigma);
     sigma > 1e-6 * largest
-}
-
-/// How each sensor follows each driver once the baseline and `set` are fitted, the surest first.
-pub fn following(
-    linear: &Linear<'_>,
-    set: &[&'static Effect],
-    noise: &Noise,
-    drivers: &[Driver],
-) -> Option<Vec<Following>> {
-    let mut found = Vec::new();
-    for kind in &linear.scene.kinds {
-        let (design, fitted) = with_drivers(linear, set, *kind, drivers);
-        let projected = projected(linear, &design, fitted, noise)?;
-        let mut at = 0;
-        for driver in drivers {
-            let count = driver.columns(*kind).len();
-            let places: Vec<usize> = (at..at + count).collect();
-            at += count;
-            found.push(follow(*kind, driver, &projected, &places)?);
-        }
-    }
-    sort(&mut found);
-    Some(found)
-}
-
-/// As [`following`], but what would show in a quieter noise is tested again with a noise estimated beside it: a gap
-/// that nothing explains has been taken for drift or scatter.
-pub fn following_anew(
-    linear: &Linear<'_>,
-    set: &[&'static Effect],
-    noise: &Noise,
-    drivers: &[Driver],
-) -> Option<Vec<Following>> {
-    let mut found = following(linear, set, noise, drivers)?;
-    let suspects = following(linear, set, &noise.quieter(), drivers)?;
-    for suspect in suspects.iter().filter(|f| f.p_value < SUSPECT && !f.is_slow()).take(SUSPECTS) {
-        let Some(driver) = drivers.iter().find(|driver| driver.name == suspect.driver) else { continue };
-        let (design, fitted) = with_drivers(linear, set, suspect.kind, std::slice::from_ref(driver));
-        let every: Vec<usize> = (0..design.size).collect();
-        let mut anew = noise.clone();
-        anew.sensors[suspect.kind as usize] =
-            linear.weighing.fit(&design, suspect.kind, &every, noise, &NEAR);
-        let projected = projected(linear, &design, fitted, &anew)?;
-        let again = follow(suspect.kind, driver, &projected, &(0..every.len() - fitted).collect::<Vec<_>>())?;
-        if let Some(own) = found.iter_mut().find(|f| f.kind == again.kind && f.driver == again.driver)
-            && again.p_value < own.p_value
-        {
-            *own = again;
-        }
-    }
-    sort(&mut found);
-    Some(found)
-}
-
-fn sort(found: &mut [Following]) {
-    found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value).then(b.size.total_cmp(&a.size)));
-}
-
-impl Following {
-    /// Its driver is as slow as drift, which an estimate of the noise cannot tell from it.
-    fn is_slow(&self) -> bool {
-        self.driver == "time" || self.driver.starts_with("temperature")
-    }
-}
-
-/// The columns of the baseline and a set, and of drivers of one sensor behind them; with the number of the former.
-fn with_drivers(
-    linear: &Linear<'_>,
-    set: &[&'static Effect],
-    kind: SensorKind,
-    drivers: &[Driver],
-) -> (Design, usize) {
-    let fitted = linear.fitted(set);
-    let means: Vec<Means> = drivers
-        .iter()
-        .flat_map(|driver| driver.columns(kind).into_iter().map(move |at| (driver, at)))
-        .map(|(driver, (function, axis))| on(kind, axis, &driver.functions[function].values))
-        .collect();
-    let columns = fitted.iter().map(|id| linear.design.columns[*id]).collect();
-    (linear.design.extended(&fitted, columns, &means), fitted.len())
-}
-
-fn projected(linear: &Linear<'_>, design: &Design, fitted: usize, noise: &Noise) -> Option<Projected> {
-    let every: Vec<usize> = (0..design.size).collect();
-    let (first, others) = every.split_at(fitted);
-    let normal = design.normal(&linear.whitenings(noise), &every);
-    Projected::new(&normal, first, others)
-}
-
-/// A signature on one axis of one sensor.
-fn on(kind: SensorKind, axis: usize, values: &[f64]) -> Means {
-    let mut means: Means = Default::default();
-    let along = |value: &f64| Vector3::from_fn(|k, _| if k == axis { *value } else { 0.0 });
-    means[kind as usize] = Some(values.iter().map(along).collect());
-    means
-}
-
-fn follow(kind: SensorKind, driver: &Driver, projected: &Projected, places: &[usize]) -> Option<Following> {
-    let (statistic, dimensions) = score_test(projected, places);
-    let p_value = match ChiSquared::new(dimensions.max(1) as f64) {
-        Ok(distribution) if dimensions > 0 => distribution.sf(statistic / CAUTION),
-        _ => 1.0,
-    };
-    let single =
-        |place: &usize| projected.score[*place].powi(2) / projected.information[(*place, *place)].max(1e-12);
-    let most = places.iter().max_by(|a, b| single(a).total_cmp(&single(b)))?;
-    let (function, axis) = *driver.columns(kind).get(most - places[0])?;
-    Some(Following {
-        kind,
-        driver: driver.name.clone(),
-        detail: format!("{} axis, {}", ["x", "y", "z"][axis], driver.functions[function].detail),
-        size: (statistic - dimensions as f64).max(0.0),
-        p_value,
-    })
-}
-
-/// sᵀ V⁺ s and the rank of V, over directions that the projection leaves.
-pub fn score_test(projected: &Projected, places: &[usize]) -> (f64, usize) {
-    let n = places.len();
-    let scale = |i: usize| 1.0 / projected.before[places[i]].max(f64::MIN_POSITIVE).sqrt();
-    let v =
-        DMatrix::from_fn(n, n, |i, j| projected.information[(places[i], places[j])] * scale(i) * scale(j));
-    let eigen = SymmetricEigen::new(v);
-    let mut sum = 0.0;
-    let mut rank = 0;
-    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-        if *value > RETAINED {
-            let along: f64 =
-                vector.iter().enumerate().map(|(i, v)| v * projected.score[places[i]] * scale(i)).sum();
-            sum += along * along / value;
-            rank += 1;
-        }
-    }
-    (sum, rank)
 }

@@ -9,8 +9,9 @@
 //! ```
 //!
 //! A difference of energies needs no noise floor, so that white noise known to a few per cent does no harm. The
-//! interval is that of a jackknife over the folds, widened by what no driver test would have seen. Not modelled: drift
-//! that ties one fold to the next.
+//! interval is that of a jackknife over the folds, widened by what no test would have seen: below it stands the share
+//! that would be closed if the gap held as much again as an effect that just escapes the search. Not modelled: drift that
+//! ties one fold to the next.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -26,7 +27,9 @@ const LOOSE: f64 = 1e4;
 /// Of an effect's: what few blocks tell of it must not run away on the others.
 const LARGE: f64 = 30.0;
 /// Standard deviation of a driver's statistic where there is nothing to follow: √(2·18).
-const UNSEEN: f64 = 6.0;
+const SCATTER: f64 = 6.0;
+/// Whitened squared size of an effect that the search may miss.
+const UNSEEN: f64 = 36.0;
 
 /// A share of the explainable gap.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,9 +91,10 @@ pub fn closed(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise, remai
             .collect();
         let mean = left.iter().sum::<f64>() / n;
         let variance = (n - 1.0) / n * left.iter().map(|l| (l - mean).powi(2)).sum::<f64>();
-        let sigma = (variance + (UNSEEN / explainable).powi(2)).sqrt();
+        let sigma = (variance + (SCATTER / explainable).powi(2)).sqrt();
         let bound = |x: f64| x.clamp(0.0, 1.0);
-        Share { value: bound(value), interval: [bound(value - 1.96 * sigma), bound(value + 1.96 * sigma)] }
+        let least = bound(value - 1.96 * sigma) * explainable / (explainable + UNSEEN);
+        Share { value: bound(value), interval: [least, bound(value + 1.96 * sigma)] }
     };
     let total = share(&closed);
     let mut each = Vec::new();

@@ -10,6 +10,7 @@ pub mod estimate;
 pub mod evidence;
 pub mod experiment;
 pub mod finding;
+pub mod following;
 pub mod footing;
 pub mod gap;
 pub mod model;
@@ -27,8 +28,8 @@ pub mod whitening;
 pub use self::finding::{Diagnosis, Verdict};
 use self::{
     candidates::{Candidates, Setting},
-    driver::Following,
     finding::{Cause, Place as Driven},
+    following::Following,
     footing::Footing,
     scene::Scene,
     search::Explained,
@@ -122,8 +123,8 @@ fn untestable(recording: &Recording, why: String) -> Diagnosis {
 fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&str)) -> Option<Diagnosis> {
     let (linear, best) = (&explained.linear, &explained.best);
     let drivers = driver::drivers(linear.scene, &linear.weighing.given);
-    let before = driver::following(linear, &[], &best.noise, &drivers)?;
-    let after = driver::following_anew(linear, &best.set, &best.noise, &drivers)?;
+    let before = following::following(linear, &[], &best.noise, &drivers)?;
+    let after = following::following_anew(linear, &best.set, &best.noise, &drivers)?;
     progress("drivers tested");
     let left = after.iter().find(|f| is_followed(f, after.len()));
     let closed = gap::closed(linear, &best.set, &best.noise, left.map_or(0.0, |f| f.size))?;
@@ -149,7 +150,8 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
     let remarks = if linear.scene.swings.is_none() { unborne(&mut causes) } else { Vec::new() };
     causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let mut credible_set: Vec<String> = Vec::new();
-    for effect in standings.iter().flat_map(|standing| &standing.set) {
+    let suspects = if best.set.is_empty() { credible::suspects(linear, best)? } else { Vec::new() };
+    for effect in standings.iter().flat_map(|standing| &standing.set).chain(&suspects) {
         if !credible_set.contains(&effect.id) {
             credible_set.push(effect.id.clone());
         }

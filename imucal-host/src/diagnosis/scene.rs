@@ -16,8 +16,11 @@ use crate::{
     },
 };
 
-/// Nodes of signatures are this far apart, s; where no rig guides the sensor, which moves briskly then, the latter.
+/// Nodes of signatures are this far apart in motion, s; where no rig guides the sensor, which moves briskly then, the
+/// latter.
 const NODES: (f64, f64) = (0.045, 0.0175);
+/// At rest on a rig nothing changes from one to the next, s.
+const RESTING: f64 = 0.25;
 
 /// Rows at which a run is simulated.
 #[derive(Clone, Debug, Default)]
@@ -27,10 +30,12 @@ pub struct Nodes {
 }
 
 impl Nodes {
-    fn choose(time: &[f64], blocks: &[Block], wanted: impl Fn(&Block, usize) -> bool) -> Self {
+    /// So many rows of each block, evenly over it.
+    fn choose(time: &[f64], blocks: &[Block], count: impl Fn(&Block) -> usize) -> Self {
         let mut nodes = Self::default();
         for (index, block) in blocks.iter().enumerate() {
-            for row in block.rows.clone().filter(|row| wanted(block, *row)) {
+            let (rows, count) = (block.rows.len(), count(block).max(1));
+            for row in (0..count).map(|k| block.rows.start + (2 * k + 1) * rows / (2 * count)) {
                 nodes.times.push(time[row]);
                 nodes.blocks.push(index);
             }
@@ -102,10 +107,13 @@ impl<'a> Scene<'a> {
         });
         let kinds = SensorKind::ALL.into_iter().filter(|kind| recording.sensor(*kind).is_some()).collect();
         let apart = if motion.swings().is_some() { NODES.0 } else { NODES.1 };
-        let stride = ((apart / interval).round() as usize).max(1);
-        let fine = Nodes::choose(&recording.time, &blocks, |_, row| row % stride == stride / 2);
-        let centre = |block: &Block, row: usize| row == (block.rows.start + block.rows.end) / 2;
-        let coarse = Nodes::choose(&recording.time, &blocks, centre);
+        let fine = |block: &Block| {
+            let still = block.rest.is_some() && motion.swings().is_some();
+            let stride = ((if still { RESTING } else { apart } / interval).round() as usize).max(1);
+            block.rows.len().div_ceil(stride)
+        };
+        let fine = Nodes::choose(&recording.time, &blocks, fine);
+        let coarse = Nodes::choose(&recording.time, &blocks, |_| 1);
         Self {
             recording,
             blocks,
@@ -187,7 +195,8 @@ impl<'a> Scene<'a> {
 
 /// A simulated run at the nodes, to be differentiated.
 pub struct Reference<'s> {
-    scene: &'s Scene<'s>,
+    /// What is simulated beside.
+    pub scene: &'s Scene<'s>,
     nodes: &'s Nodes,
     /// Effects of the run, the baseline among them.
     pub doses: Vec<Dose>,

@@ -14,6 +14,8 @@ use crate::effect::{Effect, Role};
 
 /// Distance of instants in a menu, s, and as a share of the recording where that is more.
 const GRID: (f64, f64) = (5.0, 1.0 / 60.0);
+/// About the best pair of instants, a menu this many times as dense.
+const CLOSER: i32 = 8;
 /// Signatures judged at once.
 const BATCH: usize = 12;
 
@@ -144,42 +146,62 @@ fn vary(menu: &[Vec<f64>], at: usize, values: &[f64]) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// An episode is what began less what began at its end: one signature for each beginning serves all pairs.
+/// An episode is what began less what began at its end: one signature for each instant serves all pairs. Looked for all
+/// over the recording, and then closer about the best pair.
 fn episode(
     effect: &'static Effect,
     reference: &Reference<'_>,
     backdrop: &Backdrop<'_>,
     duration: f64,
 ) -> Option<Vec<f64>> {
-    let instants: Vec<usize> = (0..effect.parameters.len())
-        .filter(|at| matches!(effect.parameters[*at].role, Role::Instant { .. }))
-        .collect();
-    let [start, end] = *instants else { return None };
     let step = GRID.0.max(GRID.1 * duration);
-    let times: Vec<f64> = (1..(duration / step) as usize).map(|k| step * k as f64).collect();
-    let from = |time: f64| {
-        let mut shape = effect.neutral(duration);
-        (shape[start], shape[end]) = (time, f64::INFINITY);
-        shape
+    let all: Vec<f64> = (1..(duration / step) as usize).map(|k| step * k as f64).collect();
+    let (start, end) = pair(effect, reference, backdrop, &all, &all)?;
+    let about = |instant: f64| -> Vec<f64> {
+        let closer = (1 - CLOSER..CLOSER).map(|k| instant + step * f64::from(k) / f64::from(CLOSER));
+        closer.filter(|time| (0.0..duration).contains(time)).collect()
     };
-    let shapes: Vec<Vec<f64>> = times.iter().map(|time| from(*time)).collect();
+    let ends = if end.is_finite() { about(end) } else { Vec::new() };
+    let (start, end) = pair(effect, reference, backdrop, &about(start), &ends)?;
+    Some(placed(effect, duration, start, end))
+}
+
+/// Its parameters with these instants, s.
+fn placed(effect: &Effect, duration: f64, start: f64, end: f64) -> Vec<f64> {
+    let mut shape = effect.neutral(duration);
+    let instants =
+        shape.iter_mut().zip(&effect.parameters).filter(|(_, p)| matches!(p.role, Role::Instant { .. }));
+    instants.zip([start, end]).for_each(|((value, _), instant)| *value = instant);
+    shape
+}
+
+/// The most evident beginning and end of those given; an end that never comes is among them.
+fn pair(
+    effect: &'static Effect,
+    reference: &Reference<'_>,
+    backdrop: &Backdrop<'_>,
+    starts: &[f64],
+    ends: &[f64],
+) -> Option<(f64, f64)> {
+    let mut times: Vec<f64> = starts.iter().chain(ends).copied().collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    let shapes: Vec<Vec<f64>> =
+        times.iter().map(|time| placed(effect, backdrop.scene.duration(), *time, f64::INFINITY)).collect();
     let (projected, each) = project(effect, &shapes, reference, backdrop)?;
-    let mut best: Option<(f64, usize, Option<usize>)> = None;
-    for i in 0..times.len() {
-        for j in (i + 1..times.len()).map(Some).chain([None]) {
+    let own: Vec<usize> = (0..each).collect();
+    let mut best: Option<(f64, (f64, f64))> = None;
+    for (i, start) in times.iter().enumerate().filter(|(_, time)| starts.contains(time)) {
+        let later = (i + 1..times.len()).filter(|j| ends.contains(&times[*j]));
+        for j in later.map(Some).chain([None]) {
             let pair = projected.combined(&places(i, each), j.map(|j| places(j, each)).as_deref());
-            let own: Vec<usize> = (0..each).collect();
             let value = pair.log_bayes_factor(&[&own]);
-            if best.is_none_or(|(most, ..)| value > most) {
-                best = Some((value, i, j));
+            if best.is_none_or(|(most, _)| value > most) {
+                best = Some((value, (*start, j.map_or(f64::INFINITY, |j| times[j]))));
             }
         }
     }
-    best.map(|(_, i, j)| {
-        let mut shape = from(times[i]);
-        shape[end] = j.map_or(f64::INFINITY, |j| times[j]);
-        shape
-    })
+    best.map(|(_, pair)| pair)
 }
 
 /// Improves a shape by steps that are halved, and tells how far each parameter may move before the evidence falls by a

@@ -1,9 +1,9 @@
 //! Which effects would have been seen, and which this recording cannot show.
 
 use super::{
-    driver::score_test,
     evidence::Projected,
     finding::{Absent, NotTestable},
+    following::score_test,
     noise::Noise,
     search::Linear,
 };
