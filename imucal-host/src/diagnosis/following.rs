@@ -1,15 +1,18 @@
 //! Whether a sensor's residual follows a driver: score tests, and evidence with a noise of its own.
 
-use nalgebra::{DMatrix, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
+use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
-    design::Design,
+    design::{Design, Normal},
     driver::Driver,
     evidence::Projected,
+    frequency,
     noise::{NEAR, Noise},
     scene::Means,
     search::{Linear, log_evidence},
+    whitening::Whitening,
 };
 use crate::{effect::Effect, recording::SensorKind};
 
@@ -19,6 +22,8 @@ const CAUTION: f64 = 1.1;
 const SUSPECT: f64 = 1e-9;
 /// Drivers tested again, of those as slow as drift and of the others.
 const SUSPECTS: (usize, usize) = (2, 4);
+/// Standard deviation of a fitted column's prior, in usual sizes.
+const LOOSE: f64 = 1e4;
 /// Directions that keep less than this share of their information do not count.
 const RETAINED: f64 = 1e-4;
 
@@ -44,20 +49,80 @@ pub fn following(
     noise: &Noise,
     drivers: &[Driver],
 ) -> Option<Vec<Following>> {
-    let mut found = Vec::new();
-    for kind in &linear.scene.kinds {
-        let (design, fitted) = with_drivers(linear, set, *kind, drivers, noise);
-        let projected = projected(linear, &design, fitted, noise)?;
-        let mut at = 0;
-        for driver in drivers {
-            let count = driver.columns(*kind).len();
-            let places: Vec<usize> = (at..at + count).collect();
-            at += count;
-            found.push(follow(*kind, driver, &projected, &places)?);
-        }
-    }
+    let fitted = linear.fitted(set);
+    let whitenings = linear.whitenings(noise);
+    let normal = linear.design.normal(&whitenings, &fitted);
+    let kinds = linear.scene.kinds.iter();
+    let pairs: Vec<(SensorKind, &Driver)> =
+        kinds.flat_map(|kind| drivers.iter().map(move |driver| (*kind, driver))).collect();
+    let follow = |(kind, driver): &(SensorKind, &Driver)| {
+        let projected = across(linear, &whitenings, *kind, driver, &fitted).projected(&normal)?;
+        let places: Vec<usize> = (0..projected.score.len()).collect();
+        follow(*kind, driver, &projected, &places)
+    };
+    let mut found: Vec<Following> = pairs.par_iter().map(follow).collect::<Option<_>>()?;
     sort(&mut found);
     Some(found)
+}
+
+/// What a driver's columns share with those fitted.
+struct Across {
+    /// Dᵀ Σ⁻¹ r.
+    score: DVector<f64>,
+    /// Dᵀ Σ⁻¹ D.
+    information: DMatrix<f64>,
+    /// Xᵀ Σ⁻¹ D.
+    cross: DMatrix<f64>,
+}
+
+impl Across {
+    /// With the fitted columns, of these normal equations, projected out.
+    fn projected(self, fitted: &Normal) -> Option<Projected> {
+        let n = fitted.score.len();
+        let loosened = &fitted.information + DMatrix::identity(n, n) / (LOOSE * LOOSE);
+        let factor = loosened.cholesky()?;
+        let solved = factor.solve(&self.cross);
+        Some(Projected {
+            score: self.score - solved.tr_mul(&fitted.score),
+            before: self.information.diagonal(),
+            information: self.information - self.cross.tr_mul(&solved),
+        })
+    }
+}
+
+fn across(
+    linear: &Linear<'_>,
+    whitenings: &[Whitening],
+    kind: SensorKind,
+    driver: &Driver,
+    fitted: &[usize],
+) -> Across {
+    let columns = driver.columns(kind);
+    let n = columns.len();
+    let (mut score, mut information) = (DVector::zeros(n), DMatrix::zeros(n, n));
+    let mut cross = DMatrix::zeros(fitted.len(), n);
+    for (channel, whitening) in linear.design.channels.iter().zip(whitenings) {
+        let own: Vec<usize> =
+            (0..n).filter(|at| channel.kind == kind && columns[*at].1 == channel.axis).collect();
+        let shared: Vec<(usize, usize)> = (0..fitted.len())
+            .filter_map(|to| Some((to, channel.ids.iter().position(|id| *id == fitted[to])?)))
+            .collect();
+        for at in &own {
+            let values = &driver.functions[columns[*at].0].values;
+            let mut weighed = DVector::zeros(values.len());
+            whitening.apply(values, weighed.as_mut_slice());
+            score[*at] = channel.y.dot(&weighed);
+            for other in &own {
+                let other_values = &driver.functions[columns[*other].0].values;
+                information[(*other, *at)] =
+                    other_values.iter().zip(weighed.iter()).map(|(a, b)| a * b).sum();
+            }
+            for (to, from) in &shared {
+                cross[(*to, *at)] = channel.x.column(*from).dot(&weighed);
+            }
+        }
+    }
+    Across { score, information, cross }
 }
 
 /// As [`following`], but what would show in a quieter noise is judged again by its evidence, with a noise estimated
@@ -76,24 +141,31 @@ pub fn following_anew(
     };
     for suspect in suspects(true, SUSPECTS.0).chain(suspects(false, SUSPECTS.1)) {
         let Some(driver) = drivers.iter().find(|driver| driver.name == suspect.driver) else { continue };
-        let again = judged(linear, set, noise, suspect.kind, driver)?;
+        let again = judged(linear, set, noise, suspect.kind, driver, 1)?;
         if let Some(own) = found.iter_mut().find(|f| f.kind == again.kind && f.driver == again.driver)
             && again.p_value < own.p_value
         {
             *own = again;
         }
     }
+    let whitenings = linear.whitenings(noise);
+    for kind in &linear.scene.kinds {
+        if let Some((driver, choices)) = frequency::beat(linear, set, &whitenings, *kind) {
+            found.push(judged(linear, set, noise, *kind, &driver, choices)?);
+        }
+    }
     sort(&mut found);
     Some(found)
 }
 
-/// A driver beside a set, by the evidence that it adds with a noise of its own.
+/// A driver, chosen among so many, beside a set, by the evidence that it adds with a noise of its own.
 fn judged(
     linear: &Linear<'_>,
     set: &[&'static Effect],
     noise: &Noise,
     kind: SensorKind,
     driver: &Driver,
+    choices: usize,
 ) -> Option<Following> {
     let (design, fitted) = with_drivers(linear, set, kind, std::slice::from_ref(driver), noise);
     let every: Vec<usize> = (0..design.size).collect();
@@ -107,7 +179,7 @@ fn judged(
     anew.sensors[kind as usize] = linear.weighing.fit(&design, kind, &every, noise, &NEAR);
     let normal = design.normal(&linear.whitenings(&anew), &every);
     groups.push(every[fitted..].to_vec());
-    let gain = log_evidence(&normal, linear.baseline.len(), &groups)? - before;
+    let gain = log_evidence(&normal, linear.baseline.len(), &groups)? - before - (choices as f64).ln();
     let projected = Projected::new(&normal, &every[..fitted], &every[fitted..])?;
     let following = follow(kind, driver, &projected, &(0..every.len() - fitted).collect::<Vec<_>>())?;
     Some(Following { p_value: libm::exp(-gain.max(0.0)), ..following })
@@ -142,13 +214,6 @@ fn with_drivers(
         .collect();
     let columns = fitted.iter().map(|id| linear.design.columns[*id]).collect();
     (linear.design.extended(&fitted, columns, &means), fitted.len())
-}
-
-fn projected(linear: &Linear<'_>, design: &Design, fitted: usize, noise: &Noise) -> Option<Projected> {
-    let every: Vec<usize> = (0..design.size).collect();
-    let (first, others) = every.split_at(fitted);
-    let normal = design.normal(&linear.whitenings(noise), &every);
-    Projected::new(&normal, first, others)
 }
 
 /// A signature on one axis of one sensor.

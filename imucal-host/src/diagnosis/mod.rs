@@ -12,6 +12,7 @@ pub mod experiment;
 pub mod finding;
 pub mod following;
 pub mod footing;
+pub mod frequency;
 pub mod gap;
 pub mod model;
 pub mod noise;
@@ -123,8 +124,11 @@ fn untestable(recording: &Recording, why: String) -> Diagnosis {
 fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&str)) -> Option<Diagnosis> {
     let (linear, best) = (&explained.linear, &explained.best);
     let drivers = driver::drivers(linear.scene, &linear.weighing.given);
-    let before = following::following(linear, &[], &best.noise, &drivers)?;
     let after = following::following_anew(linear, &best.set, &best.noise, &drivers)?;
+    let before = match best.set.as_slice() {
+        [] => after.clone(),
+        _ => following::following(linear, &[], &best.noise, &drivers)?,
+    };
     progress("drivers tested");
     let left = after.iter().find(|f| is_followed(f, after.len()));
     let closed = gap::closed(linear, &best.set, &best.noise, left.map_or(0.0, |f| f.size))?;

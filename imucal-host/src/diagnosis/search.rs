@@ -4,6 +4,8 @@
 //! algebra first; the few best are judged again with the noise that suits them, since steps and sways hide in a drift
 //! that was estimated without them. After each change baseline and effects are fitted anew through the simulator.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use super::{
     candidates::{Candidates, is_shaped},
     design::{Design, Normal},
@@ -25,8 +27,10 @@ const MOST: (usize, usize) = (3, 5);
 /// An addition must raise the evidence by this, beyond its share of the prior. Of forty healthy recordings the likeliest
 /// addition reached 0.6 (`imucal blind`).
 const GAIN: f64 = 1.5;
-/// Sets judged with a noise of their own at each turn.
-const JUDGED: usize = 6;
+/// Sets judged with a noise of their own at each turn: of the likeliest, and of those that a quieter noise would have.
+const JUDGED: (usize, usize) = (6, 3);
+/// Normal equations that are kept.
+const KEPT: usize = 2;
 /// Fits of the baseline, each with the noise that the last one left, where no rig guides the sensor.
 const SETTLING: usize = 2;
 
@@ -55,7 +59,11 @@ pub struct Linear<'s> {
     pub baseline: Vec<usize>,
     /// Parameters of each candidate at which its signature was taken.
     pub shapes: Vec<Vec<f64>>,
+    normals: Normals,
 }
+
+/// Normal equations of all columns under the noises asked for last.
+type Normals = Mutex<Vec<(Noise, Arc<Normal>)>>;
 
 /// A search that has come to its end.
 pub struct Explained<'s> {
@@ -103,7 +111,7 @@ impl<'s> Linear<'s> {
             .collect();
         design.restore(&restored);
         let baseline = candidates.baseline.iter().flat_map(|term| design.of(term)).collect();
-        Some(Self { scene, candidates, design, weighing, baseline, shapes })
+        Some(Self { scene, candidates, design, weighing, baseline, shapes, normals: Normals::default() })
     }
 
     /// The same problem, with shapes of candidates that are best under another noise; `None` as well where those are the
@@ -131,7 +139,11 @@ impl<'s> Linear<'s> {
         let baseline = self.candidates.baseline.iter().flat_map(|term| design.of(term)).collect();
         let (scene, candidates) = (self.scene, self.candidates);
         let weighing = Weighing::new(scene, self.weighing.given.clone());
-        Some(Self { scene, candidates, design, weighing, baseline, shapes })
+        Some(Self { scene, candidates, design, weighing, baseline, shapes, normals: Normals::default() })
+    }
+
+    fn shape_of(&self, effect: &Effect) -> Vec<f64> {
+        self.candidates.shape(&self.shapes, effect)
     }
 
     /// Columns of the baseline and of a set.
@@ -179,12 +191,28 @@ impl<'s> Linear<'s> {
         self.weighing.whitenings(&self.design, noise)
     }
 
+    /// Normal equations of all columns.
+    pub fn normal(&self, noise: &Noise) -> Arc<Normal> {
+        let known = |normals: &Vec<(Noise, Arc<Normal>)>| {
+            normals.iter().find(|(other, _)| other == noise).map(|(_, normal)| Arc::clone(normal))
+        };
+        let locked = || self.normals.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(normal) = known(&locked()) {
+            return normal;
+        }
+        let every: Vec<usize> = (0..self.design.columns.len()).collect();
+        let normal = Arc::new(self.design.normal(&self.whitenings(noise), &every));
+        let mut normals = locked();
+        normals.truncate(KEPT - 1);
+        normals.insert(0, (noise.clone(), Arc::clone(&normal)));
+        normal
+    }
+
     /// Scores of all columns but the baseline's, with the baseline projected out.
     pub fn projected(&self, noise: &Noise) -> Option<(Projected, Vec<usize>)> {
-        let every: Vec<usize> = (0..self.design.columns.len()).collect();
-        let normal = self.design.normal(&self.whitenings(noise), &every);
-        let others: Vec<usize> = every.into_iter().filter(|id| !self.baseline.contains(id)).collect();
-        Some((Projected::new(&normal, &self.baseline, &others)?, others))
+        let every = 0..self.design.columns.len();
+        let others: Vec<usize> = every.filter(|id| !self.baseline.contains(id)).collect();
+        Some((Projected::new(&self.normal(noise), &self.baseline, &others)?, others))
     }
 
     /// Candidates by ln BF of a set with each of them added, best first; the set itself has the value returned beside.
@@ -214,14 +242,14 @@ impl<'s> Linear<'s> {
         Some((value(None), ranked))
     }
 
-    /// The best set with one effect more, judged with its own noise.
-    fn added(&self, from: &Judged) -> Option<Option<Judged>> {
-        let quiet = from.noise.quieter();
+    /// The best set with one effect more, judged with its own noise; of `among`.
+    fn added(&self, from: &Judged, among: &dyn Fn(&'static Effect) -> bool) -> Option<Option<Judged>> {
         let mut shortlist: Vec<&'static Effect> = Vec::new();
-        for noise in [&from.noise, &quiet] {
+        // Less noise than is true makes evidence, never takes it.
+        for (noise, most) in [(&from.noise, JUDGED.0), (&from.noise.quieter(), JUDGED.1)] {
             let (own, ranked) = self.ranked(&from.set, noise)?;
-            // Less noise than is true makes evidence, never takes it.
-            for (_, effect) in ranked.into_iter().take(JUDGED).filter(|(value, _)| *value > own) {
+            let likely = ranked.into_iter().filter(|(value, effect)| *value > own && among(effect));
+            for (_, effect) in likely.take(most) {
                 if !shortlist.iter().any(|other| std::ptr::eq(*other, effect)) {
                     shortlist.push(effect);
                 }
@@ -250,7 +278,7 @@ impl<'s> Linear<'s> {
             let taken = fewer.remove(at);
             let (_, ranked) = self.ranked(&fewer, &from.noise)?;
             let others = ranked.into_iter().filter(|(_, effect)| !std::ptr::eq(*effect, taken));
-            for (_, effect) in others.take(JUDGED / 2) {
+            for (_, effect) in others.take(JUDGED.1) {
                 let mut set = fewer.clone();
                 set.push(effect);
                 sets.push((set, either(taken.sensors, effect.sensors)));
@@ -340,7 +368,9 @@ pub fn search<'s>(
         best = linear.judge(&best.set, &best.noise, &SensorKind::ALL, &FAR)?;
         let mut next: Option<Judged> = None;
         if best.set.len() < most {
-            next = linear.added(&best)?.filter(|judged| judged.log_evidence > best.log_evidence + GAIN);
+            next = linear
+                .added(&best, &|_| true)?
+                .filter(|judged| judged.log_evidence > best.log_evidence + GAIN);
         }
         if next.is_none() && best.set.len() > 1 {
             next = linear.changed(&best)?.filter(|judged| judged.log_evidence > best.log_evidence + 0.5);
@@ -350,7 +380,10 @@ pub fn search<'s>(
             // A step or a sway that stands in the drift is not where that drift would have it.
             from_quiet = linear.reshaped(&fit, &best.noise.quieter());
             if let Some(quiet) = &from_quiet {
-                next = quiet.added(&best)?.filter(|judged| judged.log_evidence > best.log_evidence + GAIN);
+                let moved = |effect: &'static Effect| quiet.shape_of(effect) != linear.shape_of(effect);
+                next = quiet
+                    .added(&best, &moved)?
+                    .filter(|judged| judged.log_evidence > best.log_evidence + GAIN);
             }
         }
         let Some(next) = next else { break };

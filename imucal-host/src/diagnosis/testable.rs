@@ -20,11 +20,9 @@ pub fn testable(
     set: &[&'static Effect],
     noise: &Noise,
 ) -> Option<(Vec<Absent>, Vec<NotTestable>)> {
-    let every: Vec<usize> = (0..linear.design.columns.len()).collect();
-    let normal = linear.design.normal(&linear.whitenings(noise), &every);
     let fitted = linear.fitted(set);
-    let others: Vec<usize> = every.into_iter().filter(|id| !fitted.contains(id)).collect();
-    let projected = Projected::new(&normal, &fitted, &others)?;
+    let others: Vec<usize> = (0..linear.design.columns.len()).filter(|id| !fitted.contains(id)).collect();
+    let projected = Projected::new(&linear.normal(noise), &fitted, &others)?;
     let mut absent = Vec::new();
     let told = |(effect, why): &(&'static Effect, &str)| NotTestable {
         effect: effect.id.clone(),
