@@ -62,14 +62,15 @@ fn every_part_stays_within_its_instructions_flash_ram_and_stack() {
 
     print_costs(&costs);
     let [m4, m0] = &costs;
-    announce(&format!("{:<44} {:>12} {:>20}", "bytes over an empty image", "Cortex-M4F", "Cortex-M0"));
-    let both = |what: &str, [a, b]: [u64; 2]| announce(&format!("{what:<44} {a:>12} {b:>20}"));
+    announce("");
+    announce(&format!("{:<46} {:>12} {:>20}", "bytes over an empty image", "Cortex-M4F", "Cortex-M0"));
+    let both = |what: &str, [a, b]: [u64; 2]| announce(&format!("{what:<46} {a:>12} {b:>20}"));
     both("flash: decode and correct", flash.correct);
-    announce(&format!("{:<44} {:>12}", "flash: and fit, judge and pack every model", flash.fits));
+    announce(&format!("{:<46} {:>12}", "flash: and fit, judge and pack every model", flash.fits));
     both("flash: the co-processor, link and drivers", flash.whole);
     both("RAM: the co-processor and room for its fits", flash.ram);
-    announce(&format!("{:<44} {:>12}", "RAM: of them T9 of 64 rests", ram[0]));
-    announce(&format!("{:<44} {:>12}", "RAM: of them a swarm of 40 in 12 parameters", ram[1]));
+    announce(&format!("{:<46} {:>12}", "RAM: of them T9 of 64 rests", ram[0]));
+    announce(&format!("{:<46} {:>12}", "RAM: of them a swarm of 40 in 12 parameters", ram[1]));
     let depths = stack.map(|graph| graph.depth("main"));
     both("stack: the co-processor, by analysis", [0, 1].map(|k| depths[k].bytes.into()));
     both("stack: after every fit and a search, by paint", painted.map(Into::into));
@@ -124,11 +125,11 @@ fn print_costs([m4, m0]: &[Costs; 2]) {
     announce(
         "profile firmware (opt-level s); instructions by QEMU's -icount, stack below the caller by paint",
     );
-    announce(&format!("{:<44} {:>12} {:>7} {:>12} {:>7}", "", "Cortex-M4F", "stack", "Cortex-M0", "stack"));
+    announce(&format!("{:<46} {:>12} {:>7} {:>12} {:>7}", "", "Cortex-M4F", "stack", "Cortex-M0", "stack"));
     let row = |what: &str, name: &str, per: fn(&Part) -> f64| {
         let (a, b) = (&m4[name], &m0[name]);
         let many = |part: &Part| format!("{:.0}", part.instructions / per(part));
-        announce(&format!("{what:<44} {:>12} {:>7} {:>12} {:>7}", many(a), a.stack, many(b), b.stack));
+        announce(&format!("{what:<46} {:>12} {:>7} {:>12} {:>7}", many(a), a.stack, many(b), b.stack));
     };
     let each: fn(&Part) -> f64 = |part| part.count;
     let whole: fn(&Part) -> f64 = |_| 1.0;

@@ -5,7 +5,7 @@ use imucal_core::{
     link::FitModel,
     model::parameterisation::{FULL, UPPER_TRIANGULAR},
 };
-use imucal_tests::firmware::{BOARDS, Board, announce, build, ready, run, run_with};
+use imucal_tests::firmware::{BOARDS, Board, build, ready, run, run_with};
 use imucal_tests::footprint;
 use object::{Object, ObjectSection, ObjectSymbol};
 
