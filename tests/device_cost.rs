@@ -138,6 +138,15 @@ fn print_costs([m4, m0]: &[Costs; 2]) {
     row("correct a sample, temperature as before", "apply_at", each);
     row("correct a sample of another temperature", "apply_at_moving", each);
     row("the same by hand, without a library", "apply_by_hand", each);
+    for (what, name) in [
+        ("add two numbers, in software", "add"),
+        ("the same by the compiler's function", "add_by_compiler"),
+        ("multiply two numbers, in software", "multiply"),
+        ("the same by the compiler's function", "multiply_by_compiler"),
+    ] {
+        let part = &m0[name];
+        announce(&format!("{what:<46} {:>33.0} {:>7}", part.instructions / part.count, part.stack));
+    }
     for (model, what) in [("T9", "rests"), ("I14", "poses"), ("E9", "samples"), ("K12", "turns of 12 blocks")]
     {
         let (a, b) = (m4[&format!("whole fit of {model}")].count, m0[&format!("whole fit of {model}")].count);

@@ -60,6 +60,8 @@ pub fn write(out: &mut impl Write) -> core::fmt::Result {
     let watch = Stopwatch::start();
     decode(out, &watch)?;
     apply(out, &watch)?;
+    #[cfg(microbit)]
+    arithmetic(out, &watch)?;
     fits(out, &watch)?;
     particle(out, &watch)
 }
@@ -132,6 +134,41 @@ fn apply(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
             [*p, *q, *r] = [row(a, u), row(b, v), row(c, w)];
         }
     })
+}
+
+/// Sums and products of single numbers, by [`crate::soft_float`] and by the compiler's functions.
+#[cfg(microbit)]
+#[inline(never)]
+fn arithmetic(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
+    #[expect(unsafe_code, reason = "the compiler's own names")]
+    unsafe extern "C" {
+        fn __aeabi_fadd(a: u32, b: u32) -> u32;
+        fn __aeabi_fmul(a: u32, b: u32) -> u32;
+        fn __addsf3(a: u32, b: u32) -> u32;
+        fn __mulsf3(a: u32, b: u32) -> u32;
+    }
+    type Operation = unsafe extern "C" fn(u32, u32) -> u32;
+    let operations: [(_, Operation); 4] = [
+        ("add", __aeabi_fadd),
+        ("add_by_compiler", __addsf3),
+        ("multiply", __aeabi_fmul),
+        ("multiply_by_compiler", __mulsf3),
+    ];
+    let mut noise = Noise(1);
+    let pairs = [(); SAMPLES].map(|()| {
+        let [a, b, _] = <[f32; 3]>::from(noise.vector(100.0)).map(f32::to_bits);
+        (a, b)
+    });
+    for (name, operation) in operations {
+        measured(out, watch, (name, SAMPLES), || {
+            for (a, b) in black_box(&pairs) {
+                #[expect(unsafe_code, reason = "as above")]
+                // SAFETY: functions of two numbers, which touch no memory.
+                black_box(unsafe { operation(*a, *b) });
+            }
+        })?;
+    }
+    Ok(())
 }
 
 /// Each model to the end: a slice, the whole fit, and its judgement.

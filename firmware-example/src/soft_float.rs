@@ -1,10 +1,10 @@
 //! Single-precision addition and multiplication for a core without a floating-point unit, in the place of the
-//! compiler's own: they take half the instructions (`tests/device_cost.rs`), and a core has no faster way to correct.
+//! compiler's own, which take longer (`tests/device_cost.rs`).
 //!
 //! Rounded to nearest, ties to even, as IEEE 754 wants it, so that no bit of any result changes: `crate::replay` holds
 //! them against the host's. What is not a normal number, or may become none, goes a longer way, zeros apart.
 //!
-//! In assembly, since eight registers are all there is: what the compiler makes of the same steps takes a third more.
+//! In assembly, since eight registers are all there is, and the compiler spills them.
 #![allow(unsafe_code)] // Assembly, and the names that it calls.
 
 const SIGN: u32 = 1 << 31;
