@@ -1,44 +1,17 @@
 //! The emulated co-processor at the end of its UART, through the program and through its library.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use firmware_example::{drill, scene::Noise};
-use imucal_core::{
-    link::{FitModel, Observation},
-    record::Date,
-};
-use imucal_host::{
-    device::{Address, Session, fit::BoardFit},
-    recording::Recording,
-};
+use imucal_core::{link::FitModel, record::Date};
+use imucal_host::recording::Recording;
 use imucal_tests::{
+    coprocessor::{address, drilled, session},
     data,
-    firmware::{BOARDS, Board, announce, build, ready},
+    firmware::{BOARDS, ready},
     program,
 };
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_imucal-under-test");
-/// Stack of the whole co-processor, bytes.
-const STACK_BUDGET: u32 = 8 * 1024;
-
-fn address(board: Board) -> String {
-    let image = build(board, "coprocessor", &[]).unwrap_or_else(|refusal| panic!("{refusal}"));
-    let machine = if board.machine == "microbit" { "microbit" } else { "qemu" };
-    format!("{machine}:{}", image.display())
-}
-
-fn session(board: Board, flash: Option<&Path>) -> Session {
-    let address: Address = address(board).parse().expect("an address");
-    Session::open(&address, flash).unwrap_or_else(|error| panic!("{error}"))
-}
-
-/// A fit of simulated observations.
-fn drilled(model: FitModel, count: usize, seed: u32) -> BoardFit {
-    let mut observations: Vec<Observation> = Vec::new();
-    drill::observe(model, count, &mut Noise(seed), |observation| observations.push(observation));
-    BoardFit { task: drill::task(model), observations }
-}
-
 #[test]
 fn both_boards_fit_store_and_correct_as_this_machine_does() {
     if !ready() {
@@ -58,10 +31,6 @@ fn both_boards_fit_store_and_correct_as_this_machine_does() {
         assert_eq!(session.store_record(false).unwrap_or_else(|error| panic!("{error}")), 1);
         let stored = session.record().unwrap_or_else(|error| panic!("{error}")).expect("stored");
         assert!(imucal_core::record::decode(&stored).is_ok_and(|record| record.acc.is_some()));
-        let status = session.status().unwrap_or_else(|error| panic!("{error}"));
-        let stack = status.stack.expect("the machine looks");
-        announce(&format!("stack: {}: the co-processor, after all its fits: {stack} B", board.core));
-        assert!(stack <= STACK_BUDGET, "{}: {stack} B", board.core);
     }
 }
 

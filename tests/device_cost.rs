@@ -1,9 +1,13 @@
-//! What the core's parts take on a device: instructions counted by QEMU, stack by paint. Prints the README's table:
-//! `cargo test -p imucal-tests --test device_cost -- --nocapture`.
+//! What the core's parts take on a device: instructions counted by QEMU, flash and RAM by section, stack by paint and
+//! by analysis. Prints the README's table: `cargo test -p imucal-tests --test device_cost -- --nocapture`.
 
 use std::collections::HashMap;
 
+use firmware_example::fitting::{self, Fitting};
+use imucal_tests::call_stack::CallGraph;
+use imucal_tests::coprocessor::painted_stack;
 use imucal_tests::firmware::{BOARDS, SHIFT, announce, counted, ready};
+use imucal_tests::footprint::{self, Footprint};
 
 /// Frequency of the images' stopwatch, Hz: of mps2-an386, and of the micro:bit.
 const STOPWATCH: [f64; 2] = [25e6, 16e6];
@@ -31,27 +35,118 @@ fn parts(lines: &str, frequency: f64) -> HashMap<String, Part> {
     lines.lines().filter_map(part).collect()
 }
 
+/// Flash that reading a record and correcting samples may take, bytes: of the board with a floating-point unit, and
+/// of the other, which brings its arithmetic along.
+const FLASH: [u64; 2] = [6 * 1024, 8 * 1024];
+/// Flash that reading a record, correcting, and fitting, judging and packing every model may take on the board with a
+/// floating-point unit, bytes.
+const FLASH_WITH_FITS: u64 = 48 * 1024;
+/// RAM of a fit of 64 rests, and of a swarm of 40 in twelve parameters beside its blocks, bytes.
+const RAM: [usize; 2] = [4096, 8192];
+/// Stack, bytes.
+const STACK: u32 = 8 * 1024;
+
 #[test]
-fn every_part_stays_within_its_instructions_and_its_stack() {
+fn every_part_stays_within_its_instructions_flash_ram_and_stack() {
     if !ready() {
         return;
     }
-    let [m4, m0] = [0, 1].map(|k| parts(&counted(BOARDS[k], "cost"), STOPWATCH[k]));
+    let costs = [0, 1].map(|k| parts(&counted(BOARDS[k], "cost"), STOPWATCH[k]));
+    let flash = Flash::measured();
+    let ram = [size_of::<fitting::Memory<64, 0, 0, 0, 0>>() + size_of::<Fitting<'_, 0, 0, 0, 0, 0>>()]
+        .into_iter()
+        .chain([size_of::<fitting::Memory<0, 0, 0, 0, 40>>()]);
+    let ram: Vec<usize> = ram.collect();
+    let stack = BOARDS.map(|board| CallGraph::of(&footprint::elf(board, "coprocessor")));
+    let painted = BOARDS.map(painted_stack);
+
+    print_costs(&costs);
+    let [m4, m0] = &costs;
+    announce("");
+    announce(&format!("{:<46} {:>12} {:>20}", "bytes over an empty image", "Cortex-M4F", "Cortex-M0"));
+    let both = |what: &str, [a, b]: [u64; 2]| announce(&format!("{what:<46} {a:>12} {b:>20}"));
+    both("flash: decode and correct", flash.correct);
+    announce(&format!("{:<46} {:>12}", "flash: and fit, judge and pack every model", flash.fits));
+    both("flash: the co-processor, link and drivers", flash.whole);
+    both("RAM: the co-processor and room for its fits", flash.ram);
+    announce(&format!("{:<46} {:>12}", "RAM: of them T9 of 64 rests", ram[0]));
+    announce(&format!("{:<46} {:>12}", "RAM: of them a swarm of 40 in 12 parameters", ram[1]));
+    let depths = stack.map(|graph| graph.depth("main"));
+    both("stack: the co-processor, by analysis", [0, 1].map(|k| depths[k].bytes.into()));
+    both("stack: after every fit and a search, by paint", painted.map(Into::into));
+
+    check_costs(m4, m0);
+    assert!(flash.correct.iter().zip(FLASH).all(|(used, budget)| *used <= budget), "{:?}", flash.correct);
+    assert!(flash.fits <= FLASH_WITH_FITS, "{}", flash.fits);
+    assert!(ram.iter().zip(RAM).all(|(used, budget)| *used <= budget), "{ram:?}");
+    for (depth, painted) in depths.iter().zip(painted) {
+        assert!(painted <= depth.bytes && depth.bytes <= STACK, "{painted} B used, {depth:#?}");
+    }
+}
+
+#[test]
+fn only_the_gauge_of_the_stack_is_called_through_a_pointer() {
+    if ready() {
+        for board in BOARDS {
+            let graph = CallGraph::of(&footprint::elf(board, "coprocessor"));
+            assert!(graph.indirect().len() <= 1, "{:?}", graph.indirect());
+        }
+    }
+}
+
+/// Flash and RAM over an empty image, bytes, of each board.
+struct Flash {
+    correct: [u64; 2],
+    fits: u64,
+    whole: [u64; 2],
+    ram: [u64; 2],
+}
+
+impl Flash {
+    fn measured() -> Self {
+        let empty = BOARDS.map(|board| Footprint::of(board, "empty"));
+        let over = |k: usize, image: &str| {
+            let footprint = Footprint::of(BOARDS[k], image);
+            (footprint.flash - empty[k].flash, footprint.ram - empty[k].ram)
+        };
+        let whole = [0, 1].map(|k| over(k, "coprocessor"));
+        Self {
+            correct: [0, 1].map(|k| over(k, "correct").0),
+            fits: over(0, "fits").0,
+            whole: whole.map(|(flash, _)| flash),
+            ram: whole.map(|(_, ram)| ram),
+        }
+    }
+}
+
+type Costs = HashMap<String, Part>;
+
+fn print_costs([m4, m0]: &[Costs; 2]) {
     announce(
         "profile firmware (opt-level s); instructions by QEMU's -icount, stack below the caller by paint",
     );
-    announce(&format!("{:<44} {:>12} {:>7} {:>12} {:>7}", "", "Cortex-M4F", "stack", "Cortex-M0", "stack"));
+    announce(&format!("{:<46} {:>12} {:>7} {:>12} {:>7}", "", "Cortex-M4F", "stack", "Cortex-M0", "stack"));
     let row = |what: &str, name: &str, per: fn(&Part) -> f64| {
         let (a, b) = (&m4[name], &m0[name]);
         let many = |part: &Part| format!("{:.0}", part.instructions / per(part));
-        announce(&format!("{what:<44} {:>12} {:>7} {:>12} {:>7}", many(a), a.stack, many(b), b.stack));
+        announce(&format!("{what:<46} {:>12} {:>7} {:>12} {:>7}", many(a), a.stack, many(b), b.stack));
     };
     let each: fn(&Part) -> f64 = |part| part.count;
     let whole: fn(&Part) -> f64 = |_| 1.0;
     row("decode a record", "decode", whole);
     row("correct a sample", "apply", each);
-    row("correct a sample with its temperature", "apply_at", each);
+    row("correct a sample, temperature as before", "apply_at", each);
+    row("correct a sample of another temperature", "apply_at_moving", each);
     row("the same by hand, without a library", "apply_by_hand", each);
+    for (what, name) in [
+        ("add two numbers, in software", "add"),
+        ("the same by the compiler's function", "add_by_compiler"),
+        ("multiply two numbers, in software", "multiply"),
+        ("the same by the compiler's function", "multiply_by_compiler"),
+    ] {
+        let part = &m0[name];
+        announce(&format!("{what:<46} {:>33.0} {:>7}", part.instructions / part.count, part.stack));
+    }
     for (model, what) in [("T9", "rests"), ("I14", "poses"), ("E9", "samples"), ("K12", "turns of 12 blocks")]
     {
         let (a, b) = (m4[&format!("whole fit of {model}")].count, m0[&format!("whole fit of {model}")].count);
@@ -62,22 +157,29 @@ fn every_part_stays_within_its_instructions_and_its_stack() {
     }
     row("swarm: a particle's block", "particle", each);
     row("swarm: a slice", "swarm_slice", whole);
-
-    let cost = |name: &str| m4[name].instructions;
-    assert!(cost("apply_at") / m4["apply_at"].count <= 60.0 && cost("apply") / m4["apply"].count <= 40.0);
-    assert!(m0["apply_at"].instructions / m0["apply_at"].count <= 2_400.0);
-    assert!(cost("whole fit of T9") <= 3e6 && cost("whole fit of I14") <= 6e6);
-    // 40 particles over 1000 blocks.
-    assert_eq!(m4["swarm_iteration"].count, 40_000.0);
-    let search = cost("swarm_iteration") * SEARCH;
+    let search = m4["swarm_iteration"].instructions * SEARCH;
     announce(&format!(
         "swarm: 40 particles, 300 iterations, 1000 blocks: {:.2} G on the Cortex-M4F",
         search * 1e-9
     ));
+}
+
+fn check_costs(m4: &Costs, m0: &Costs) {
+    let cost = |name: &str| m4[name].instructions;
+    // A sample's, whether its temperature is that of the sample before or not.
+    for name in ["apply_at", "apply_at_moving"] {
+        assert!(m4[name].instructions / m4[name].count <= 60.0, "{name}: {:?}", m4[name]);
+        assert!(m0[name].instructions / m0[name].count <= 2_000.0, "{name}: {:?}", m0[name]);
+    }
+    assert!(cost("apply") / m4["apply"].count <= 40.0);
+    assert!(cost("whole fit of T9") <= 3e6 && cost("whole fit of I14") <= 6e6);
+    // 40 particles over 1000 blocks.
+    assert_eq!(m4["swarm_iteration"].count, 40_000.0);
+    let search = cost("swarm_iteration") * SEARCH;
     assert!(search <= 3e9);
     // A millisecond at 100 MHz.
     assert!(cost("swarm_slice") <= 1e5, "{}", cost("swarm_slice"));
-    for (name, part) in m4.iter().chain(&m0) {
+    for (name, part) in m4.iter().chain(m0) {
         assert!(part.stack <= 8192.0, "{name}: {part:?}");
     }
 }

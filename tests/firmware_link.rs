@@ -1,26 +1,13 @@
 //! The core on the microcontroller: it links without panic and allocator, fits, and computes what the host computes.
 
-use std::path::Path;
-
-use firmware_example::{
-    drill, fit,
-    fitting::{self, Fitting},
-};
+use firmware_example::{drill, fit};
 use imucal_core::{
     link::FitModel,
     model::parameterisation::{FULL, UPPER_TRIANGULAR},
 };
-use imucal_tests::call_stack::CallGraph;
-use imucal_tests::firmware::{BOARDS, Board, announce, build, ready, run, run_with};
-use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, elf};
-
-/// Flash that reading a record and correcting samples may take, bytes: of the board with a floating-point unit, and
-/// of the other, which brings its arithmetic along.
-const BUDGET: [(&str, u64); 2] = [("Cortex-M4F", 6 * 1024), ("Cortex-M0", 8 * 1024)];
-
-/// Flash that reading a record, correcting, and fitting, judging and packing every model may take on the board with a
-/// floating-point unit, bytes.
-const FIT_BUDGET: u64 = 48 * 1024;
+use imucal_tests::firmware::{BOARDS, Board, build, ready, run, run_with};
+use imucal_tests::footprint;
+use object::{Object, ObjectSection, ObjectSymbol};
 
 /// Stack of the fits, bytes.
 const STACK_BUDGET: u32 = 8 * 1024;
@@ -132,7 +119,6 @@ fn device_and_host_fit_search_and_pack_to_the_same_bits_and_the_stack_suffices()
         let stack = after_the_lines_of(&host, board, "fit");
         let figures: Vec<u32> = stack.split(' ').filter_map(|word| word.parse().ok()).collect();
         let [used, there] = figures[..] else { panic!("{}: {stack:?}", board.core) };
-        announce(&format!("stack: {}: fitting every model takes {used} of {there} B", board.core));
         assert!(used < there, "{}: the stack has left its memory", board.core);
         assert!(used <= STACK_BUDGET, "{}: {used} B of stack", board.core);
     }
@@ -145,17 +131,6 @@ fn fits_of_the_host() -> String {
     host
 }
 
-#[test]
-fn fits_stay_within_their_memory() {
-    // 64 rests and their fit; and a swarm of 40 in twelve parameters beside its blocks.
-    type Rests = fitting::Memory<64, 0, 0, 0, 0>;
-    type Swarm = fitting::Memory<0, 0, 0, 0, 40>;
-    let (rests, swarm) = (size_of::<Rests>(), size_of::<Swarm>());
-    let fitting = size_of::<Fitting<'_, 0, 0, 0, 0, 0>>();
-    announce(&format!("memory: T9 of 64 rests {} B, swarm of 40 {swarm} B", rests + fitting));
-    assert!(rests + fitting <= 4096 && swarm <= 8192);
-}
-
 /// What an image writes after the lines that it shares with the host.
 fn after_the_lines_of(host: &str, board: Board, image: &str) -> String {
     let output = run(board, image);
@@ -164,51 +139,6 @@ fn after_the_lines_of(host: &str, board: Board, image: &str) -> String {
     let differing = host.lines().zip(device.lines()).find(|(host, device)| host != device);
     assert_eq!(differing, None, "host and {} differ", board.core);
     device.strip_prefix(host).expect("as many lines as the host").to_owned()
-}
-
-#[test]
-fn record_corrector_and_fits_stay_within_their_flash() {
-    if !ready() {
-        return;
-    }
-    for (board, (core, budget)) in BOARDS.into_iter().zip(BUDGET) {
-        assert_eq!(board.core, core);
-        let [empty, correct, gate] = ["empty", "correct", "gate"].map(|image| memory(&elf_of(board, image)));
-        let flash = correct.flash - empty.flash;
-        announce(&format!(
-            "size: {core}: decode and apply take {flash} B of flash and {} B of static RAM over an empty image \
-             (budget {budget} B); with encode and a swarm {} B",
-            correct.ram - empty.ram,
-            gate.flash - empty.flash,
-        ));
-        assert!(flash <= budget, "{core}: {flash} B exceed {budget} B");
-        if core != "Cortex-M4F" {
-            continue;
-        }
-        let [fits, whole] = ["fits", "coprocessor"].map(|image| memory(&elf_of(board, image)));
-        let flash = fits.flash - empty.flash;
-        announce(&format!(
-            "size: {core}: with all fits {flash} B of flash (budget {FIT_BUDGET} B); the co-processor with its link, \
-             storage and drivers {} B",
-            whole.flash - empty.flash
-        ));
-        assert!(flash <= FIT_BUDGET, "{core}: {flash} B exceed {FIT_BUDGET} B");
-    }
-}
-
-#[test]
-fn the_worst_stack_by_analysis_stays_within_its_budget() {
-    if !ready() {
-        return;
-    }
-    for board in BOARDS {
-        let graph = CallGraph::of(&elf_of(board, "coprocessor"));
-        let depth = graph.depth("main");
-        announce(&format!("stack: {}: the co-processor by analysis: {} B", board.core, depth.bytes));
-        assert!(depth.bytes <= STACK_BUDGET, "{}: {depth:#?}", board.core);
-        // Only the gauge of the stack itself is called through a pointer.
-        assert!(graph.indirect().len() <= 1, "{:?}", graph.indirect());
-    }
 }
 
 #[test]
@@ -223,7 +153,7 @@ fn a_sample_costs_at_most_forty_instructions_on_a_cortex_m4f() {
     if !ready() {
         return;
     }
-    let bytes = elf_of(BOARDS[0], "correct");
+    let bytes = footprint::elf(BOARDS[0], "correct");
     let file = object::File::parse(&*bytes).expect("an ELF file");
     let apply = file
         .symbols()
@@ -233,7 +163,6 @@ fn a_sample_costs_at_most_forty_instructions_on_a_cortex_m4f() {
     // The lowest bit of a function's address says Thumb.
     let code = text.data_range(apply.address() & !1, apply.size()).ok().flatten().expect("its code");
     let count = straight_line_instructions(code).expect("no branch but the return");
-    announce(&format!("cost: Cortex-M4F: {count} instructions a sample"));
     assert!(count <= INSTRUCTIONS_A_SAMPLE, "{count} instructions");
 }
 
@@ -272,40 +201,4 @@ fn loops_are_not_taken_for_straight_lines() {
     assert_eq!(straight_line_instructions(&looping), None);
     let calling = [0x00, 0xF0, 0x00, 0xF8, 0x70, 0x47]; // bl; bx lr
     assert_eq!(straight_line_instructions(&calling), None);
-}
-
-fn elf_of(board: Board, image: &str) -> Vec<u8> {
-    let path = build(board, image, &[]).unwrap_or_else(|refusal| panic!("{refusal}"));
-    read(&path)
-}
-
-fn read(path: &Path) -> Vec<u8> {
-    std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-}
-
-struct Memory {
-    /// Code, constants, and the initial values of variables.
-    flash: u64,
-    /// Variables, the stack apart.
-    ram: u64,
-}
-
-fn memory(bytes: &[u8]) -> Memory {
-    let file = object::File::parse(bytes).expect("an ELF file");
-    let mut memory = Memory { flash: 0, ram: 0 };
-    for section in file.sections() {
-        let SectionFlags::Elf { sh_flags, .. } = section.flags() else {
-            panic!("not an ELF file");
-        };
-        let (kept, written) = (sh_flags.0 & elf::SHF_ALLOC.0 != 0, sh_flags.0 & elf::SHF_WRITE.0 != 0);
-        if !kept {
-            continue;
-        }
-        if written {
-            memory.ram += section.size();
-        }
-        let (_, in_file) = section.file_range().unwrap_or_default();
-        memory.flash += in_file;
-    }
-    memory
 }

@@ -1,6 +1,6 @@
 //! The least a device does: read its record once, then correct samples.
 
-use imucal_core::corrector::Corrector;
+use imucal_core::corrector::{Compensator, Corrector};
 use imucal_core::record::{self, Match};
 use nalgebra::Vector3;
 
@@ -22,8 +22,8 @@ pub fn apply(corrector: &Corrector<f32>, raw: &Vector3<f32>) -> Vector3<f32> {
     corrector.apply(raw)
 }
 
-/// One sample with its temperature, °C.
+/// One sample of a stream with its temperature, °C.
 #[inline(never)]
-pub fn apply_at(corrector: &Corrector<f32>, raw: &Vector3<f32>, temperature: f32) -> Vector3<f32> {
-    corrector.apply_at(raw, temperature)
+pub fn apply_at(compensator: &mut Compensator<f32>, raw: &Vector3<f32>, temperature: f32) -> Vector3<f32> {
+    compensator.apply_at(raw, temperature)
 }

@@ -5,7 +5,7 @@
 use core::{fmt::Write, hint::black_box};
 
 use imucal_core::{
-    corrector::Corrector,
+    corrector::{Compensator, Corrector},
     link::FitModel,
     model::{Cost, attitude::AttitudeModel, parameterisation::FULL},
     observation::{Block, BlockBuilder, Compared, Durations, Motion},
@@ -60,6 +60,8 @@ pub fn write(out: &mut impl Write) -> core::fmt::Result {
     let watch = Stopwatch::start();
     decode(out, &watch)?;
     apply(out, &watch)?;
+    #[cfg(microbit)]
+    arithmetic(out, &watch)?;
     fits(out, &watch)?;
     particle(out, &watch)
 }
@@ -86,7 +88,7 @@ fn decode(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
     measured(out, watch, ("decode", 1), || record::decode(black_box(crate::RECORD)).is_ok()).map(drop)
 }
 
-/// Samples in a loop, with temperature terms, and the same without a corrector: what is between is the correction.
+/// Samples in a loop, by a full gain, without and with temperature terms, and the same without a corrector.
 #[inline(never)]
 fn apply(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
     let terms = TemperatureTerms {
@@ -94,35 +96,79 @@ fn apply(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
         bias_slope: [1e-3, -2e-3, 5e-4],
         scale_slope: [1e-5, 2e-5, -1e-5],
     };
-    let triad = scene::accelerometer().truth;
+    let triad = scene::gyroscope().truth;
     let plain = Corrector::new(black_box(triad), black_box(None));
     let warm = Corrector::new(black_box(triad), black_box(Some(terms)));
-    let mut samples = [[0f32; 3]; SAMPLES];
+    let mut compensator = Compensator::new(warm);
+    let mut samples = [[0f32; 4]; SAMPLES];
+    // The last is the temperature: one, and then another with each sample.
     for (k, sample) in samples.iter_mut().enumerate() {
-        *sample = [k as f32, 1.0, 2.0];
+        *sample = [k as f32, 1.0, 2.0, 31.0];
+    }
+    let mut moving = samples;
+    for (k, sample) in moving.iter_mut().enumerate() {
+        sample[3] += k as f32 * 0.125;
     }
     measured(out, watch, ("apply", SAMPLES), || {
-        for sample in black_box(&mut samples) {
-            *sample = plain.apply(&Vector3::from(*sample)).into();
+        for [x, y, z, _] in black_box(&mut samples) {
+            [*x, *y, *z] = plain.apply(&Vector3::new(*x, *y, *z)).into();
         }
     })?;
-    measured(out, watch, ("apply_at", SAMPLES), || {
-        for sample in black_box(&mut samples) {
-            *sample = warm.apply_at(&Vector3::from(*sample), 31.0).into();
-        }
-    })?;
+    for (name, samples) in [("apply_at", &mut samples), ("apply_at_moving", &mut moving)] {
+        measured(out, watch, (name, SAMPLES), || {
+            for [x, y, z, temperature] in black_box(samples) {
+                [*x, *y, *z] = compensator.apply_at(&Vector3::new(*x, *y, *z), *temperature).into();
+            }
+        })?;
+    }
     measured(out, watch, ("apply_by_hand", SAMPLES), || {
         let ([a, b, c], [x, y, z]) =
             black_box((<[[f32; 3]; 3]>::from(triad.gain), <[f32; 3]>::from(triad.bias)));
         let ([i, j, k], [u, v, w]) = black_box((terms.bias_slope, terms.scale_slope));
-        for sample in black_box(&mut samples) {
-            let change = black_box(31.0f32) - 25.0;
-            let [p, q, r] = *sample;
-            let (p, q, r) = (p - i * change - x, q - j * change - y, r - k * change - z);
-            let row = |n: [f32; 3], scale: f32| (n[0] * p + n[1] * q + n[2] * r) * (1.0 + scale * change);
-            *sample = [row(a, u), row(b, v), row(c, w)];
+        for [p, q, r, temperature] in black_box(&mut moving) {
+            let change = *temperature - 25.0;
+            let raw = (*p - (x + i * change), *q - (y + j * change), *r - (z + k * change));
+            let row = |n: [f32; 3], scale: f32| {
+                (n[0] * raw.0 + n[1] * raw.1 + n[2] * raw.2) * (1.0 + scale * change)
+            };
+            [*p, *q, *r] = [row(a, u), row(b, v), row(c, w)];
         }
     })
+}
+
+/// Sums and products of single numbers, by [`crate::soft_float`] and by the compiler's functions.
+#[cfg(microbit)]
+#[inline(never)]
+fn arithmetic(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
+    #[expect(unsafe_code, reason = "the compiler's own names")]
+    unsafe extern "C" {
+        fn __aeabi_fadd(a: u32, b: u32) -> u32;
+        fn __aeabi_fmul(a: u32, b: u32) -> u32;
+        fn __addsf3(a: u32, b: u32) -> u32;
+        fn __mulsf3(a: u32, b: u32) -> u32;
+    }
+    type Operation = unsafe extern "C" fn(u32, u32) -> u32;
+    let operations: [(_, Operation); 4] = [
+        ("add", __aeabi_fadd),
+        ("add_by_compiler", __addsf3),
+        ("multiply", __aeabi_fmul),
+        ("multiply_by_compiler", __mulsf3),
+    ];
+    let mut noise = Noise(1);
+    let pairs = [(); SAMPLES].map(|()| {
+        let [a, b, _] = <[f32; 3]>::from(noise.vector(100.0)).map(f32::to_bits);
+        (a, b)
+    });
+    for (name, operation) in operations {
+        measured(out, watch, (name, SAMPLES), || {
+            for (a, b) in black_box(&pairs) {
+                #[expect(unsafe_code, reason = "as above")]
+                // SAFETY: functions of two numbers, which touch no memory.
+                black_box(unsafe { operation(*a, *b) });
+            }
+        })?;
+    }
+    Ok(())
 }
 
 /// Each model to the end: a slice, the whole fit, and its judgement.

@@ -36,6 +36,8 @@ pub mod machine;
 pub mod replay;
 pub mod scene;
 pub mod search;
+#[cfg(microbit)]
+mod soft_float;
 #[cfg(target_os = "none")]
 pub mod stack;
 pub mod storage;

@@ -33,7 +33,49 @@ pub fn write(out: &mut impl Write) -> fmt::Result {
         write_triad(out, sensor.symbol(), triad)?;
         write_many(out, sensor.symbol(), triad)?;
     }
+    write_arithmetic(out)
+}
+
+/// Lines of [`write_arithmetic`], and pairs of operands of each.
+const ARITHMETIC_LINES: u32 = 20;
+/// See above.
+const PAIRS_A_LINE: u32 = 100_000;
+
+/// Sums, differences and products of single numbers, folded: every kind of number, and many ties and near zeros.
+#[inline(never)]
+fn write_arithmetic(out: &mut impl Write) -> fmt::Result {
+    let mut bits = 2_463_534_242;
+    for _ in 0..ARITHMETIC_LINES {
+        let mut folded = 0u32;
+        for _ in 0..PAIRS_A_LINE {
+            let (a, b) = operands(&mut bits);
+            for result in [a + b, a - b, a * b] {
+                // What sign and payload a NaN has is left to the machine.
+                let seen = if result.is_nan() { 1 } else { result.to_bits() };
+                folded = (folded ^ seen).wrapping_mul(16_777_619).rotate_left(5);
+            }
+        }
+        writeln!(out, "{PAIRS_A_LINE} pairs {folded:08x}")?;
+    }
     Ok(())
+}
+
+/// Two numbers of any bits; or alike in their exponent, and of few digits.
+fn operands(state: &mut u32) -> (f32, f32) {
+    let mut next = || {
+        *state ^= *state << 13;
+        *state ^= *state >> 17;
+        *state ^= *state << 5;
+        *state
+    };
+    let (kind, a, mut b) = (next(), next(), next());
+    if kind & 3 == 0 {
+        return (f32::from_bits(a), f32::from_bits(b));
+    }
+    let apart = (kind >> 2 & 31).wrapping_sub(4) << 23;
+    b = b & 0x807F_FFFF | (a & 0x7F80_0000).wrapping_add(apart) & 0x7F80_0000;
+    let digits = u32::MAX << (kind >> 8 & 31).min(22);
+    (f32::from_bits(a & digits), f32::from_bits(if kind & 128 == 0 { b } else { b & digits }))
 }
 
 /// Lines of [`write_many`], and samples of each.

@@ -33,6 +33,8 @@ pub trait Scalar: sealed::Sealed + RealField + Copy {
     fn root(self) -> Self;
     /// Neither infinite nor NaN.
     fn finite(self) -> bool;
+    /// Bit by bit, without the cost of a comparison of numbers on a core that has no unit for them.
+    fn same(self, other: Self) -> bool;
 }
 
 impl Scalar for f32 {
@@ -59,6 +61,10 @@ impl Scalar for f32 {
     fn finite(self) -> bool {
         f32::is_finite(self)
     }
+    #[inline]
+    fn same(self, other: Self) -> bool {
+        self.to_bits() == other.to_bits()
+    }
 }
 
 impl Scalar for f64 {
@@ -84,5 +90,9 @@ impl Scalar for f64 {
     #[inline]
     fn finite(self) -> bool {
         f64::is_finite(self)
+    }
+    #[inline]
+    fn same(self, other: Self) -> bool {
+        self.to_bits() == other.to_bits()
     }
 }

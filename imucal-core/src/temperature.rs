@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Δ          = θ − θ₀
-//! calibrated = (1 + s·Δ) ∘ gain · (raw − bias − β·Δ)            correct, on the device
+//! calibrated = (1 + s·Δ) ∘ gain · (raw − (bias + β·Δ))          correct, on the device
 //! raw        = gain⁻¹ · (calibrated ⊘ (1 + s·Δ)) + bias + β·Δ    predict, in the simulator
 //! ```
 //!
@@ -12,6 +12,10 @@
 //! | β | [`bias_slope`](TemperatureTerms::bias_slope) |
 //! | s | [`scale_slope`](TemperatureTerms::scale_slope) |
 //! | ∘, ⊘ | product and quotient axis by axis |
+//!
+//! Both brackets hold for all samples of one temperature: a device keeps them ([`Warmth`]) from one reading of its
+//! thermometer to the next. The scale stays outside the gain: as part of it it would spare a product an axis while the
+//! temperature stands, and take six more wherever it moves.
 //!
 //! Source: the temperature terms of IEEE Std 1293, cut after the first order. Not modelled: second order, drift of
 //! the axes' directions, hysteresis, and the lag between the thermometer and the sensing element.
@@ -41,10 +45,16 @@ impl<T: Scalar> TemperatureTerms<T> {
     /// correction and not the sample.
     #[inline]
     pub fn correct(&self, triad: &Triad<T>, raw: &Vector3<T>, temperature: T) -> Vector3<T> {
+        self.at(triad, temperature).correct(triad, raw)
+    }
+
+    /// What warmth makes of a triad at `temperature` °C.
+    #[inline]
+    pub fn at(&self, triad: &Triad<T>, temperature: T) -> Warmth<T> {
         let change = self.change(temperature);
         let (drift, factor) = (self.drift(change), self.factor(change));
-        let value = triad.correct(&Vector3::new(raw.x - drift.x, raw.y - drift.y, raw.z - drift.z));
-        Vector3::new(value.x * factor.x, value.y * factor.y, value.z * factor.z)
+        let bias = Vector3::new(triad.bias.x + drift.x, triad.bias.y + drift.y, triad.bias.z + drift.z);
+        Warmth { bias, factor }
     }
 
     /// What the sensor would put out at `temperature` °C for a calibrated value.
@@ -88,6 +98,30 @@ impl<T: Scalar> TemperatureTerms<T> {
     fn factor(&self, change: T) -> Vector3<T> {
         let [x, y, z] = self.scale_slope;
         Vector3::new(T::one() + x * change, T::one() + y * change, T::one() + z * change)
+    }
+}
+
+/// A triad's bias and scale at one temperature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Warmth<T: Scalar> {
+    /// `bias + β·Δ`, raw unit, sensor axes.
+    pub bias: Vector3<T>,
+    /// `1 + s·Δ`, calibrated axes.
+    pub factor: Vector3<T>,
+}
+
+impl<T: Scalar> Warmth<T> {
+    /// Of a triad as it is.
+    #[inline]
+    pub fn none(triad: &Triad<T>) -> Self {
+        Self { bias: triad.bias, factor: Vector3::new(T::one(), T::one(), T::one()) }
+    }
+
+    /// A raw sample of this temperature, sensor axes and raw unit, to calibrated axes and unit.
+    #[inline]
+    pub fn correct(&self, triad: &Triad<T>, raw: &Vector3<T>) -> Vector3<T> {
+        let value = Triad { gain: triad.gain, bias: self.bias }.correct(raw);
+        Vector3::new(value.x * self.factor.x, value.y * self.factor.y, value.z * self.factor.z)
     }
 }
 

@@ -2,8 +2,10 @@
 
 pub mod call_stack;
 pub mod clouds;
+pub mod coprocessor;
 pub mod data;
 pub mod firmware;
+pub mod footprint;
 pub mod golden;
 pub mod program;
 pub mod rig;

@@ -6,6 +6,7 @@
 fn main() -> ! {
     use core::hint::black_box;
     use firmware_example::{FAILED, RECORD, correct};
+    use imucal_core::corrector::Compensator;
     use nalgebra::Vector3;
 
     // `black_box` keeps the compiler from computing the answer itself.
@@ -14,7 +15,8 @@ fn main() -> ! {
         Some(corrector) => {
             let raw = black_box(Vector3::repeat(32_768.0));
             black_box(correct::apply(&corrector, &raw));
-            black_box(correct::apply_at(&corrector, &raw, black_box(31.0)));
+            let mut compensator = Compensator::new(corrector);
+            black_box(correct::apply_at(&mut compensator, &raw, black_box(31.0)));
             0
         }
     };

@@ -11,6 +11,7 @@ fn main() -> ! {
         fitting::{Fitting, Memory},
     };
     use imucal_core::{
+        corrector::Compensator,
         link::{FitTask, Observation},
         record::{self, Date},
     };
@@ -30,7 +31,8 @@ fn main() -> ! {
     if let Some(corrector) = correct::accelerometer(black_box(RECORD), black_box("00300017")) {
         let raw = black_box(Vector3::repeat(32_768.0));
         black_box(correct::apply(&corrector, &raw));
-        black_box(correct::apply_at(&corrector, &raw, black_box(31.0)));
+        let mut compensator = Compensator::new(corrector);
+        black_box(correct::apply_at(&mut compensator, &raw, black_box(31.0)));
     }
     if let Some(task) = task {
         let _begun = black_box(fitting.begin(task));

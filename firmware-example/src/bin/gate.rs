@@ -13,7 +13,7 @@ fn main() -> ! {
 fn runs() -> bool {
     use core::hint::black_box;
     use firmware_example::{RECORD, correct, search};
-    use imucal_core::record;
+    use imucal_core::{corrector::Compensator, record};
     use nalgebra::Vector3;
 
     #[cfg(feature = "control-panic")]
@@ -24,7 +24,8 @@ fn runs() -> bool {
     };
     let raw = black_box(Vector3::repeat(32_768.0));
     black_box(correct::apply(&corrector, &raw));
-    black_box(correct::apply_at(&corrector, &raw, black_box(31.0)));
+    let mut compensator = Compensator::new(corrector);
+    black_box(correct::apply_at(&mut compensator, &raw, black_box(31.0)));
 
     if !search::gyroscope(black_box(3)) {
         return false;

@@ -8,8 +8,10 @@
 //! | record | the last four pages of flash |
 //! | serial | the chip's device id |
 //!
-//! Samples are the sensor's counts, 100 a second. A read of them takes the bus for half a millisecond, and the erase of
-//! a page halts the core for 85 ms: what comes in that time over the UART is lost, and asked for again by the host.
+//! Samples are the sensor's counts, 100 a second. A read of them takes the bus for half a millisecond, a slice of a fit
+//! up to 35 ms, and the erase of a page halts the core for 85 ms: what comes in that time over the UART is lost, and
+//! asked for again by the host, and of the samples one is kept. Whoever may lose none reads the sensor's FIFO, and
+//! takes bytes in an interrupt.
 //!
 //! The HAL keeps panic paths, so this image is none for the panic gate: a panic resets the chip, and the record is
 //! in flash.

@@ -1,7 +1,7 @@
 //! The calibration in use, and what of it is in flash.
 
 use imucal_core::{
-    corrector::Corrector,
+    corrector::{Compensator, Corrector},
     link::{Fault, RecordState},
     record::{self, CalibrationRecord, Date, DecodeError, Match, Sensor, SensorIdentity, TriadRecord},
 };
@@ -12,7 +12,7 @@ pub(super) struct Calibration {
     /// The unit at hand.
     pub(super) unit: SensorIdentity,
     record: CalibrationRecord,
-    correctors: [Option<Corrector<f32>>; 3],
+    correctors: [Option<Compensator<f32>>; 3],
     /// What is in flash.
     pub(super) state: RecordState,
     /// What is in use is not what is in flash.
@@ -53,7 +53,7 @@ impl Calibration {
     #[inline(never)]
     fn put_in_use(&mut self, record: &CalibrationRecord) {
         for (corrector, sensor) in self.correctors.iter_mut().zip(Sensor::ALL) {
-            *corrector = record.triad(sensor).map(Corrector::from);
+            *corrector = record.triad(sensor).map(|triad| Compensator::new(Corrector::from(triad)));
         }
         self.record.clone_from(record);
     }
@@ -76,7 +76,7 @@ impl Calibration {
     /// Takes a triad that was fitted here.
     #[inline(never)]
     pub(super) fn adopt(&mut self, sensor: Sensor, triad: &TriadRecord, date: Date) {
-        let corrector = Some(Corrector::from(triad));
+        let corrector = Some(Compensator::new(Corrector::from(triad)));
         let (slot, place) = match sensor {
             Sensor::Accelerometer => (&mut self.record.acc, 0),
             Sensor::Gyroscope => (&mut self.record.gyr, 1),
@@ -99,8 +99,8 @@ impl Calibration {
 
     /// Corrects a sample; `None` without a calibration of that sensor.
     #[inline]
-    pub(super) fn correct(&self, sensor: Sensor, raw: [f32; 3], temperature: f32) -> Option<[f32; 3]> {
-        let corrector = self.correctors.get(sensor as usize)?.as_ref()?;
+    pub(super) fn correct(&mut self, sensor: Sensor, raw: [f32; 3], temperature: f32) -> Option<[f32; 3]> {
+        let corrector = self.correctors.get_mut(sensor as usize)?.as_mut()?;
         Some(corrector.apply_at(&Vector3::from(raw), temperature).into())
     }
 }

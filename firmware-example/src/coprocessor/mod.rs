@@ -1,8 +1,11 @@
 //! The co-processor: corrects samples, talks to its host, fits and stores, and never waits.
 //!
 //! ```text
-//! poll:  send what the link takes → answer what is due → take a frame → correct a sample → one slice of work
+//! poll:  send what the link takes → answer what is due → take a frame → correct a sample → or else: a slice of work
 //! ```
+//!
+//! Work waits for bytes and samples, unless they never end: what came during a long slice is caught up before the next.
+//! The board keeps it until then. A slice takes as long as `tests/device_cost.rs` says of an iteration or a judgement.
 //!
 //! A slice is one flash operation of [`crate::storage`] or one slice of [`crate::fitting`]. A request that takes many
 //! slices is answered when it is done; until then one that would need its result is [`Fault::Busy`], and samples are
@@ -14,7 +17,7 @@ mod requests;
 
 use embedded_storage::nor_flash::NorFlash;
 use imucal_core::{
-    link::{Fault, FrameError, Receiver, RecordState, Reply, Request, VERSION, split},
+    link::{Fault, FitProgress, FrameError, Receiver, RecordState, Reply, Request, VERSION, split},
     record::{Date, Sensor, SensorIdentity},
 };
 
@@ -28,6 +31,9 @@ use outgoing::Outgoing;
 
 /// Bytes taken from the link in one turn, so that a flood of them leaves time for samples.
 const BYTES_A_TURN: usize = 64;
+
+/// Turns with bytes or samples after which a slice of work is done all the same.
+const TURNS_WITHOUT_WORK: u8 = 32;
 
 /// What takes many slices, and the request it answers.
 #[derive(Clone, Debug)]
@@ -104,6 +110,8 @@ struct Device<
     calibration: Calibration,
     fitting: Fitting<'a, POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
     job: Job,
+    /// Turns that bytes or samples have kept the work waiting.
+    waited: u8,
     due: Option<(u32, Due)>,
     /// The last fit that was judged.
     finished: Option<Finished>,
@@ -146,6 +154,7 @@ impl<
             calibration,
             fitting: Fitting::new(memory),
             job: Job::Booting,
+            waited: 0,
             due: None,
             finished: None,
             stream: None,
@@ -165,16 +174,20 @@ impl<
         self.device.outgoing.flush(&mut self.link);
         let mut busy = !self.device.outgoing.is_free();
         busy |= self.device.answer_due();
-        busy |= self.listen();
-        busy |= self.device.take_sample();
-        busy | self.device.work()
+        let came = self.listen() | self.device.take_sample();
+        busy | came | self.device.work_or_wait(came)
     }
 
-    /// Takes bytes up to the end of a frame, while there is room for its answer.
+    /// How far the fit is; `None` without one.
+    pub fn fit(&self) -> Option<FitProgress> {
+        self.device.fitting.progress()
+    }
+
+    /// Takes bytes up to the end of a frame, while there is room for its answer; whether there were any.
     fn listen(&mut self) -> bool {
         for count in 0..BYTES_A_TURN {
             if !self.device.outgoing.is_free() {
-                return true;
+                return count > 0;
             }
             let Some(byte) = self.link.receive() else { return count > 0 };
             if let Some(frame) = self.receiver.push(byte) {
@@ -299,6 +312,16 @@ impl<
             }
         }
         true
+    }
+
+    /// A slice, unless something came, and not too often.
+    fn work_or_wait(&mut self, came: bool) -> bool {
+        if came && self.waited < TURNS_WITHOUT_WORK {
+            self.waited += 1;
+            return true;
+        }
+        self.waited = 0;
+        self.work()
     }
 
     /// One slice of what takes many.

@@ -1,7 +1,8 @@
 //! A fit under way: what it is made to, and its solver, which goes on by slices.
 //!
-//! A slice is one iteration of Levenberg–Marquardt, or [`SLICE`] blocks of a swarm's cost: below a millisecond at
-//! 100 MHz (`tests/device_cost.rs`). What follows a stop (the judgement, and a cloud's refinement) is one more.
+//! A slice is [`SLICE`] blocks of a swarm's cost, below a millisecond at 100 MHz, or one iteration of
+//! Levenberg–Marquardt, up to ten (`tests/device_cost.rs`). What follows a stop (the judgement, and a cloud's
+//! refinement) is one more, up to twice as long.
 
 use heapless::Vec;
 use imucal_core::{

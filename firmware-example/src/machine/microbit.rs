@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
 
-use super::{Register, wait, wake_by};
+use super::{Register, read_words, wait, wake_by};
 use crate::board::ByteLink;
 
 const START_RECEIVER: Register = Register(0x4000_2000);
@@ -106,9 +106,7 @@ impl ReadNorFlash for Flash {
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
         check_read(self, offset, bytes.len())?;
-        for (word, at) in bytes.chunks_exact_mut(WORD).zip((offset..).step_by(WORD)) {
-            word.copy_from_slice(&Register((START + at) as usize).read().to_le_bytes());
-        }
+        read_words(START + offset, bytes);
         Ok(())
     }
 

@@ -96,6 +96,13 @@ impl Register {
     }
 }
 
+/// Reads memory word by word, the flash's or what stands for it.
+fn read_words(from: u32, bytes: &mut [u8]) {
+    for (word, at) in bytes.chunks_exact_mut(4).zip((from as usize..).step_by(4)) {
+        word.copy_from_slice(&Register(at).read().to_le_bytes());
+    }
+}
+
 /// Interrupts stay masked: one that is pending ends the wait, and is cleared by hand.
 const ENABLE: Register = Register(0xE000_E100);
 const CLEAR_PENDING: Register = Register(0xE000_E280);

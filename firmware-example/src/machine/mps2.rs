@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
 
-use super::{Register, wait, wake_by};
+use super::{Register, read_words, wait, wake_by};
 use crate::board::ByteLink;
 
 const DATA: Register = Register(0x4000_4000);
@@ -81,9 +81,7 @@ impl ReadNorFlash for Flash {
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
         check_read(self, offset, bytes.len())?;
-        for (word, at) in bytes.chunks_exact_mut(WORD).zip((offset..).step_by(WORD)) {
-            word.copy_from_slice(&Self::word(at).read().to_le_bytes());
-        }
+        read_words(WINDOW + offset, bytes);
         Ok(())
     }
 

@@ -51,6 +51,16 @@ pub struct Counting {
     pub on: bool,
 }
 
+/// Sensors whose samples wait in a queue, which is in our hands.
+#[derive(Clone, Debug, Default)]
+pub struct Queued(pub Rc<RefCell<VecDeque<Sample>>>);
+
+impl SampleSource for Queued {
+    fn sample(&mut self) -> Option<Sample> {
+        self.0.borrow_mut().pop_front()
+    }
+}
+
 impl SampleSource for Counting {
     fn sample(&mut self) -> Option<Sample> {
         self.count += 1.0;

@@ -3,5 +3,6 @@
 mod bad_link;
 mod bench;
 mod nor;
+mod rate;
 mod session;
 mod storage;
