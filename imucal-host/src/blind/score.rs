@@ -109,7 +109,9 @@ pub fn score(judged: &[Judgement]) -> Score {
         Share { name, hits, trials: trials.len(), must, aim }
     };
     let right = |j: &Judgement| j.classes_right;
-    let claimed: Vec<Closed> = judged.iter().filter_map(|j| j.closed).collect();
+    // A fault of the recording itself is undone or left out before anything is fitted, and no share is said.
+    let said = |j: &Judgement| j.closed.filter(|closed| closed.interval.is_some());
+    let claimed: Vec<Closed> = judged.iter().filter_map(said).collect();
     let covered =
         |closed: &Closed| closed.interval.is_some_and(|[low, high]| (low..=high).contains(&closed.truly));
     let shares = vec![
@@ -236,6 +238,7 @@ pub fn score(judged: &[Judgement]) -> Score {
             None,
             None,
         ),
+        share("causes without a closed share", &|j| j.closed.is_some(), &|j| said(j).is_none(), None, None),
         share("without an answer", &|_| true, &|j| j.answer.verdict.is_none(), None, None),
     ];
     let mut seconds: Vec<f64> = judged.iter().map(|j| j.seconds).collect();

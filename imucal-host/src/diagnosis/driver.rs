@@ -13,6 +13,8 @@ use crate::{effect::Swing, recording::SensorKind};
 
 /// Harmonics of a gimbal's angle.
 const HARMONICS: [&str; 3] = ["first", "second", "third"];
+/// The time of the recording, as a driver.
+pub const TIME: &str = "time";
 /// Half-waves of the time of the recording.
 const WAVES: usize = 8;
 /// A temperature's rate is taken over this time, s.
@@ -74,7 +76,7 @@ pub fn drivers(scene: &Scene<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Driver>
         let values = scene.blocks.iter().map(|b| libm::cos(PI * order as f64 * b.time / duration)).collect();
         Function::new(format!("{order} half-waves"), values)
     };
-    drivers.push(Driver { name: "time".into(), functions: (1..=WAVES).map(wave).collect() });
+    drivers.push(Driver { name: TIME.into(), functions: (1..=WAVES).map(wave).collect() });
     if let Some(temperature) = temperature(scene) {
         let square = temperature.iter().map(|t| t * t).collect();
         let rate = rates(scene, &temperature);

@@ -6,7 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
     design::{Design, Normal},
-    driver::Driver,
+    driver::{Driver, TIME},
     evidence::Projected,
     frequency,
     noise::{NEAR, Noise},
@@ -20,6 +20,8 @@ use crate::{effect::Effect, recording::SensorKind};
 const CAUTION: f64 = 1.1;
 /// A driver that would be followed by chance less often than this in a quieter noise is tested again.
 const SUSPECT: f64 = 1e-9;
+/// What half-waves of the time must raise the evidence by beyond others: a drift is no sum of two processes.
+const DRIFTING: f64 = 12.0;
 /// Drivers tested again, of those as slow as drift and of the others.
 const SUSPECTS: (usize, usize) = (2, 4);
 /// Standard deviation of a fitted column's prior, in usual sizes.
@@ -180,6 +182,7 @@ fn judged(
     let normal = design.normal(&linear.whitenings(&anew), &every);
     groups.push(every[fitted..].to_vec());
     let gain = log_evidence(&normal, linear.baseline.len(), &groups)? - before - (choices as f64).ln();
+    let gain = if driver.name == TIME { gain - DRIFTING } else { gain };
     let projected = Projected::new(&normal, &every[..fitted], &every[fitted..])?;
     let following = follow(kind, driver, &projected, &(0..every.len() - fitted).collect::<Vec<_>>())?;
     Some(Following { p_value: libm::exp(-gain.max(0.0)), ..following })
@@ -192,7 +195,7 @@ fn sort(found: &mut [Following]) {
 impl Following {
     /// Its driver is as slow as drift, which an estimate of the noise cannot tell from it.
     fn is_slow(&self) -> bool {
-        self.driver == "time" || self.driver.starts_with("temperature")
+        self.driver == TIME || self.driver.starts_with("temperature")
     }
 }
 

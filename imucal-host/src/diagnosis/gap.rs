@@ -10,8 +10,9 @@
 //!
 //! A difference of energies needs no noise floor, so that white noise known to a few per cent does no harm. The
 //! interval is that of a jackknife over the folds, widened by what no test would have seen: below it stands the share
-//! that would be closed if the gap held as much again as an effect that just escapes the search. Not modelled: drift that
-//! ties one fold to the next.
+//! that would be closed if the gap held an effect more that just escapes the search. How much that is, is told by the
+//! size of what is closed in the whole recording, since drift that ties one fold to the next makes a slow effect seem
+//! larger in each.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -29,7 +30,7 @@ const LARGE: f64 = 30.0;
 /// Standard deviation of a driver's statistic where there is nothing to follow: √(2·18).
 const SCATTER: f64 = 6.0;
 /// Whitened squared size of an effect that the search may miss.
-const UNSEEN: f64 = 36.0;
+const UNSEEN: f64 = 50.0;
 
 /// A share of the explainable gap.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +80,7 @@ pub fn closed(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise, remai
     let costs: f64 = before.iter().zip(&after).map(|(before, after)| after.cost - before.cost).sum();
     let closed = gain(&after);
     let explainable = (closed.iter().sum::<f64>() + costs + remainder).max(f64::MIN_POSITIVE);
+    let whole = (size(linear, set, noise)? + remainder).clamp(1.0, explainable.max(1.0));
     let share = |gains: &[f64]| {
         let value = gains.iter().sum::<f64>() / explainable;
         let n = FOLDS as f64;
@@ -91,9 +93,9 @@ pub fn closed(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise, remai
             .collect();
         let mean = left.iter().sum::<f64>() / n;
         let variance = (n - 1.0) / n * left.iter().map(|l| (l - mean).powi(2)).sum::<f64>();
-        let sigma = (variance + (SCATTER / explainable).powi(2)).sqrt();
+        let sigma = (variance + (SCATTER / whole).powi(2)).sqrt();
         let bound = |x: f64| x.clamp(0.0, 1.0);
-        let least = bound(value - 1.96 * sigma) * explainable / (explainable + UNSEEN);
+        let least = bound(value - 1.96 * sigma) * whole / (whole + UNSEEN);
         Share { value: bound(value), interval: [least, bound(value + 1.96 * sigma)] }
     };
     let total = share(&closed);

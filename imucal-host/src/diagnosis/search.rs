@@ -24,9 +24,8 @@ use crate::{
 
 /// Most effects in a set; where no rig guides the sensor, the latter: a hand and a reference add gaps of their own.
 const MOST: (usize, usize) = (3, 5);
-/// An addition must raise the evidence by this, beyond its share of the prior. Of forty healthy recordings the likeliest
-/// addition reached 0.6 (`imucal blind`).
-const GAIN: f64 = 1.5;
+/// An addition must raise the evidence by this, beyond its share of the prior: odds of twenty.
+const GAIN: f64 = 3.0;
 /// Sets judged with a noise of their own at each turn: of the likeliest, and of those that a quieter noise would have.
 const JUDGED: (usize, usize) = (6, 3);
 /// Normal equations that are kept.
