@@ -117,6 +117,9 @@ pub fn drivers(scene: &Scene<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Driver>
     drivers.push(input(given));
     drivers.retain_mut(|driver| {
         driver.functions.retain_mut(|function| standardise(&mut function.values));
+        for (at, _) in scene.blocks.iter().enumerate().filter(|(_, block)| block.rows.is_empty()) {
+            driver.functions.iter_mut().for_each(|function| function.values[at] = 0.0);
+        }
         !driver.functions.is_empty()
     });
     drivers
@@ -256,9 +259,12 @@ pub fn following(
         let mut at = 0;
         for driver in drivers {
             let count = driver.columns(*kind).len();
+            if count == 0 {
+                continue;
+            }
             let places: Vec<usize> = (at..at + count).collect();
             at += count;
-            found.push(follow(*kind, driver, &projected, &places)?);
+            found.push(follow(linear.scene, *kind, driver, &projected, &places)?);
         }
     }
     sort(&mut found);
@@ -283,7 +289,8 @@ pub fn following_anew(
         anew.sensors[suspect.kind as usize] =
             linear.weighing.fit(&design, suspect.kind, &every, noise, &NEAR);
         let projected = projected(linear, &design, fitted, &anew)?;
-        let again = follow(suspect.kind, driver, &projected, &(0..every.len() - fitted).collect::<Vec<_>>())?;
+        let places: Vec<usize> = (0..every.len() - fitted).collect();
+        let again = follow(linear.scene, suspect.kind, driver, &projected, &places)?;
         if let Some(own) = found.iter_mut().find(|f| f.kind == again.kind && f.driver == again.driver)
             && again.p_value < own.p_value
         {
@@ -337,7 +344,13 @@ fn on(kind: SensorKind, axis: usize, values: &[f64]) -> Means {
     means
 }
 
-fn follow(kind: SensorKind, driver: &Driver, projected: &Projected, places: &[usize]) -> Option<Following> {
+fn follow(
+    scene: &Scene<'_>,
+    kind: SensorKind,
+    driver: &Driver,
+    projected: &Projected,
+    places: &[usize],
+) -> Option<Following> {
     let (statistic, dimensions) = score_test(projected, places);
     let p_value = match ChiSquared::new(dimensions.max(1) as f64) {
         Ok(distribution) if dimensions > 0 => distribution.sf(statistic / CAUTION),
@@ -350,7 +363,10 @@ fn follow(kind: SensorKind, driver: &Driver, projected: &Projected, places: &[us
     Some(Following {
         kind,
         driver: driver.name.clone(),
-        detail: format!("{} axis, {}", ["x", "y", "z"][axis], driver.functions[function].detail),
+        detail: match scene.axis(kind, axis) {
+            name @ ("x" | "y" | "z") => format!("{name} axis, {}", driver.functions[function].detail),
+            name => format!("{name}; {}", driver.functions[function].detail),
+        },
         size: (statistic - dimensions as f64).max(0.0),
         p_value,
     })

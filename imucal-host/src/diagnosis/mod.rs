@@ -12,6 +12,7 @@ pub mod experiment;
 pub mod finding;
 pub mod footing;
 pub mod gap;
+pub mod hand;
 pub mod model;
 pub mod noise;
 pub mod orientation;
@@ -21,7 +22,9 @@ pub mod scene;
 pub mod search;
 pub mod shape;
 mod skyline;
+pub mod start;
 pub mod testable;
+mod unsteady;
 pub mod whitening;
 
 pub use self::finding::{Diagnosis, Verdict};
@@ -59,12 +62,16 @@ pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str
         Ok(footing) => footing,
         Err(why) => return untestable(recording, why),
     };
-    let scene = Scene::new(recording, footing.usable.clone(), &*footing.movement, footing.triads);
+    let mut scene = Scene::new(recording, footing.usable.clone(), &*footing.movement, footing.triads);
+    if let Some(held) = &footing.held {
+        scene = scene.through(held);
+    }
     let setting = Setting {
         kinds: &scene.kinds,
         thermometer: recording.temperature.is_some(),
         calibrated: &footing.calibrated,
         gimbals: scene.swings.is_some(),
+        hand: footing.held.is_some(),
         field_known: recording.manifest.site.field_ned_ut.is_some(),
     };
     let candidates = Candidates::new(&setting, &options.without);
@@ -146,7 +153,10 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
             gap_closed_ci95: Some(share.interval),
         });
     }
-    let remarks = if linear.scene.swings.is_none() { unborne(&mut causes) } else { Vec::new() };
+    let remarks = match linear.scene.swings {
+        Some(_) => Vec::new(),
+        None => unborne(&mut causes, &gap::closed_of_own(linear, &best.set, &best.noise)?),
+    };
     causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let mut credible_set: Vec<String> = Vec::new();
     for effect in standings.iter().flat_map(|standing| &standing.set) {
@@ -194,14 +204,13 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
 
 /// Takes out causes that no held-out block bears out, or that are too small to matter: where no rig guides the sensor,
 /// what hand and reference add is no noise of any kind that is estimated, and evidence alone is too sure.
-fn unborne(causes: &mut Vec<Cause>) -> Vec<String> {
-    let borne = |cause: &Cause| {
-        cause.material
-            && cause.gap_closed.is_some_and(|share| share > REMAINDER)
-            && cause.gap_closed_ci95.is_some_and(|[from, _]| from > 0.0)
+fn unborne(causes: &mut Vec<Cause>, of_own: &[gap::Share]) -> Vec<String> {
+    let borne = |(cause, share): &(Cause, &gap::Share)| {
+        cause.material && share.value > REMAINDER && share.interval[0] > 0.0
     };
-    let (kept, out): (Vec<Cause>, Vec<Cause>) = causes.drain(..).partition(borne);
-    *causes = kept;
+    let (kept, out): (Vec<_>, Vec<_>) = causes.drain(..).zip(of_own).partition(borne);
+    let out: Vec<Cause> = out.into_iter().map(|(cause, _)| cause).collect();
+    *causes = kept.into_iter().map(|(cause, _)| cause).collect();
     if out.is_empty() {
         return Vec::new();
     }

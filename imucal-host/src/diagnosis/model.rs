@@ -4,7 +4,7 @@ use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::{
-    apply,
+    apply::{self, ApplyError},
     recording::{Nominal, Recording, SensorKind},
     store::{StoredCalibration, StoredTriad},
 };
@@ -35,7 +35,7 @@ impl Model {
     /// Why it does not fit the recording, for a reader.
     pub fn new(recording: &Recording, stored: &StoredCalibration) -> Result<Self, String> {
         let record = stored.to_record(&recording.path).map_err(|error| error.to_string())?;
-        let remark = apply::check(recording, stored, &record, false).map_err(|error| error.to_string())?;
+        let remark = apply::check(recording, stored, &record, false).map_err(because)?;
         let mut model = Self { remark, ..Self::default() };
         for kind in SensorKind::ALL {
             if let (Some(triple), Some(triad)) = (recording.sensor(kind), stored.triad(kind)) {
@@ -44,6 +44,17 @@ impl Model {
             }
         }
         Ok(model)
+    }
+}
+
+/// Why a calibration is no model of a recording's unit: a simulation of another unit is not to be forced.
+fn because(error: ApplyError) -> String {
+    match error {
+        ApplyError::WrongSensor { recording, recorded, connected } => format!(
+            "{recording}: recorded with serial `{connected}`, but the model was calibrated for `{recorded}`: what parts \
+             two units is no gap of a simulator; give --model a calibration of `{connected}`, or leave it out"
+        ),
+        other => other.to_string(),
     }
 }
 

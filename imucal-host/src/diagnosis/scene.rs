@@ -6,7 +6,11 @@
 use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
 
-use super::block::{Block, cut};
+use super::{
+    block::{Block, cut},
+    hand::{Held, View},
+    unsteady,
+};
 use crate::{
     effect::{Act, Effect, Input, Parameter, Role, Swing, Truth},
     recording::{Recording, SensorKind},
@@ -67,8 +71,10 @@ pub type Means = [Option<Vec<Vector3<f64>>>; 3];
 pub struct Scene<'a> {
     /// The recording.
     pub recording: &'a Recording,
-    /// Its blocks.
+    /// Its blocks; where a view looks at it, those of the view.
     pub blocks: Vec<Block>,
+    cuts: Vec<Block>,
+    view: Option<View>,
     /// Sensors that are there.
     pub kinds: Vec<SensorKind>,
     /// Swings of the gimbals at each row; `None` without gimbals.
@@ -96,18 +102,25 @@ impl<'a> Scene<'a> {
     ) -> Self {
         let interval = recording.median_interval().unwrap_or(0.01);
         let blocks = cut(&recording.time, motion.moving(), interval);
-        let counts = usable.each_ref().map(|usable| {
+        let mut counts = usable.each_ref().map(|usable| {
             let count = |block: &Block| usable.get(block.rows.clone()).unwrap_or_default();
             blocks.iter().map(|block| count(block).iter().filter(|usable| **usable).count()).collect()
         });
+        if motion.swings().is_none() {
+            unsteady::leave_out(recording, &usable, &blocks, &mut counts);
+        }
         let kinds = SensorKind::ALL.into_iter().filter(|kind| recording.sensor(*kind).is_some()).collect();
         let apart = if motion.swings().is_some() { NODES.0 } else { NODES.1 };
         let stride = ((apart / interval).round() as usize).max(1);
-        let fine = Nodes::choose(&recording.time, &blocks, |_, row| row % stride == stride / 2);
+        // Across a gap of a reference it is bridged as if it turned evenly: no derivative is to be taken there.
+        let told = |row: usize| motion.swings().is_some() || motion.known()[row];
+        let fine = Nodes::choose(&recording.time, &blocks, |_, row| row % stride == stride / 2 && told(row));
         let centre = |block: &Block, row: usize| row == (block.rows.start + block.rows.end) / 2;
         let coarse = Nodes::choose(&recording.time, &blocks, centre);
         Self {
             recording,
+            cuts: blocks.clone(),
+            view: None,
             blocks,
             kinds,
             swings: motion.swings(),
@@ -117,6 +130,49 @@ impl<'a> Scene<'a> {
             triads,
             fine,
             coarse,
+        }
+    }
+
+    /// Looked at by way of the rests of a hand; what the magnetometer is given there is not known.
+    #[must_use]
+    pub fn through(mut self, held: &Held) -> Self {
+        let gravity = self.motion.place().gravity;
+        let of = |time: f64| self.motion.truth(time, &|_| ()).c_t_p;
+        let view = View::new(held, &self.recording.time, &self.cuts, &self.counts, &of, gravity);
+        self.kinds.retain(|kind| match kind {
+            SensorKind::Acc => true,
+            SensorKind::Gyr => held.with_gyroscope,
+            SensorKind::Mag => false,
+        });
+        self.blocks.clone_from(&view.blocks);
+        self.counts.clone_from(&view.counts);
+        self.view = Some(view);
+        self
+    }
+
+    /// Means as they are looked at.
+    fn seen(&self, means: Means) -> Means {
+        match &self.view {
+            Some(view) => view.of(&means),
+            None => means,
+        }
+    }
+
+    /// Sensors whose blocks an effect may alter: by way of an attitude, others than its own.
+    pub fn reach(&self, effect: &Effect) -> &'static [SensorKind] {
+        if self.view.is_some() { &SensorKind::ALL } else { effect.sensors }
+    }
+
+    /// A block tells something on an axis of a sensor.
+    pub fn tells(&self, kind: SensorKind, block: usize, axis: usize) -> bool {
+        self.view.as_ref().is_none_or(|view| view.tells(kind, block, axis))
+    }
+
+    /// What an axis of a sensor is, in a table.
+    pub fn axis(&self, kind: SensorKind, axis: usize) -> &'static str {
+        match (&self.view, kind) {
+            (Some(_), SensorKind::Acc) => ["along gravity", "across gravity, first", "across, second"][axis],
+            _ => ["x", "y", "z"][axis],
         }
     }
 
@@ -131,7 +187,13 @@ impl<'a> Scene<'a> {
 
     /// The truth in the middle of each block, without any effect.
     pub fn plain(&self) -> Vec<Truth> {
-        self.truth(&[], &self.coarse)
+        match &self.view {
+            Some(_) => {
+                let times: Vec<f64> = self.blocks.iter().map(|block| block.time).collect();
+                Chain::default().truth(self.motion, &times)
+            }
+            None => self.truth(&[], &self.coarse),
+        }
     }
 
     /// Recorded less simulated, block by block. `None` where a triad is singular.
@@ -143,7 +205,7 @@ impl<'a> Scene<'a> {
             let output = chain.output(*kind, &self.triads[*kind as usize], &input)?;
             means[*kind as usize] = self.difference(*kind, &output);
         }
-        Some(means)
+        Some(self.seen(means))
     }
 
     fn difference(&self, kind: SensorKind, output: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
@@ -158,7 +220,7 @@ impl<'a> Scene<'a> {
             }
             if count > 0.0 { sum / count } else { sum }
         };
-        Some(self.blocks.iter().map(mean).collect())
+        Some(self.cuts.iter().map(mean).collect())
     }
 
     /// What each sensor puts out at the nodes.
@@ -199,7 +261,10 @@ pub struct Reference<'s> {
 impl Reference<'_> {
     /// What a sensor puts out, block by block.
     pub fn output(&self, kind: SensorKind) -> Vec<Vector3<f64>> {
-        self.nodes.averaged(&self.outputs[kind as usize], self.scene.blocks.len())
+        match &self.scene.view {
+            Some(view) => view.given(kind),
+            None => self.nodes.averaged(&self.outputs[kind as usize], self.scene.cuts.len()),
+        }
     }
 
     /// The truth at each block's last node, in the order of the nodes.
@@ -246,9 +311,9 @@ impl Reference<'_> {
         for kind in effect.sensors.iter().filter(|kind| self.scene.kinds.contains(kind)) {
             let (with, without) = (&outputs[*kind as usize], &self.outputs[*kind as usize]);
             let change: Vec<_> = with.iter().zip(without).map(|(a, b)| (a - b) * (scale / step)).collect();
-            means[*kind as usize] = Some(self.nodes.averaged(&change, self.scene.blocks.len()));
+            means[*kind as usize] = Some(self.nodes.averaged(&change, self.scene.cuts.len()));
         }
-        Some(means)
+        Some(self.scene.seen(means))
     }
 }
 

@@ -12,6 +12,7 @@ use super::{
     refit::{Fit, columns, refit, signatures},
     scene::Scene,
     shape::{self, Backdrop},
+    start,
     whitening::Whitening,
 };
 use crate::{
@@ -104,11 +105,18 @@ impl<'s> Linear<'s> {
             let design = Design::new(scene, fitted, &means, &fit.residual);
             let every: Vec<usize> = (0..design.columns.len()).collect();
             let whitenings = weighing.whitenings(&design, noise);
-            let backdrop = Backdrop { scene, design: &design, fitted: &every, whitenings: &whitenings };
+            // An episode without a name has been taken for drift, which hides when it began and ended.
+            let quiet = weighing.whitenings(&design, &noise.quieter().even());
             let coarse = scene.reference(fit.doses.clone(), &scene.coarse)?;
             for (effect, shape) in candidates.effects.iter().zip(&mut shapes) {
                 if is_shaped(effect) && !chosen.iter().any(|other| std::ptr::eq(*other, *effect)) {
+                    let hidden = scene.swings.is_none() && shape::is_episode(effect);
+                    let whitenings = if hidden { &quiet } else { &whitenings };
+                    let backdrop = Backdrop { scene, design: &design, fitted: &every, whitenings };
                     *shape = shape::best(effect, &coarse, &backdrop)?;
+                    if hidden {
+                        *shape = shape::refine(effect, shape, &coarse, &backdrop)?.0;
+                    }
                 }
             }
         }
@@ -225,7 +233,7 @@ impl<'s> Linear<'s> {
         let sets = shortlist.into_iter().map(|effect| {
             let mut set = from.set.clone();
             set.push(effect);
-            (set, effect.sensors)
+            (set, self.scene.reach(effect))
         });
         Some(self.best_of(sets, &from.noise))
     }
@@ -295,7 +303,10 @@ pub fn search<'s>(
         .iter()
         .map(|effect| Dose { effect, values: vec![0.0; effect.parameters.len()] })
         .collect();
-    let mut fit = refit(scene, doses, None)?;
+    let mut fit = match scene.swings {
+        Some(_) => refit(scene, doses, None)?,
+        None => start::start(scene, doses)?,
+    };
     trace("baseline fitted");
     let mut linear = Linear::new(scene, candidates, &fit, None)?;
     let white = linear.weighing.white(&fit.residual);
