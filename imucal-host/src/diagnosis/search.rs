@@ -324,6 +324,7 @@ pub fn search<'s>(
     let mut best = none.clone();
     linear = Linear::new(scene, candidates, &fit, Some(&best.noise))?;
     trace("shapes");
+    let mut seen = Vec::new();
     loop {
         best = linear.judge(&best.set, &best.noise, &SensorKind::ALL, &FAR)?;
         let mut next: Option<Judged> = None;
@@ -333,13 +334,22 @@ pub fn search<'s>(
         if next.is_none() && best.set.len() > 1 {
             next = linear.changed(&best)?.filter(|judged| judged.log_evidence > best.log_evidence + 0.5);
         }
-        let Some(next) = next else { break };
+        // Two sets may each be better than the other with the noise that the other leaves.
+        let Some(next) = next.filter(|judged| !seen.contains(&key(&judged.set))) else { break };
+        seen.push(key(&next.set));
         let names: Vec<&str> = next.set.iter().map(|effect| effect.id.as_str()).collect();
         trace(&format!("{:.1} → {:.1} {names:?}", best.log_evidence, next.log_evidence));
         (fit, linear, best) = advance(scene, candidates, &fit, &linear, next)?;
         trace("refitted");
     }
     Some(Explained { best, none, fit, linear })
+}
+
+/// A set, whatever the order of its effects.
+fn key(set: &[&'static Effect]) -> Vec<&'static str> {
+    let mut key: Vec<&'static str> = set.iter().map(|effect| effect.id.as_str()).collect();
+    key.sort_unstable();
+    key
 }
 
 /// Fits a set through the simulator and looks at all candidates from there.
