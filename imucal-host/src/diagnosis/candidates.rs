@@ -62,9 +62,8 @@ impl Candidates {
             .filter(|effect| !matches!(effect.act, Act::Signal(..) | Act::Data(..)) && reached(effect))
             .partition(|effect| in_baseline(effect));
         let is_free = |effect: &Effect| match effect.id.as_str() {
-            // A magnetometer is a chip of its own, and a reference has no clock in common with it; nor does a hand turn
-            // it where it lay before.
-            "mag.lag" | "mag.place" => !setting.gimbals,
+            // A magnetometer is a chip of its own, and a reference has no clock in common with it.
+            "mag.lag" => !setting.gimbals,
             // Without the vertical, the levelling tilts stand for the dip.
             "mag.field_dip" => !setting.field_known && kinds.contains(&SensorKind::Acc),
             // A triad that is free takes up the strength.

@@ -2,6 +2,7 @@
 
 pub mod block;
 pub mod candidates;
+mod carried;
 pub mod convention;
 pub mod credible;
 pub mod design;
@@ -155,7 +156,11 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
     }
     let remarks = match linear.scene.swings {
         Some(_) => Vec::new(),
-        None => unborne(&mut causes, &gap::closed_of_own(linear, &best.set, &best.noise)?),
+        None => {
+            let mut remarks = unborne(&mut causes, &gap::closed_of_own(linear, &best.set, &best.noise)?);
+            remarks.extend(carried::leave_out(&mut causes, &linear.scene.blocks));
+            remarks
+        }
     };
     causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let mut credible_set: Vec<String> = Vec::new();

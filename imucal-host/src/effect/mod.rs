@@ -48,7 +48,6 @@ mod motor_current;
 mod mounting;
 mod noise_burst;
 mod parameter;
-mod place;
 mod rate_error;
 mod saturation;
 mod scale;
@@ -320,7 +319,7 @@ pub static CATALOGUE: LazyLock<Vec<Effect>> = LazyLock::new(|| {
 /// Terms that the baseline has where a rig, a surveyed site or a housing does not fix them. They are fitted, never named
 /// as a cause, and not part of the catalogue.
 pub static NUISANCES: LazyLock<Vec<Effect>> = LazyLock::new(|| {
-    let mut list = vec![field_dip::effect(), field_strength::effect(), lag::effect(Mag), place::effect()];
+    let mut list = vec![field_dip::effect(), field_strength::effect(), lag::effect(Mag)];
     list.extend(SensorKind::ALL.map(mounting::effect));
     list
 });
