@@ -12,6 +12,8 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Recordings in a hand.
 const HAND: [&str; 3] = ["xsens-mti", "mpu9150-0", "mpu9150-1"];
+/// Whitened squared size from which on a term can be shown, as in the diagnosis itself.
+const SEEN: f64 = 25.0;
 /// A part of a recording has a term against another part of it by chance: as often as this at most.
 const FALSE_ALARMS: f64 = 0.05;
 
@@ -84,9 +86,17 @@ fn terms_taken_out_of_the_baseline_of_a_hand_recording_are_named_with_their_size
     let (mut named, mut sized, mut all) = (0, 0, 0);
     for name in HAND {
         let Some(recording) = read(name) else { return };
-        for term in ["acc.bias", "acc.scale", "acc.misalignment", "gyr.bias", "gyr.scale", "gyr.misalignment"] {
+        for term in ["acc.bias", "acc.scale", "acc.misalignment", "gyr.bias", "gyr.scale", "gyr.misalignment"]
+        {
             let diagnosis = without(&recording, &[term]);
             let expected = expected(&recording, term);
+            let size: f64 = expected.iter().map(|(value, std)| (value / std).powi(2)).sum();
+            if size < SEEN {
+                println!(
+                    "{name:<12} {term:<18} cannot be shown: {expected:.4?} is {size:.0} in whitened squared size"
+                );
+                continue;
+            }
             all += 1;
             let Some(cause) = diagnosis.causes.iter().find(|cause| cause.effect == term) else {
                 println!("{name:<12} {term:<18} not named: {:?} {:?}", names(&diagnosis), expected);
@@ -114,7 +124,9 @@ fn a_hand_recording_lists_what_it_cannot_show_and_why() {
         let Some(recording) = read(name) else { return };
         let diagnosis = without(&recording, &[]);
         assert!(diagnosis.held_out, "{name}");
-        for id in ["rig.level_tilt", "rig.encoder_offset", "clk.time_offset", "gyr.earth_rate", "acc.gravity_error"] {
+        for id in
+            ["rig.level_tilt", "rig.encoder_offset", "clk.time_offset", "gyr.earth_rate", "acc.gravity_error"]
+        {
             let why = diagnosis.not_testable.iter().find(|not| not.effect == id).expect("it is listed");
             assert!(!why.because.is_empty());
         }
@@ -130,7 +142,11 @@ fn too_few_rests_in_a_hand_are_not_diagnosed() {
     let diagnosis = without(&recording, &[]);
     assert_eq!(diagnosis.verdict, Verdict::NotTestable);
     assert!(diagnosis.causes.is_empty());
-    assert!(diagnosis.remarks[0].contains("the accelerometer's calibration is refused"), "{:?}", diagnosis.remarks);
+    assert!(
+        diagnosis.remarks[0].contains("the accelerometer's calibration is refused"),
+        "{:?}",
+        diagnosis.remarks
+    );
 }
 
 /// Some rows of a recording, its time from zero.
@@ -183,7 +199,11 @@ fn two_parts_of_one_recording_do_not_differ() {
                     names(&diagnosis).into_iter().filter(|id| !names(&own).contains(id)).collect();
                 splits += 1;
                 alarms += usize::from(!differing.is_empty());
-                println!("{name:<12} {how} {direction}: {:?} {differing:?}, on its own {:?}", diagnosis.verdict, names(&own));
+                println!(
+                    "{name:<12} {how} {direction}: {:?} {differing:?}, on its own {:?}",
+                    diagnosis.verdict,
+                    names(&own)
+                );
             }
         }
     }
@@ -197,9 +217,16 @@ fn a_magnet_that_came_near_for_a_while_is_named_with_its_times() {
     let Some(disturbed) = read("broad-32-magnet-1cm") else { return };
     let diagnosis = against(&disturbed, &model(&calm));
     let cause = diagnosis.causes.iter().find(|cause| cause.effect == "mag.bias_step").expect("it is named");
-    let value = |name: &str| cause.parameters.iter().find(|p| p.name == name).expect("it has it").value.expect("finite");
+    let value = |name: &str| {
+        cause.parameters.iter().find(|p| p.name == name).expect("it has it").value.expect("finite")
+    };
     println!("magnet: {:?}", cause.parameters);
-    println!("{:?}: {:?}, closed {:?}", diagnosis.verdict, names(&diagnosis), diagnosis.gap_closed_total_ci95);
+    println!(
+        "{:?}: {:?}, closed {:?}",
+        diagnosis.verdict,
+        names(&diagnosis),
+        diagnosis.gap_closed_total_ci95
+    );
     assert!((value("t_start") - 38.5).abs() < 1.5 && (value("t_end") - 95.0).abs() < 1.5);
     assert!(diagnosis.gap_closed_total.expect("causes") >= 0.9);
 }

@@ -41,8 +41,8 @@ pub struct Footing {
     pub usable: [Vec<bool>; 3],
     /// Triads to start from, nominal SI to SI: those of the model, or such as put axes and units right.
     pub triads: [Triad<f64>; 3],
-    /// Sensors whose triad is the model's.
-    pub calibrated: Vec<SensorKind>,
+    /// The model that it stands on.
+    pub model: Model,
     /// Faults of the recording that are effects of the catalogue.
     pub findings: Vec<Finding>,
     /// What else a reader ought to know.
@@ -94,11 +94,11 @@ impl Footing {
         };
         debug_assert!(recording.sensor(*measured).is_some());
         let mut remarks = conventions.remarks;
-        remarks.extend(model.remark);
+        remarks.extend(model.remark.clone());
         remarks.extend(revisits::remark(&*movement));
         remarks.extend(shortcomings(recording));
         let findings = conventions.findings;
-        Ok(Self { movement, held, usable, triads, calibrated: model.calibrated, findings, remarks })
+        Ok(Self { movement, held, usable, triads, model, findings, remarks })
     }
 }
 

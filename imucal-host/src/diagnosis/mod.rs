@@ -70,7 +70,7 @@ pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str
     let setting = Setting {
         kinds: &scene.kinds,
         thermometer: recording.temperature.is_some(),
-        calibrated: &footing.calibrated,
+        calibrated: &footing.model.calibrated,
         gimbals: scene.swings.is_some(),
         hand: footing.held.is_some(),
         field_known: recording.manifest.site.field_ned_ut.is_some(),
@@ -79,9 +79,26 @@ pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str
     let explained = search::search(&scene, &candidates, progress);
     let answer = explained.as_ref().and_then(|explained| answer(recording, explained, progress));
     match answer {
-        Some(answer) => with_faults(answer, &footing),
+        Some(answer) => with_faults(beyond_model(answer, &footing.model), &footing),
         None => untestable(recording, "the baseline cannot be fitted to this recording".to_owned()),
     }
+}
+
+/// Takes out what a model made elsewhere does not know better itself.
+fn beyond_model(mut diagnosis: Diagnosis, model: &model::Model) -> Diagnosis {
+    let out: Vec<Cause> = diagnosis.causes.extract_if(.., |cause| model.errs_as_much(cause)).collect();
+    for cause in &out {
+        diagnosis.credible_set.retain(|id| *id != cause.effect && !cause.equivalents.contains(id));
+        diagnosis
+            .remarks
+            .push(format!("not asserted: {} is within the model's own standard errors", cause.effect));
+    }
+    let explained = matches!(diagnosis.verdict, Verdict::Explained | Verdict::Ambiguous);
+    if !out.is_empty() && diagnosis.causes.is_empty() {
+        (diagnosis.gap_closed_total, diagnosis.gap_closed_total_ci95) = (None, None);
+        diagnosis.verdict = if explained { Verdict::None } else { Verdict::Unknown };
+    }
+    diagnosis
 }
 
 /// Adds what was wrong with the recording itself: that is certain, and comes first.

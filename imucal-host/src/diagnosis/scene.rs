@@ -106,7 +106,7 @@ impl<'a> Scene<'a> {
             let count = |block: &Block| usable.get(block.rows.clone()).unwrap_or_default();
             blocks.iter().map(|block| count(block).iter().filter(|usable| **usable).count()).collect()
         });
-        if motion.swings().is_none() {
+        if recording.reference.is_some() && motion.swings().is_none() {
             unsteady::leave_out(recording, &usable, &blocks, &mut counts);
         }
         let kinds = SensorKind::ALL.into_iter().filter(|kind| recording.sensor(*kind).is_some()).collect();
