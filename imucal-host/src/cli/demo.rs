@@ -13,6 +13,7 @@ use super::{
 use crate::{
     apply::apply,
     calibrate::{Calibration, Options, calibrate},
+    diagnosis::{self, diagnose},
     effect,
     equivalence::{FitEquivalence, SampleEquivalence, fits, samples},
     recording::SensorKind,
@@ -80,6 +81,21 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     apply(&recording, &stored, &device).write(&out.join("rig-calibrated.csv.gz"))?;
 
+    say!("\n5. Diagnose: which effect was withheld, and how far does the gap close with it?\n");
+    let diagnosis = diagnose(&recording, &diagnosis::Options::default(), &|_| {});
+    output::text(&report::diagnosis::page(&diagnosis))?;
+    let json = serde_json::to_string_pretty(&diagnosis)? + "\n";
+    output::file(&out.join("diagnosis.json"), &json)?;
+    let named = diagnosis.causes.iter().any(|cause| cause.effect == WITHHELD.0);
+    say!(
+        "{}",
+        if named {
+            "It is the one that was withheld."
+        } else {
+            "The one that was withheld is not among them."
+        }
+    );
+
     say!("\nWritten to {}:", out.display());
     for (file, what) in [
         ("rig.csv.gz", "the recording"),
@@ -89,10 +105,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         ("calibration.json", "everything, for programs"),
         ("rig-calibrated.csv.gz", "the recording corrected through the core"),
         ("rig-calibrated.toml", "its manifest"),
+        ("diagnosis.json", "the diagnosis, for programs"),
     ] {
         say!("  {file:<24} {what}");
     }
-    Ok(if found && equal { Ending::Done } else { Ending::Refused })
+    Ok(if found && equal && named { Ending::Done } else { Ending::Refused })
 }
 
 /// Largest error in standard errors, sensor by sensor, and what was withheld; whether all were accepted.

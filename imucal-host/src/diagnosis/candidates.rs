@@ -33,6 +33,8 @@ pub struct Setting<'a> {
     pub calibrated: &'a [SensorKind],
     /// The movement is that of a rig's gimbals; else of a reference that is fixed to the sensor.
     pub gimbals: bool,
+    /// The movement is what the sensors themselves tell from rest to rest.
+    pub hand: bool,
     /// The site tells the field.
     pub field_known: bool,
 }
@@ -48,6 +50,7 @@ impl Candidates {
         // A reference that is no rig has a clock of its own.
         let on_clock = |effect: &Effect| !setting.gimbals && effect.id == "clk.time_offset";
         let in_baseline = |effect: &Effect| match term(effect, kinds) {
+            _ if setting.hand && untold(effect).is_some() => false,
             _ if on_clock(effect) => !named(effect),
             Some(Term::Rig) => !named(effect),
             Some(Term::Triad) => !named(effect) && !given(effect),
@@ -59,6 +62,8 @@ impl Candidates {
             .filter(|effect| !matches!(effect.act, Act::Signal(..) | Act::Data(..)) && reached(effect))
             .partition(|effect| in_baseline(effect));
         let is_free = |effect: &Effect| match effect.id.as_str() {
+            // A magnetometer is a chip of its own, and a reference has no clock in common with it.
+            "mag.lag" => !setting.gimbals,
             // Without the vertical, the levelling tilts stand for the dip.
             "mag.field_dip" => !setting.field_known && kinds.contains(&SensorKind::Acc),
             // A triad that is free takes up the strength.
@@ -74,7 +79,9 @@ impl Candidates {
             if elsewhere && is_triad_term(effect, &[SensorKind::Mag]) {
                 continue;
             }
-            if !setting.thermometer && effect.id.contains(".temp_") {
+            if let Some(why) = untold(effect).filter(|_| setting.hand) {
+                candidates.untestable.push((effect, why));
+            } else if !setting.thermometer && effect.id.contains(".temp_") {
                 candidates.untestable.push((effect, "no temperature was recorded"));
             } else if !elsewhere && ELSEWHERE.contains(&effect.id.as_str()) {
                 let why = "it shows against a calibration made elsewhere (--model)";
@@ -97,6 +104,18 @@ impl Candidates {
     pub fn shape(&self, shapes: &[Vec<f64>], effect: &Effect) -> Vec<f64> {
         let at = self.effects.iter().position(|other| std::ptr::eq(*other, effect));
         at.and_then(|at| shapes.get(at).cloned()).unwrap_or_default()
+    }
+}
+
+/// Why a recording in a hand, whose attitudes the sensors themselves tell, cannot show an effect.
+fn untold(effect: &Effect) -> Option<&'static str> {
+    match effect.act {
+        Act::Rig(_) => Some("there is no rig: gravity itself tells the attitude of each rest"),
+        Act::Clock(_) => Some("there is no clock but the sensors' own"),
+        Act::Field(_) if effect.id == "gyr.earth_rate" => {
+            Some("the heading is not told, so that Earth's rotation is not known in the sensor's axes")
+        }
+        _ => None,
     }
 }
 

@@ -44,7 +44,8 @@ pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> O
     for (_, effect) in others.take(JUDGED) {
         let mut set = rest.clone();
         set.push(effect);
-        let anew: Vec<_> = cause.sensors.iter().chain(effect.sensors).copied().collect();
+        let anew: Vec<_> =
+            linear.scene.reach(cause).iter().chain(linear.scene.reach(effect)).copied().collect();
         if let Some(found) = linear.judge(&set, &best.noise, &anew, &NEAR) {
             judged.push((found.log_evidence, effect));
         }

@@ -90,6 +90,9 @@ pub fn drivers(scene: &Scene<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Driver>
     drivers.push(other_input(given));
     drivers.retain_mut(|driver| {
         driver.functions.retain_mut(|function| standardise(&mut function.values));
+        for (at, _) in scene.blocks.iter().enumerate().filter(|(_, block)| block.rows.is_empty()) {
+            driver.functions.iter_mut().for_each(|function| function.values[at] = 0.0);
+        }
         !driver.functions.is_empty()
     });
     drivers

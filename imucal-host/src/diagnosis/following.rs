@@ -10,7 +10,7 @@ use super::{
     evidence::Projected,
     frequency,
     noise::{NEAR, Noise},
-    scene::Means,
+    scene::{Means, Scene},
     search::{Linear, log_evidence},
     whitening::Whitening,
 };
@@ -55,12 +55,14 @@ pub fn following(
     let whitenings = linear.whitenings(noise);
     let normal = linear.design.normal(&whitenings, &fitted);
     let kinds = linear.scene.kinds.iter();
-    let pairs: Vec<(SensorKind, &Driver)> =
-        kinds.flat_map(|kind| drivers.iter().map(move |driver| (*kind, driver))).collect();
+    let pairs: Vec<(SensorKind, &Driver)> = kinds
+        .flat_map(|kind| drivers.iter().map(move |driver| (*kind, driver)))
+        .filter(|(kind, driver)| !driver.columns(*kind).is_empty())
+        .collect();
     let follow = |(kind, driver): &(SensorKind, &Driver)| {
         let projected = across(linear, &whitenings, *kind, driver, &fitted).projected(&normal)?;
         let places: Vec<usize> = (0..projected.score.len()).collect();
-        follow(*kind, driver, &projected, &places)
+        follow(linear.scene, *kind, driver, &projected, &places)
     };
     let mut found: Vec<Following> = pairs.par_iter().map(follow).collect::<Option<_>>()?;
     sort(&mut found);
@@ -184,7 +186,8 @@ fn judged(
     let gain = log_evidence(&normal, linear.baseline.len(), &groups)? - before - (choices as f64).ln();
     let gain = if driver.name == TIME { gain - DRIFTING } else { gain };
     let projected = Projected::new(&normal, &every[..fitted], &every[fitted..])?;
-    let following = follow(kind, driver, &projected, &(0..every.len() - fitted).collect::<Vec<_>>())?;
+    let following =
+        follow(linear.scene, kind, driver, &projected, &(0..every.len() - fitted).collect::<Vec<_>>())?;
     Some(Following { p_value: libm::exp(-gain.max(0.0)), ..following })
 }
 
@@ -227,7 +230,13 @@ fn on(kind: SensorKind, axis: usize, values: &[f64], usual: f64) -> Means {
     means
 }
 
-fn follow(kind: SensorKind, driver: &Driver, projected: &Projected, places: &[usize]) -> Option<Following> {
+fn follow(
+    scene: &Scene<'_>,
+    kind: SensorKind,
+    driver: &Driver,
+    projected: &Projected,
+    places: &[usize],
+) -> Option<Following> {
     let (statistic, dimensions) = score_test(projected, places);
     let p_value = match ChiSquared::new(dimensions.max(1) as f64) {
         Ok(distribution) if dimensions > 0 => distribution.sf(statistic / CAUTION),
@@ -240,7 +249,10 @@ fn follow(kind: SensorKind, driver: &Driver, projected: &Projected, places: &[us
     Some(Following {
         kind,
         driver: driver.name.clone(),
-        detail: format!("{} axis, {}", ["x", "y", "z"][axis], driver.functions[function].detail),
+        detail: match scene.axis(kind, axis) {
+            name @ ("x" | "y" | "z") => format!("{name} axis, {}", driver.functions[function].detail),
+            name => format!("{name}; {}", driver.functions[function].detail),
+        },
         size: (statistic - dimensions as f64).max(0.0),
         p_value,
     })

@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     convention::{self, Conventions, Finding},
+    hand::Held,
     model::Model,
     revisits,
 };
@@ -34,12 +35,14 @@ const CLIPPED: f64 = 5.0;
 pub struct Footing {
     /// The recorded movement.
     pub movement: Box<dyn Recorded>,
+    /// The rests that it was told from, where neither a rig nor a reference tells it.
+    pub held: Option<Held>,
     /// Rows of each sensor that can be used, by [`SensorKind::ALL`].
     pub usable: [Vec<bool>; 3],
     /// Triads to start from, nominal SI to SI: those of the model, or such as put axes and units right.
     pub triads: [Triad<f64>; 3],
-    /// Sensors whose triad is the model's.
-    pub calibrated: Vec<SensorKind>,
+    /// The model that it stands on.
+    pub model: Model,
     /// Faults of the recording that are effects of the catalogue.
     pub findings: Vec<Finding>,
     /// What else a reader ought to know.
@@ -55,7 +58,7 @@ impl Footing {
     pub fn new(recording: &Recording, model: Option<&StoredCalibration>) -> Result<Self, String> {
         let model = model.map(|model| Model::new(recording, model)).transpose()?.unwrap_or_default();
         let integrity = integrity::inspect(recording);
-        let movement = movement(recording, &integrity, &model)?;
+        let (movement, held) = movement(recording, &integrity, &model)?;
         let conventions = convention::check(recording, &integrity, &*movement);
         if let Some(contradiction) = conventions.contradiction {
             return Err(contradiction);
@@ -65,6 +68,13 @@ impl Footing {
             usable.iter_mut().zip(movement.known()).for_each(|(usable, known)| *usable &= known);
         }
         let mut triads = model.triads;
+        if let Some(held) = &held {
+            for kind in [SensorKind::Acc, SensorKind::Gyr] {
+                if model.calibrated.contains(&kind) {
+                    triads[kind as usize] = held.triads[kind as usize];
+                }
+            }
+        }
         if let Some(turn) = conventions.turned.and_then(axis_swap::signed_permutation) {
             triads.iter_mut().for_each(|triad| triad.gain = turn.tr_mul(&triad.gain));
         }
@@ -84,11 +94,11 @@ impl Footing {
         };
         debug_assert!(recording.sensor(*measured).is_some());
         let mut remarks = conventions.remarks;
-        remarks.extend(model.remark);
+        remarks.extend(model.remark.clone());
         remarks.extend(revisits::remark(&*movement));
         remarks.extend(shortcomings(recording));
         let findings = conventions.findings;
-        Ok(Self { movement, usable, triads, calibrated: model.calibrated, findings, remarks })
+        Ok(Self { movement, held, usable, triads, model, findings, remarks })
     }
 }
 
@@ -185,7 +195,7 @@ fn movement(
     recording: &Recording,
     integrity: &Integrity,
     model: &Model,
-) -> Result<Box<dyn Recorded>, String> {
+) -> Result<(Box<dyn Recorded>, Option<Held>), String> {
     let site = &recording.manifest.site;
     let mut place = Place {
         latitude_deg: site.latitude_deg.unwrap_or(0.0),
@@ -194,6 +204,7 @@ fn movement(
         field_n: site.field_ned_ut.unwrap_or_default().into(),
     };
     let temperature = recording.temperature.clone().unwrap_or_else(|| vec![25.0; recording.rows()]);
+    let mut held = None;
     let movement: Box<dyn Recorded> = match (recording.gimbal.as_deref(), recording.reference.as_deref()) {
         (Some(gimbal), _) => {
             let axes = axes(recording)?;
@@ -215,10 +226,9 @@ fn movement(
             Box::new(tracked.ok_or("no row has a reference attitude")?)
         }
         (None, None) => {
-            return Err("there are neither encoder columns (gimbal_outer, gimbal_middle, gimbal_inner) nor a \
-                        reference attitude (ref_qw, ref_qx, ref_qy, ref_qz): the simulator cannot be given the \
-                        movement"
-                .into());
+            let told = Held::new(recording, integrity, model, temperature, place)?;
+            held = Some(told.clone());
+            Box::new(told)
         }
     };
     let length = movement.duration() - recording.time.first().copied().unwrap_or(0.0);
@@ -230,7 +240,7 @@ fn movement(
     if !movement.moving().iter().any(|moves| *moves) {
         return Err("the rig stands still: nothing tells an effect from a bias".to_owned());
     }
-    Ok(movement)
+    Ok((movement, held))
 }
 
 /// The field in the frame of a reference, µT: the median of what the magnetometer shows there, component by component.

@@ -16,7 +16,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{design::Normal, evidence::Projected, finding::Gap, noise::Noise, search::Linear};
+use super::{
+    design::{Design, Normal},
+    evidence::Projected,
+    finding::Gap,
+    noise::Noise,
+    search::Linear,
+};
 use crate::effect::Effect;
 
 /// Folds.
@@ -54,13 +60,35 @@ pub struct Closed {
 
 /// Shares that a set closes; `remainder` is the whitened size of what a driver still follows.
 pub fn closed(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise, remainder: f64) -> Option<Closed> {
+    closed_in(linear, &linear.design, set, noise, remainder)
+}
+
+/// Share that each effect closes of what its own sensors show: beside a quiet sensor's gap that of another looks small.
+pub fn closed_of_own(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise) -> Option<Vec<Share>> {
+    let of = |(k, effect): (usize, &&'static Effect)| {
+        let mut design = linear.design.clone();
+        design.channels.retain(|channel| linear.scene.reach(effect).contains(&channel.kind));
+        closed_in(linear, &design, set, noise, 0.0)?.each.get(k).copied()
+    };
+    set.iter().enumerate().map(of).collect()
+}
+
+fn closed_in(
+    linear: &Linear<'_>,
+    design: &Design,
+    set: &[&'static Effect],
+    noise: &Noise,
+    remainder: f64,
+) -> Option<Closed> {
     let fitted = linear.fitted(set);
     let folds: Vec<Normal> = (0..FOLDS)
         .map(|fold| {
             let time = |block: usize| linear.scene.blocks[block].time / STRETCH;
-            let inside = |block: usize| time(block) as usize % FOLDS == fold;
-            let whitenings = linear.weighing.whitenings_within(&linear.design, noise, &inside);
-            linear.design.normal(&whitenings, &fitted)
+            // A row that holds no samples is a convention, and belongs to every fold.
+            let empty = |block: usize| linear.scene.blocks[block].rows.is_empty();
+            let inside = |block: usize| empty(block) || time(block) as usize % FOLDS == fold;
+            let whitenings = linear.weighing.whitenings_within(design, noise, &inside);
+            design.normal(&whitenings, &fitted)
         })
         .collect();
     let baseline = linear.baseline.len();
@@ -184,7 +212,7 @@ pub fn table(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise) -> Opt
         };
         Gap {
             sensor: channel.kind.prefix().to_owned(),
-            axis: ["x", "y", "z"][channel.axis].to_owned(),
+            axis: linear.scene.axis(channel.kind, channel.axis).to_owned(),
             unit: crate::recording::Unit::of(channel.kind)
                 .first()
                 .map(ToString::to_string)

@@ -2,6 +2,7 @@
 
 pub mod block;
 pub mod candidates;
+mod carried;
 pub mod convention;
 pub mod credible;
 pub mod design;
@@ -14,6 +15,7 @@ pub mod following;
 pub mod footing;
 pub mod frequency;
 pub mod gap;
+pub mod hand;
 pub mod model;
 pub mod noise;
 pub mod orientation;
@@ -23,7 +25,9 @@ pub mod scene;
 pub mod search;
 pub mod shape;
 mod skyline;
+pub mod start;
 pub mod testable;
+mod unsteady;
 pub mod whitening;
 
 pub use self::finding::{Diagnosis, Verdict};
@@ -61,21 +65,42 @@ pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str
         Ok(footing) => footing,
         Err(why) => return untestable(recording, why),
     };
-    let scene = Scene::new(recording, footing.usable.clone(), &*footing.movement, footing.triads);
+    let mut scene = Scene::new(recording, footing.usable.clone(), &*footing.movement, footing.triads);
+    if let Some(held) = &footing.held {
+        scene = scene.through(held);
+    }
     let setting = Setting {
         kinds: &scene.kinds,
         thermometer: recording.temperature.is_some(),
-        calibrated: &footing.calibrated,
+        calibrated: &footing.model.calibrated,
         gimbals: scene.swings.is_some(),
+        hand: footing.held.is_some(),
         field_known: recording.manifest.site.field_ned_ut.is_some(),
     };
     let candidates = Candidates::new(&setting, &options.without);
     let explained = search::search(&scene, &candidates, progress);
     let answer = explained.as_ref().and_then(|explained| answer(recording, explained, progress));
     match answer {
-        Some(answer) => with_faults(answer, &footing),
+        Some(answer) => with_faults(beyond_model(answer, &footing.model), &footing),
         None => untestable(recording, "the baseline cannot be fitted to this recording".to_owned()),
     }
+}
+
+/// Takes out what a model made elsewhere does not know better itself.
+fn beyond_model(mut diagnosis: Diagnosis, model: &model::Model) -> Diagnosis {
+    let out: Vec<Cause> = diagnosis.causes.extract_if(.., |cause| model.errs_as_much(cause)).collect();
+    for cause in &out {
+        diagnosis.credible_set.retain(|id| *id != cause.effect && !cause.equivalents.contains(id));
+        diagnosis
+            .remarks
+            .push(format!("not asserted: {} is within the model's own standard errors", cause.effect));
+    }
+    let explained = matches!(diagnosis.verdict, Verdict::Explained | Verdict::Ambiguous);
+    if !out.is_empty() && diagnosis.causes.is_empty() {
+        (diagnosis.gap_closed_total, diagnosis.gap_closed_total_ci95) = (None, None);
+        diagnosis.verdict = if explained { Verdict::None } else { Verdict::Unknown };
+    }
+    diagnosis
 }
 
 /// Adds what was wrong with the recording itself: that is certain, and comes first.
@@ -151,7 +176,14 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
             gap_closed_ci95: Some(share.interval),
         });
     }
-    let remarks = if linear.scene.swings.is_none() { unborne(&mut causes) } else { Vec::new() };
+    let remarks = match linear.scene.swings {
+        Some(_) => Vec::new(),
+        None => {
+            let mut remarks = unborne(&mut causes, &gap::closed_of_own(linear, &best.set, &best.noise)?);
+            remarks.extend(carried::leave_out(&mut causes, &linear.scene.blocks));
+            remarks
+        }
+    };
     causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let mut credible_set: Vec<String> = Vec::new();
     let suspects = if best.set.is_empty() { credible::suspects(linear, best)? } else { Vec::new() };
@@ -200,14 +232,13 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
 
 /// Takes out causes that no held-out block bears out, or that are too small to matter: where no rig guides the sensor,
 /// what hand and reference add is no noise of any kind that is estimated, and evidence alone is too sure.
-fn unborne(causes: &mut Vec<Cause>) -> Vec<String> {
-    let borne = |cause: &Cause| {
-        cause.material
-            && cause.gap_closed.is_some_and(|share| share > REMAINDER)
-            && cause.gap_closed_ci95.is_some_and(|[from, _]| from > 0.0)
+fn unborne(causes: &mut Vec<Cause>, of_own: &[gap::Share]) -> Vec<String> {
+    let borne = |(cause, share): &(Cause, &gap::Share)| {
+        cause.material && share.value > REMAINDER && share.interval[0] > 0.0
     };
-    let (kept, out): (Vec<Cause>, Vec<Cause>) = causes.drain(..).partition(borne);
-    *causes = kept;
+    let (kept, out): (Vec<_>, Vec<_>) = causes.drain(..).zip(of_own).partition(borne);
+    let out: Vec<Cause> = out.into_iter().map(|(cause, _)| cause).collect();
+    *causes = kept.into_iter().map(|(cause, _)| cause).collect();
     if out.is_empty() {
         return Vec::new();
     }

@@ -3,11 +3,15 @@
 use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
 
+use super::finding::Cause;
 use crate::{
-    apply,
+    apply::{self, ApplyError},
     recording::{Nominal, Recording, SensorKind},
     store::{StoredCalibration, StoredTriad},
 };
+
+/// Whitened squared size of what is more than a model's own error.
+const SEEN: f64 = 25.0;
 
 /// Triads that a simulation starts from.
 #[derive(Clone, Debug)]
@@ -16,6 +20,8 @@ pub struct Model {
     pub triads: [Triad<f64>; 3],
     /// Sensors that it holds and the recording has.
     pub calibrated: Vec<SensorKind>,
+    /// Standard errors of its gain and, nominal SI, of its bias, by [`SensorKind::ALL`]; zero where it has none.
+    pub errors: [(Matrix3<f64>, Vector3<f64>); 3],
     /// What a reader ought to know of it.
     pub remark: Option<String>,
 }
@@ -23,7 +29,12 @@ pub struct Model {
 impl Default for Model {
     /// Knows nothing: every triad is nominal.
     fn default() -> Self {
-        Self { triads: [Triad::identity(); 3], calibrated: Vec::new(), remark: None }
+        Self {
+            triads: [Triad::identity(); 3],
+            calibrated: Vec::new(),
+            errors: Default::default(),
+            remark: None,
+        }
     }
 }
 
@@ -35,15 +46,57 @@ impl Model {
     /// Why it does not fit the recording, for a reader.
     pub fn new(recording: &Recording, stored: &StoredCalibration) -> Result<Self, String> {
         let record = stored.to_record(&recording.path).map_err(|error| error.to_string())?;
-        let remark = apply::check(recording, stored, &record, false).map_err(|error| error.to_string())?;
+        let remark = apply::check(recording, stored, &record, false).map_err(because)?;
         let mut model = Self { remark, ..Self::default() };
         for kind in SensorKind::ALL {
             if let (Some(triple), Some(triad)) = (recording.sensor(kind), stored.triad(kind)) {
                 model.triads[kind as usize] = si(triad, triple.nominal);
+                model.errors[kind as usize] = errors(triad, triple.nominal);
                 model.calibrated.push(kind);
             }
         }
         Ok(model)
+    }
+}
+
+/// Why a calibration is no model of a recording's unit: a simulation of another unit is not to be forced.
+fn because(error: ApplyError) -> String {
+    match error {
+        ApplyError::WrongSensor { recording, recorded, connected } => format!(
+            "{recording}: recorded with serial `{connected}`, but the model was calibrated for `{recorded}`: what parts \
+             two units is no gap of a simulator; give --model a calibration of `{connected}`, or leave it out"
+        ),
+        other => other.to_string(),
+    }
+}
+
+/// Standard errors of a gain from nominal SI to SI, and of a bias in nominal SI.
+fn errors(stored: &StoredTriad, nominal: Nominal) -> (Matrix3<f64>, Vector3<f64>) {
+    let per_si = stored.unit_out.per_si().unwrap_or(nominal.per_unit);
+    let gain = Matrix3::from_fn(|row, column| stored.gain_std[row][column]) * (nominal.per_unit / per_si);
+    (gain, Vector3::from(stored.bias_std) / nominal.per_unit)
+}
+
+impl Model {
+    /// A cause is no more than what the model itself does not know of a term, given its errors.
+    pub fn errs_as_much(&self, cause: &Cause) -> bool {
+        let Some((prefix, term)) = cause.effect.split_once('.') else { return false };
+        let Some(kind) = self.calibrated.iter().find(|kind| kind.prefix() == prefix) else { return false };
+        let (gain, bias) = &self.errors[*kind as usize];
+        let own: Vec<f64> = match term {
+            "bias" | "hard_iron" => bias.iter().copied().collect(),
+            "scale" => gain.diagonal().iter().copied().collect(),
+            // One of a pair may be held by the form of the calibration: then the other has the error of both.
+            "misalignment" => [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)]
+                .map(|(row, column)| gain[(row, column)].max(gain[(column, row)]))
+                .to_vec(),
+            _ => return false,
+        };
+        let squares = cause.parameters.iter().zip(&own).filter_map(|(amount, own)| {
+            let (value, error) = (amount.value?, amount.std_error?);
+            Some(value * value / (error * error + own * own).max(f64::MIN_POSITIVE))
+        });
+        squares.sum::<f64>() < SEEN + own.len() as f64
     }
 }
 

@@ -31,7 +31,7 @@ pub const NEAR: [f64; 1] = [2.0];
 /// Rounds over all standard deviations for each factor.
 const ROUNDS: usize = 4;
 /// Lengths of groups of moving blocks that are compared where no rig guides the sensor; what is slower is drift.
-const SWAY: [usize; 3] = [1, 2, 4];
+const SWAY: [usize; 6] = [1, 2, 4, 8, 16, 32];
 /// Share of drift and scatter that [`Noise::quieter`] leaves.
 const QUIET: f64 = 0.2;
 /// Pieces of which neighbours are compared, s.
@@ -70,6 +70,19 @@ impl Noise {
     }
 }
 
+impl Noise {
+    /// As noisy at rest as in motion: a quiet rest does not outweigh all else before an instant is known to a block.
+    #[must_use]
+    pub fn even(mut self) -> Self {
+        for sensor in &mut self.sensors {
+            for axis in 0..3 {
+                sensor.white[axis] = sensor.white[axis].max(sensor.moving[axis]);
+            }
+        }
+        self
+    }
+}
+
 /// What weighs the blocks: the scene, and what each sensor is given there.
 pub struct Weighing<'s> {
     scene: &'s Scene<'s>,
@@ -88,7 +101,7 @@ impl<'s> Weighing<'s> {
     pub fn white(&self, residual: &Means) -> Noise {
         let scatter = 100.0 * self.least_scatter();
         let sensors = SensorKind::ALL.map(|kind| {
-            let white = self.resting(kind);
+            let white = self.still(kind, residual);
             let moving = self.moving(kind, residual, &white);
             let typical = white.iter().fold(0.0f64, |a, b| a.max(*b));
             SensorNoise { white, moving, drift: [0.05 * typical, 0.1 * typical], scatter }
@@ -100,6 +113,22 @@ impl<'s> Weighing<'s> {
     /// room the same all over it.
     fn least_scatter(&self) -> f64 {
         if self.scene.swings.is_some() { 1e-7 } else { 1e-5 }
+    }
+
+    /// At rest: what the samples do, and on no rig what the residual does as well, since a reference trembles with the hand.
+    fn still(&self, kind: SensorKind, residual: &Means) -> [f64; 3] {
+        let mut white = self.resting(kind);
+        let Some(values) = residual[kind as usize].as_ref().filter(|_| self.scene.swings.is_none()) else {
+            return white;
+        };
+        for length in SWAY {
+            let bends = self
+                .bends(kind, values, length, |first, other| first.rest.is_some() && first.rest == other.rest);
+            for (white, bends) in white.iter_mut().zip(bends) {
+                *white = white.max(usual_square(bends).sqrt());
+            }
+        }
+        white
     }
 
     /// From the differences of neighbouring pieces of a rest.
@@ -136,7 +165,8 @@ impl<'s> Weighing<'s> {
     fn moving(&self, kind: SensorKind, residual: &Means, resting: &[f64; 3]) -> [f64; 3] {
         let Some(values) = &residual[kind as usize] else { return [1.0; 3] };
         let guided = self.scene.swings.is_some();
-        let bends = |length: usize| self.bends(kind, values, length);
+        let in_motion = |_: &Block, other: &Block| other.rest.is_none();
+        let bends = |length: usize| self.bends(kind, values, length, in_motion);
         let most: Vec<[f64; 3]> = match guided {
             // The median of a χ² of one degree is 0.455.
             true => vec![bends(1).map(|b| crate::recording::median(b).unwrap_or(0.0) / 0.455)],
@@ -148,8 +178,15 @@ impl<'s> Weighing<'s> {
         })
     }
 
-    /// Squared second differences of neighbouring groups of moving blocks, as variances of one sample.
-    fn bends(&self, kind: SensorKind, values: &[Vector3<f64>], length: usize) -> [Vec<f64>; 3] {
+    /// Squared second differences of neighbouring groups of blocks, as variances of one sample; `alike` tells whether a
+    /// block belongs to groups that begin with another.
+    fn bends(
+        &self,
+        kind: SensorKind,
+        values: &[Vector3<f64>],
+        length: usize,
+        alike: impl Fn(&Block, &Block) -> bool,
+    ) -> [Vec<f64>; 3] {
         let counts = &self.scene.counts[kind as usize];
         let guided = self.scene.swings.is_some();
         let mut squares: [Vec<f64>; 3] = Default::default();
@@ -157,7 +194,8 @@ impl<'s> Weighing<'s> {
             // On a rig a block with fewer rows is one that it has just left or reached.
             let full =
                 |k: usize| if guided { counts[k] == counts[from] } else { 2 * counts[k] > counts[from] };
-            let whole = |k: usize| self.scene.blocks[k].rest.is_none() && counts[k] > 0 && full(k);
+            let blocks = &self.scene.blocks;
+            let whole = |k: usize| alike(&blocks[from], &blocks[k]) && counts[k] > 0 && full(k);
             if !(from..from + 3 * length).all(whole) {
                 continue;
             }
@@ -225,7 +263,8 @@ impl<'s> Weighing<'s> {
         let counts = &self.scene.counts[channel.kind as usize];
         let weight = |(at, (block, count)): (usize, (&Block, &usize))| {
             let sigma = if block.rest.is_some() { sensor.white } else { sensor.moving }[channel.axis];
-            if inside(at) { *count as f64 / (sigma * sigma) } else { 0.0 }
+            let told = inside(at) && self.scene.tells(channel.kind, at, channel.axis);
+            if told { *count as f64 / (sigma * sigma) } else { 0.0 }
         };
         let weights: Vec<f64> = blocks.iter().zip(counts).enumerate().map(weight).collect();
         let mut rests: Vec<Shared> = Vec::new();

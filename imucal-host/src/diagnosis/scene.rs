@@ -6,7 +6,11 @@
 use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
 
-use super::block::{Block, cut};
+use super::{
+    block::{Block, cut},
+    hand::{Held, View},
+    unsteady,
+};
 use crate::{
     effect::{Act, Effect, Input, Parameter, Role, Swing, Truth},
     recording::{Recording, SensorKind},
@@ -30,12 +34,18 @@ pub struct Nodes {
 }
 
 impl Nodes {
-    /// So many rows of each block, evenly over it.
-    fn choose(time: &[f64], blocks: &[Block], count: impl Fn(&Block) -> usize) -> Self {
+    /// So many rows of each block, evenly over it, of those where the movement is told.
+    fn choose(
+        time: &[f64],
+        blocks: &[Block],
+        count: impl Fn(&Block) -> usize,
+        told: impl Fn(usize) -> bool,
+    ) -> Self {
         let mut nodes = Self::default();
         for (index, block) in blocks.iter().enumerate() {
             let (rows, count) = (block.rows.len(), count(block).max(1));
-            for row in (0..count).map(|k| block.rows.start + (2 * k + 1) * rows / (2 * count)) {
+            let evenly = (0..count).map(|k| block.rows.start + (2 * k + 1) * rows / (2 * count));
+            for row in evenly.filter(|row| told(*row)) {
                 nodes.times.push(time[row]);
                 nodes.blocks.push(index);
             }
@@ -72,8 +82,10 @@ pub type Means = [Option<Vec<Vector3<f64>>>; 3];
 pub struct Scene<'a> {
     /// The recording.
     pub recording: &'a Recording,
-    /// Its blocks.
+    /// Its blocks; where a view looks at it, those of the view.
     pub blocks: Vec<Block>,
+    cuts: Vec<Block>,
+    view: Option<View>,
     /// Sensors that are there.
     pub kinds: Vec<SensorKind>,
     /// Swings of the gimbals at each row; `None` without gimbals.
@@ -101,10 +113,13 @@ impl<'a> Scene<'a> {
     ) -> Self {
         let interval = recording.median_interval().unwrap_or(0.01);
         let blocks = cut(&recording.time, motion.moving(), interval);
-        let counts = usable.each_ref().map(|usable| {
+        let mut counts = usable.each_ref().map(|usable| {
             let count = |block: &Block| usable.get(block.rows.clone()).unwrap_or_default();
             blocks.iter().map(|block| count(block).iter().filter(|usable| **usable).count()).collect()
         });
+        if recording.reference.is_some() && motion.swings().is_none() {
+            unsteady::leave_out(recording, &usable, &blocks, &mut counts);
+        }
         let kinds = SensorKind::ALL.into_iter().filter(|kind| recording.sensor(*kind).is_some()).collect();
         let apart = if motion.swings().is_some() { NODES.0 } else { NODES.1 };
         let fine = |block: &Block| {
@@ -112,10 +127,14 @@ impl<'a> Scene<'a> {
             let stride = ((if still { RESTING } else { apart } / interval).round() as usize).max(1);
             block.rows.len().div_ceil(stride)
         };
-        let fine = Nodes::choose(&recording.time, &blocks, fine);
-        let coarse = Nodes::choose(&recording.time, &blocks, |_| 1);
+        // Across a gap of a reference it is bridged as if it turned evenly: no derivative is to be taken there.
+        let told = |row: usize| motion.swings().is_some() || motion.known()[row];
+        let fine = Nodes::choose(&recording.time, &blocks, fine, told);
+        let coarse = Nodes::choose(&recording.time, &blocks, |_| 1, |_| true);
         Self {
             recording,
+            cuts: blocks.clone(),
+            view: None,
             blocks,
             kinds,
             swings: motion.swings(),
@@ -125,6 +144,49 @@ impl<'a> Scene<'a> {
             triads,
             fine,
             coarse,
+        }
+    }
+
+    /// Looked at by way of the rests of a hand; what the magnetometer is given there is not known.
+    #[must_use]
+    pub fn through(mut self, held: &Held) -> Self {
+        let gravity = self.motion.place().gravity;
+        let of = |time: f64| self.motion.truth(time, &|_| ()).c_t_p;
+        let view = View::new(held, &self.recording.time, &self.cuts, &self.counts, &of, gravity);
+        self.kinds.retain(|kind| match kind {
+            SensorKind::Acc => true,
+            SensorKind::Gyr => held.with_gyroscope,
+            SensorKind::Mag => false,
+        });
+        self.blocks.clone_from(&view.blocks);
+        self.counts.clone_from(&view.counts);
+        self.view = Some(view);
+        self
+    }
+
+    /// Means as they are looked at.
+    fn seen(&self, means: Means) -> Means {
+        match &self.view {
+            Some(view) => view.of(&means),
+            None => means,
+        }
+    }
+
+    /// Sensors whose blocks an effect may alter: by way of an attitude, others than its own.
+    pub fn reach(&self, effect: &Effect) -> &'static [SensorKind] {
+        if self.view.is_some() { &SensorKind::ALL } else { effect.sensors }
+    }
+
+    /// A block tells something on an axis of a sensor.
+    pub fn tells(&self, kind: SensorKind, block: usize, axis: usize) -> bool {
+        self.view.as_ref().is_none_or(|view| view.tells(kind, block, axis))
+    }
+
+    /// What an axis of a sensor is, in a table.
+    pub fn axis(&self, kind: SensorKind, axis: usize) -> &'static str {
+        match (&self.view, kind) {
+            (Some(_), SensorKind::Acc) => ["along gravity", "across gravity, first", "across, second"][axis],
+            _ => ["x", "y", "z"][axis],
         }
     }
 
@@ -139,7 +201,13 @@ impl<'a> Scene<'a> {
 
     /// The truth in the middle of each block, without any effect.
     pub fn plain(&self) -> Vec<Truth> {
-        self.truth(&[], &self.coarse)
+        match &self.view {
+            Some(_) => {
+                let times: Vec<f64> = self.blocks.iter().map(|block| block.time).collect();
+                Chain::default().truth(self.motion, &times)
+            }
+            None => self.truth(&[], &self.coarse),
+        }
     }
 
     /// Recorded less simulated, block by block. `None` where a triad is singular.
@@ -151,7 +219,7 @@ impl<'a> Scene<'a> {
             let output = chain.output(*kind, &self.triads[*kind as usize], &input)?;
             means[*kind as usize] = self.difference(*kind, &output);
         }
-        Some(means)
+        Some(self.seen(means))
     }
 
     fn difference(&self, kind: SensorKind, output: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
@@ -166,7 +234,7 @@ impl<'a> Scene<'a> {
             }
             if count > 0.0 { sum / count } else { sum }
         };
-        Some(self.blocks.iter().map(mean).collect())
+        Some(self.cuts.iter().map(mean).collect())
     }
 
     /// What each sensor puts out at the nodes.
@@ -208,7 +276,10 @@ pub struct Reference<'s> {
 impl Reference<'_> {
     /// What a sensor puts out, block by block.
     pub fn output(&self, kind: SensorKind) -> Vec<Vector3<f64>> {
-        self.nodes.averaged(&self.outputs[kind as usize], self.scene.blocks.len())
+        match &self.scene.view {
+            Some(view) => view.given(kind),
+            None => self.nodes.averaged(&self.outputs[kind as usize], self.scene.cuts.len()),
+        }
     }
 
     /// The truth at each block's last node, in the order of the nodes.
@@ -255,9 +326,9 @@ impl Reference<'_> {
         for kind in effect.sensors.iter().filter(|kind| self.scene.kinds.contains(kind)) {
             let (with, without) = (&outputs[*kind as usize], &self.outputs[*kind as usize]);
             let change: Vec<_> = with.iter().zip(without).map(|(a, b)| (a - b) * (scale / step)).collect();
-            means[*kind as usize] = Some(self.nodes.averaged(&change, self.scene.blocks.len()));
+            means[*kind as usize] = Some(self.nodes.averaged(&change, self.scene.cuts.len()));
         }
-        Some(means)
+        Some(self.scene.seen(means))
     }
 }
 

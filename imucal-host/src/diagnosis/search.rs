@@ -14,6 +14,7 @@ use super::{
     refit::{Fit, columns, refit, signatures},
     scene::{Reference, Scene},
     shape::{self, Backdrop},
+    start,
     whitening::Whitening,
 };
 use crate::{
@@ -257,7 +258,7 @@ impl<'s> Linear<'s> {
         let sets = shortlist.into_iter().map(|effect| {
             let mut set = from.set.clone();
             set.push(effect);
-            (set, effect.sensors.to_vec())
+            (set, self.scene.reach(effect).to_vec())
         });
         Some(self.best_of(sets.collect(), &from.noise))
     }
@@ -306,12 +307,25 @@ fn best_shapes(
     let design = Design::new(scene, fitted, &means, &fit.residual);
     let every: Vec<usize> = (0..design.columns.len()).collect();
     let whitenings = weighing.whitenings(&design, noise);
-    let backdrop = Backdrop { scene, design: &design, fitted: &every, whitenings: &whitenings };
     let coarse = scene.reference(fit.doses.clone(), &scene.coarse)?;
+    // Where no rig guides the sensor, what a hand adds hides when an episode began and ended.
+    let quiet = match scene.swings {
+        Some(_) => None,
+        None => Some(weighing.whitenings(&design, &noise.quieter().even())),
+    };
     let shape =
         |effect: &&'static Effect| match fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, *effect)) {
             Some(dose) => Some(dose.values.clone()),
-            None if is_shaped(effect) => shape::best(effect, &coarse, &backdrop),
+            None if is_shaped(effect) => {
+                let quiet = quiet.as_ref().filter(|_| shape::is_episode(effect));
+                let whitenings = quiet.unwrap_or(&whitenings);
+                let backdrop = Backdrop { scene, design: &design, fitted: &every, whitenings };
+                let best = shape::best(effect, &coarse, &backdrop)?;
+                match quiet {
+                    Some(_) => Some(shape::refine(effect, &best, &coarse, &backdrop)?.0),
+                    None => Some(best),
+                }
+            }
             None => Some(effect.neutral(scene.duration())),
         };
     candidates.effects.iter().map(shape).collect()
@@ -345,7 +359,10 @@ pub fn search<'s>(
         .iter()
         .map(|effect| Dose { effect, values: vec![0.0; effect.parameters.len()] })
         .collect();
-    let mut fit = refit(scene, doses, None)?;
+    let mut fit = match scene.swings {
+        Some(_) => refit(scene, doses, None)?,
+        None => start::start(scene, doses)?,
+    };
     trace("baseline fitted");
     let mut linear = Linear::new(scene, candidates, &fit, None)?;
     let white = linear.weighing.white(&fit.residual);
@@ -363,6 +380,7 @@ pub fn search<'s>(
     let mut best = none.clone();
     linear = Linear::new(scene, candidates, &fit, Some(&best.noise))?;
     trace("shapes");
+    let mut seen = Vec::new();
     loop {
         best = linear.judge(&best.set, &best.noise, &SensorKind::ALL, &FAR)?;
         let mut next: Option<Judged> = None;
@@ -385,13 +403,22 @@ pub fn search<'s>(
                     .filter(|judged| judged.log_evidence > best.log_evidence + GAIN);
             }
         }
-        let Some(next) = next else { break };
+        // Two sets may each be better than the other with the noise that the other leaves.
+        let Some(next) = next.filter(|judged| !seen.contains(&key(&judged.set))) else { break };
+        seen.push(key(&next.set));
         let names: Vec<&str> = next.set.iter().map(|effect| effect.id.as_str()).collect();
         trace(&format!("{:.1} → {:.1} {names:?}", best.log_evidence, next.log_evidence));
         (fit, linear, best) = advance(scene, candidates, &fit, from_quiet.as_ref().unwrap_or(&linear), next)?;
         trace("refitted");
     }
     Some(Explained { best, none, fit, linear })
+}
+
+/// A set, whatever the order of its effects.
+fn key(set: &[&'static Effect]) -> Vec<&'static str> {
+    let mut key: Vec<&'static str> = set.iter().map(|effect| effect.id.as_str()).collect();
+    key.sort_unstable();
+    key
 }
 
 /// Fits a set through the simulator and looks at all candidates from there.

@@ -34,8 +34,7 @@ pub struct Backdrop<'a> {
 /// The most evident shape of an effect: all its parameters, amplitudes zero. `None` where no shape can be judged.
 pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backdrop<'_>) -> Option<Vec<f64>> {
     let duration = backdrop.scene.duration();
-    let is_episode = effect.parameters.iter().filter(|p| matches!(p.role, Role::Instant { .. })).count() == 2;
-    if is_episode {
+    if is_episode(effect) {
         return episode(effect, reference, backdrop, duration);
     }
     let menu = menu(effect, duration);
@@ -51,12 +50,16 @@ pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backd
     best.map(|(_, shape)| shape)
 }
 
+/// It begins and ends.
+pub fn is_episode(effect: &Effect) -> bool {
+    effect.parameters.iter().filter(|p| matches!(p.role, Role::Instant { .. })).count() == 2
+}
+
 /// Number of shapes that an effect's menu holds in a recording of `duration` s: a choice among them that costs evidence.
 pub fn choices(effect: &Effect, duration: f64) -> usize {
     let single = menu(effect, duration).len();
-    let instants = effect.parameters.iter().filter(|p| matches!(p.role, Role::Instant { .. })).count();
     // Of two instants the second comes after the first.
-    if instants == 2 { single / 2 } else { single }
+    if is_episode(effect) { single / 2 } else { single }
 }
 
 /// ln BF of each shape.

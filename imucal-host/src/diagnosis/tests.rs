@@ -30,8 +30,14 @@ static HEALTHY: LazyLock<Recording> = LazyLock::new(|| simulation(11).record("he
 fn with_linear<T>(check: impl FnOnce(&Linear<'_>) -> T) -> T {
     let footing = Footing::new(&HEALTHY, None).unwrap();
     let scene = Scene::new(&HEALTHY, footing.usable.clone(), &*footing.movement, footing.triads);
-    let setting =
-        Setting { kinds: &scene.kinds, thermometer: true, calibrated: &[], gimbals: true, field_known: true };
+    let setting = Setting {
+        kinds: &scene.kinds,
+        thermometer: true,
+        calibrated: &[],
+        gimbals: true,
+        hand: false,
+        field_known: true,
+    };
     let candidates = Candidates::new(&setting, &[]);
     let doses = candidates
         .baseline

@@ -39,6 +39,7 @@ mod hard_iron;
 mod heading;
 mod hysteresis;
 mod inner_lever_arm;
+mod lag;
 mod level_tilt;
 mod lever_arm;
 mod machine;
@@ -318,7 +319,7 @@ pub static CATALOGUE: LazyLock<Vec<Effect>> = LazyLock::new(|| {
 /// Terms that the baseline has where a rig, a surveyed site or a housing does not fix them. They are fitted, never named
 /// as a cause, and not part of the catalogue.
 pub static NUISANCES: LazyLock<Vec<Effect>> = LazyLock::new(|| {
-    let mut list = vec![field_dip::effect(), field_strength::effect()];
+    let mut list = vec![field_dip::effect(), field_strength::effect(), lag::effect(Mag)];
     list.extend(SensorKind::ALL.map(mounting::effect));
     list
 });

@@ -40,6 +40,8 @@ const WINDOW: f64 = 0.1;
 const CREEP: f64 = 0.02;
 /// and by more than this many standard deviations of an attitude's noise.
 const NOISES: f64 = 8.0;
+/// It has not come to rest before, nor is it at rest still, so long about a movement, s: a hand trembles.
+const TREMBLING: f64 = 0.25;
 
 /// Attitude, rate and angular acceleration of the table at a row, against the base.
 #[derive(Clone, Copy, Debug)]
@@ -178,7 +180,7 @@ fn moving(time: &[f64], attitudes: &[Matrix3<f64>]) -> Vec<bool> {
     // The median length of three normal numbers is 1.54; a bend has the deviation of an attitude, times √6.
     let noise = median(bends).unwrap_or(0.0) / (1.54 * libm::sqrt(6.0));
     let (mut before, mut after) = (0, 0);
-    (0..time.len())
+    let turns: Vec<bool> = (0..time.len())
         .map(|row| {
             while time[before] < time[row] - WINDOW {
                 before += 1;
@@ -188,7 +190,15 @@ fn moving(time: &[f64], attitudes: &[Matrix3<f64>]) -> Vec<bool> {
             }
             turn(before, after).norm() > CREEP * (time[after] - time[before]) + NOISES * noise
         })
-        .collect()
+        .collect();
+    let mut moving = vec![false; time.len()];
+    for run in (0..time.len()).filter(|row| turns[*row]).collect::<Vec<_>>().chunk_by(|a, b| a + 1 == *b) {
+        let [first, .., last] = *run else { continue };
+        let from = time.partition_point(|t| *t < time[first] - TREMBLING);
+        let to = time.partition_point(|t| *t <= time[last] + TREMBLING);
+        moving[from..to].fill(true);
+    }
+    moving
 }
 
 /// The cubic through the attitudes about a row.
@@ -256,7 +266,7 @@ mod tests {
     #[test]
     fn a_hand_at_rest_does_not_move() {
         let (_, tracked) = tracked(0..0);
-        assert!(tracked.moving()[..980].iter().all(|moves| !moves));
+        assert!(tracked.moving()[..960].iter().all(|moves| !moves));
         assert!(tracked.moving()[1050..1150].iter().all(|moves| *moves));
         assert!(tracked.truth(5.0, &|_| ()).w_pt_t.norm() < 1e-9);
     }

@@ -1,0 +1,233 @@
+//! Recordings of real sensors: terms taken out of the baseline are named with their size, a magnet is found, and two parts
+//! of one recording seldom differ.
+
+use imucal_host::{
+    calibrate::{self, calibrate},
+    diagnosis::{Diagnosis, Options, Verdict, diagnose, finding::Cause},
+    recording::{Recording, SensorKind},
+    store::StoredCalibration,
+};
+use imucal_tests::data;
+use nalgebra::{Matrix3, Vector3};
+
+/// Recordings in a hand.
+const HAND: [&str; 3] = ["xsens-mti", "mpu9150-0", "mpu9150-1"];
+/// Whitened squared size from which on a term can be shown, as in the diagnosis itself.
+const SEEN: f64 = 25.0;
+/// Splits in which a part may seem to differ from the other. On a rig it is one in twenty; against a calibration of half a
+/// hand recording, whose errors are taken as independent and whose sensors drift, that is not reached.
+const FALSE_ALARMS: f64 = 0.25;
+
+fn read(name: &str) -> Option<Recording> {
+    Some(Recording::read(&data::real(&format!("{name}.csv.gz"))?).expect("a good recording"))
+}
+
+fn without(recording: &Recording, terms: &[&str]) -> Diagnosis {
+    let without = terms.iter().map(ToString::to_string).collect();
+    diagnose(recording, &Options { without, ..Default::default() }, &|_| ())
+}
+
+fn against(recording: &Recording, model: &StoredCalibration) -> Diagnosis {
+    diagnose(recording, &Options { model: Some(model.clone()), ..Default::default() }, &|_| ())
+}
+
+fn names(diagnosis: &Diagnosis) -> Vec<&str> {
+    let mut names: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.effect.as_str()).collect();
+    names.sort_unstable();
+    names
+}
+
+fn model(recording: &Recording) -> StoredCalibration {
+    let calibration = calibrate(recording, &calibrate::Options::default(), &|_| ());
+    StoredCalibration::of(&calibration, imucal_core::record::Date::from_unix(0))
+}
+
+/// K and bias of accelerometer and gyroscope by the full calibration, in the axes in which the accelerometer's K is
+/// symmetric, and the standard errors of gain and bias.
+fn calibrated(recording: &Recording) -> [(Matrix3<f64>, Vector3<f64>, Matrix3<f64>, Vector3<f64>); 2] {
+    let calibration = calibrate(recording, &calibrate::Options::default(), &|_| ());
+    let fit = |kind| calibration.sensor(kind).and_then(|outcome| outcome.accepted()).expect("accepted");
+    let acc = fit(SensorKind::Acc);
+    let svd = acc.triad.gain.try_inverse().expect("regular").svd(true, true);
+    let turn = svd.u.expect("asked for") * svd.v_t.expect("asked for");
+    [acc, fit(SensorKind::Gyr)].map(|fit| {
+        let k = (turn * fit.triad.gain).try_inverse().expect("regular");
+        (k, fit.triad.bias, fit.gain_std, fit.bias_std)
+    })
+}
+
+/// What a term is by the full calibration, component by component, with standard errors.
+fn expected(recording: &Recording, term: &str) -> Vec<(f64, f64)> {
+    let [acc, gyr] = calibrated(recording);
+    let (k, bias, gain_std, bias_std) = if term.starts_with("acc.") { acc } else { gyr };
+    match term.split_once('.').expect("an id").1 {
+        "bias" => (0..3).map(|axis| (bias[axis], bias_std[axis])).collect(),
+        "scale" => (0..3).map(|axis| (k[(axis, axis)] - 1.0, gain_std[(axis, axis)])).collect(),
+        _ => [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)]
+            .iter()
+            .map(|(row, column)| {
+                let std = gain_std[(*row, *column)].max(gain_std[(*column, *row)]);
+                (k[(*row, *column)] / k[(*column, *column)], std)
+            })
+            .collect(),
+    }
+}
+
+/// Root mean square of the differences from the full calibration, in standard errors of the difference.
+fn off(cause: &Cause, expected: &[(f64, f64)]) -> f64 {
+    let squares = cause.parameters.iter().zip(expected).map(|(amount, (value, std))| {
+        let own = amount.std_error.expect("estimated");
+        (amount.value.expect("finite") - value).powi(2) / (own * own + std * std)
+    });
+    (squares.sum::<f64>() / expected.len() as f64).sqrt()
+}
+
+#[test]
+fn terms_taken_out_of_the_baseline_of_a_hand_recording_are_named_with_their_size() {
+    let (mut named, mut sized, mut all) = (0, 0, 0);
+    for name in HAND {
+        let Some(recording) = read(name) else { return };
+        for term in ["acc.bias", "acc.scale", "acc.misalignment", "gyr.bias", "gyr.scale", "gyr.misalignment"]
+        {
+            let diagnosis = without(&recording, &[term]);
+            let expected = expected(&recording, term);
+            let size: f64 = expected.iter().map(|(value, std)| (value / std).powi(2)).sum();
+            if size < SEEN {
+                println!(
+                    "{name:<12} {term:<18} cannot be shown: {expected:.4?} is {size:.0} in whitened squared size"
+                );
+                continue;
+            }
+            all += 1;
+            let Some(cause) = diagnosis.causes.iter().find(|cause| cause.effect == term) else {
+                println!("{name:<12} {term:<18} not named: {:?} {:?}", names(&diagnosis), expected);
+                continue;
+            };
+            let off = off(cause, &expected);
+            named += 1;
+            sized += usize::from(off < 2.0);
+            let amounts: Vec<String> = cause
+                .parameters
+                .iter()
+                .map(|p| format!("{:.5} ± {:.5}", p.value.expect("finite"), p.std_error.expect("estimated")))
+                .collect();
+            println!("{name:<12} {term:<18} named, off by {off:.1} standard errors: {}", amounts.join(", "));
+        }
+    }
+    println!("{named} of {all} named, {sized} of them within 2 standard errors of the full calibration");
+    assert!(10 * named >= 9 * all, "{named} of {all}");
+    assert!(10 * sized >= 8 * named, "{sized} of {named}");
+}
+
+#[test]
+fn a_hand_recording_lists_what_it_cannot_show_and_why() {
+    for name in HAND {
+        let Some(recording) = read(name) else { return };
+        let diagnosis = without(&recording, &[]);
+        assert!(diagnosis.held_out, "{name}");
+        for id in
+            ["rig.level_tilt", "rig.encoder_offset", "clk.time_offset", "gyr.earth_rate", "acc.gravity_error"]
+        {
+            let why = diagnosis.not_testable.iter().find(|not| not.effect == id).expect("it is listed");
+            assert!(!why.because.is_empty());
+        }
+        // A term of the baseline that is in its place is no gap.
+        let terms = [".bias", ".scale", ".misalignment"];
+        assert!(!names(&diagnosis).iter().any(|id| terms.iter().any(|term| id.ends_with(term))));
+    }
+}
+
+#[test]
+fn too_few_rests_in_a_hand_are_not_diagnosed() {
+    let Some(recording) = read("mpu6050-unobservable") else { return };
+    let diagnosis = without(&recording, &[]);
+    assert_eq!(diagnosis.verdict, Verdict::NotTestable);
+    assert!(diagnosis.causes.is_empty());
+    assert!(
+        diagnosis.remarks[0].contains("the accelerometer's calibration is refused"),
+        "{:?}",
+        diagnosis.remarks
+    );
+}
+
+/// Some rows of a recording, its time from zero.
+fn part(recording: &Recording, rows: std::ops::Range<usize>) -> Recording {
+    let mut part = recording.clone();
+    let start = recording.time[rows.start];
+    part.time = recording.time[rows.clone()].iter().map(|time| time - start).collect();
+    for triple in [&mut part.acc, &mut part.gyr, &mut part.mag].into_iter().flatten() {
+        triple.values = triple.values[rows.clone()].to_vec();
+    }
+    for rows_of in [&mut part.temperature].into_iter().flatten() {
+        *rows_of = rows_of[rows.clone()].to_vec();
+    }
+    part.reference = recording.reference.as_ref().map(|reference| reference[rows.clone()].to_vec());
+    part.extra.clear();
+    part
+}
+
+/// A recording in which every other rest is not seen by the accelerometer.
+fn every_other(recording: &Recording, first: usize) -> Recording {
+    let calibration = calibrate(recording, &calibrate::Options::default(), &|_| ());
+    let rests = calibration.segmentation.expect("it has an accelerometer").rests;
+    let mut part = recording.clone();
+    let acc = part.acc.as_mut().expect("it has one");
+    for rows in rests.into_iter().skip(first).step_by(2) {
+        acc.values[rows].fill(Vector3::repeat(f64::NAN));
+    }
+    part
+}
+
+#[test]
+fn two_parts_of_one_recording_seldom_differ() {
+    let (mut alarms, mut splits) = (0, 0);
+    for name in HAND {
+        let Some(recording) = read(name) else { return };
+        let middle = recording.rows() / 2;
+        let halves = [part(&recording, 0..middle), part(&recording, middle..recording.rows())];
+        let rests = [every_other(&recording, 0), every_other(&recording, 1)];
+        for (how, [one, other]) in [("halves", halves), ("rests", rests)] {
+            for (direction, calibrated, diagnosed) in [("forth", &one, &other), ("back", &other, &one)] {
+                let model = model(calibrated);
+                if model.triad(SensorKind::Acc).is_none() {
+                    println!("{name:<12} {how} {direction}: too few rests for a model");
+                    continue;
+                }
+                let diagnosis = against(diagnosed, &model);
+                let own = without(diagnosed, &[]);
+                // What a part shows on its own as well is no difference between the two.
+                let differing: Vec<&str> =
+                    names(&diagnosis).into_iter().filter(|id| !names(&own).contains(id)).collect();
+                splits += 1;
+                alarms += usize::from(!differing.is_empty());
+                println!(
+                    "{name:<12} {how} {direction}: {:?} {differing:?}, on its own {:?}",
+                    diagnosis.verdict,
+                    names(&own)
+                );
+            }
+        }
+    }
+    println!("{alarms} false alarms in {splits} splits");
+    assert!(alarms as f64 <= FALSE_ALARMS * f64::from(splits), "{alarms} of {splits}");
+}
+
+#[test]
+fn a_magnet_that_came_near_for_a_while_is_named_with_its_times() {
+    let Some(calm) = read("broad-01-undisturbed") else { return };
+    let Some(disturbed) = read("broad-32-magnet-1cm") else { return };
+    let diagnosis = against(&disturbed, &model(&calm));
+    let cause = diagnosis.causes.iter().find(|cause| cause.effect == "mag.bias_step").expect("it is named");
+    let value = |name: &str| {
+        cause.parameters.iter().find(|p| p.name == name).expect("it has it").value.expect("finite")
+    };
+    println!("magnet: {:?}", cause.parameters);
+    println!(
+        "{:?}: {:?}, closed {:?}",
+        diagnosis.verdict,
+        names(&diagnosis),
+        diagnosis.gap_closed_total_ci95
+    );
+    assert!((value("t_start") - 38.5).abs() < 1.5 && (value("t_end") - 95.0).abs() < 1.5);
+    assert!(diagnosis.gap_closed_total.expect("causes") >= 0.9);
+}
