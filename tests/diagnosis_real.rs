@@ -42,9 +42,16 @@ fn model(recording: &Recording) -> StoredCalibration {
     StoredCalibration::of(&calibration, imucal_core::record::Date::from_unix(0))
 }
 
-/// K and bias of accelerometer and gyroscope by the full calibration, in the axes in which the accelerometer's K is
-/// symmetric, and the standard errors of gain and bias.
-fn calibrated(recording: &Recording) -> [(Matrix3<f64>, Vector3<f64>, Matrix3<f64>, Vector3<f64>); 2] {
+/// A triad by the full calibration, with standard errors.
+struct Calibrated {
+    k: Matrix3<f64>,
+    bias: Vector3<f64>,
+    gain_std: Matrix3<f64>,
+    bias_std: Vector3<f64>,
+}
+
+/// Accelerometer and gyroscope, in the axes in which the accelerometer's K is symmetric.
+fn calibrated(recording: &Recording) -> [Calibrated; 2] {
     let calibration = calibrate(recording, &calibrate::Options::default(), &|_| ());
     let fit = |kind| calibration.sensor(kind).and_then(|outcome| outcome.accepted()).expect("accepted");
     let acc = fit(SensorKind::Acc);
@@ -52,14 +59,14 @@ fn calibrated(recording: &Recording) -> [(Matrix3<f64>, Vector3<f64>, Matrix3<f6
     let turn = svd.u.expect("asked for") * svd.v_t.expect("asked for");
     [acc, fit(SensorKind::Gyr)].map(|fit| {
         let k = (turn * fit.triad.gain).try_inverse().expect("regular");
-        (k, fit.triad.bias, fit.gain_std, fit.bias_std)
+        Calibrated { k, bias: fit.triad.bias, gain_std: fit.gain_std, bias_std: fit.bias_std }
     })
 }
 
 /// What a term is by the full calibration, component by component, with standard errors.
 fn expected(recording: &Recording, term: &str) -> Vec<(f64, f64)> {
     let [acc, gyr] = calibrated(recording);
-    let (k, bias, gain_std, bias_std) = if term.starts_with("acc.") { acc } else { gyr };
+    let Calibrated { k, bias, gain_std, bias_std } = if term.starts_with("acc.") { acc } else { gyr };
     match term.split_once('.').expect("an id").1 {
         "bias" => (0..3).map(|axis| (bias[axis], bias_std[axis])).collect(),
         "scale" => (0..3).map(|axis| (k[(axis, axis)] - 1.0, gain_std[(axis, axis)])).collect(),
