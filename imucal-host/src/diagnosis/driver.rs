@@ -12,7 +12,7 @@ use super::{block::Block, orientation, scene::Scene};
 use crate::{effect::Swing, recording::SensorKind};
 
 /// Harmonics of a gimbal's angle.
-const HARMONICS: [&str; 3] = ["first", "second", "third"];
+const HARMONICS: [&str; 6] = ["first", "second", "third", "fourth", "fifth", "sixth"];
 /// The time of the recording, as a driver.
 pub const TIME: &str = "time";
 /// Half-waves of the time of the recording.
