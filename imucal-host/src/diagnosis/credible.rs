@@ -1,8 +1,8 @@
 //! Which other effects could stand in a cause's place.
 
 use super::{
+    linear::{Judged, Linear},
     noise::NEAR,
-    search::{Judged, Linear},
 };
 use crate::effect::Effect;
 

@@ -9,9 +9,9 @@ use super::{
     driver::{Driver, TIME},
     evidence::Projected,
     frequency,
+    linear::{Linear, log_evidence},
     noise::{NEAR, Noise},
     scene::{Means, Scene},
-    search::{Linear, log_evidence},
     whitening::Whitening,
 };
 use crate::{effect::Effect, recording::SensorKind};

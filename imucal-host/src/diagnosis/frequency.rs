@@ -13,7 +13,7 @@ use nalgebra::DVector;
 
 use super::{
     driver::{Driver, Function},
-    search::Linear,
+    linear::Linear,
     whitening::Whitening,
 };
 use crate::{

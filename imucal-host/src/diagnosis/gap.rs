@@ -20,8 +20,8 @@ use super::{
     design::{Design, Normal},
     evidence::Projected,
     finding::Gap,
+    linear::Linear,
     noise::Noise,
-    search::Linear,
 };
 use crate::effect::Effect;
 

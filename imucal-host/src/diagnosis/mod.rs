@@ -16,6 +16,7 @@ pub mod footing;
 pub mod frequency;
 pub mod gap;
 pub mod hand;
+pub mod linear;
 pub mod model;
 pub mod noise;
 pub mod orientation;

@@ -68,15 +68,25 @@ impl Noise {
         }
         quiet
     }
-}
 
-impl Noise {
     /// As noisy at rest as in motion: a quiet rest does not outweigh all else before an instant is known to a block.
     #[must_use]
     pub fn even(mut self) -> Self {
         for sensor in &mut self.sensors {
             for axis in 0..3 {
                 sensor.white[axis] = sensor.white[axis].max(sensor.moving[axis]);
+            }
+        }
+        self
+    }
+
+    /// With white noise that is no more than another's: a misfit that a fit has gone through is no noise.
+    #[must_use]
+    pub fn at_most(mut self, other: &Self) -> Self {
+        for (own, other) in self.sensors.iter_mut().zip(&other.sensors) {
+            for axis in 0..3 {
+                own.white[axis] = own.white[axis].min(other.white[axis]);
+                own.moving[axis] = own.moving[axis].min(other.moving[axis]);
             }
         }
         self
@@ -347,20 +357,6 @@ impl<'s> Weighing<'s> {
             }
         }
         best
-    }
-}
-
-impl Noise {
-    /// With white noise that is no more than another's: a misfit that a fit has gone through is no noise.
-    #[must_use]
-    pub fn at_most(mut self, other: &Self) -> Self {
-        for (own, other) in self.sensors.iter_mut().zip(&other.sensors) {
-            for axis in 0..3 {
-                own.white[axis] = own.white[axis].min(other.white[axis]);
-                own.moving[axis] = own.moving[axis].min(other.moving[axis]);
-            }
-        }
-        self
     }
 }
 

@@ -4,24 +4,16 @@
 //! algebra first; the few best are judged again with the noise that suits them, since steps and sways hide in a drift
 //! that was estimated without them. After each change baseline and effects are fitted anew through the simulator.
 
-use std::sync::{Arc, Mutex, PoisonError};
-
 use super::{
     candidates::{Candidates, is_shaped},
-    design::{Design, Normal},
-    evidence::Projected,
-    noise::{FAR, NEAR, Noise, Weighing},
-    refit::{Fit, columns, refit, signatures},
-    scene::{Reference, Scene},
+    linear::{Judged, Linear},
+    noise::{FAR, NEAR, Noise},
+    refit::{Fit, refit},
+    scene::Scene,
     shape::{self, Backdrop},
     start,
-    whitening::Whitening,
 };
-use crate::{
-    effect::{Effect, class::class},
-    recording::SensorKind,
-    simulator::Dose,
-};
+use crate::{effect::Effect, recording::SensorKind, simulator::Dose};
 
 /// Most effects in a set; where no rig guides the sensor, the latter: a hand and a reference add gaps of their own.
 const MOST: (usize, usize) = (3, 5);
@@ -29,41 +21,8 @@ const MOST: (usize, usize) = (3, 5);
 const GAIN: f64 = 3.0;
 /// Sets judged with a noise of their own at each turn: of the likeliest, and of those that a quieter noise would have.
 const JUDGED: (usize, usize) = (6, 3);
-/// Normal equations that are kept.
-const KEPT: usize = 2;
 /// Fits of the baseline, each with the noise that the last one left, where no rig guides the sensor.
 const SETTLING: usize = 2;
-
-/// A set of effects and how it was judged.
-#[derive(Clone, Debug)]
-pub struct Judged {
-    /// The effects.
-    pub set: Vec<&'static Effect>,
-    /// The noise that suits it.
-    pub noise: Noise,
-    /// ln of its probability, but for a constant.
-    pub log_evidence: f64,
-}
-
-/// The problem about a fit, with all its effects put back into the residual.
-pub struct Linear<'s> {
-    /// The scene.
-    pub scene: &'s Scene<'s>,
-    /// What there is to choose from.
-    pub candidates: &'s Candidates,
-    /// All columns and the residual of the baseline alone.
-    pub design: Design,
-    /// Weighs the blocks.
-    pub weighing: Weighing<'s>,
-    /// Columns of the baseline.
-    pub baseline: Vec<usize>,
-    /// Parameters of each candidate at which its signature was taken.
-    pub shapes: Vec<Vec<f64>>,
-    normals: Normals,
-}
-
-/// Normal equations of all columns under the noises asked for last.
-type Normals = Mutex<Vec<(Noise, Arc<Normal>)>>;
 
 /// A search that has come to its end.
 pub struct Explained<'s> {
@@ -77,171 +36,7 @@ pub struct Explained<'s> {
     pub linear: Linear<'s>,
 }
 
-impl<'s> Linear<'s> {
-    /// About a fit; shapes of candidates that it does not hold are those best under `noise`. Without a noise, about the
-    /// fitted columns alone: nothing can be added.
-    pub fn new(
-        scene: &'s Scene<'s>,
-        candidates: &'s Candidates,
-        fit: &Fit,
-        noise: Option<&Noise>,
-    ) -> Option<Self> {
-        let reference = scene.reference(fit.doses.clone(), &scene.fine)?;
-        let weighing = Weighing::new(scene, SensorKind::ALL.map(|kind| reference.output(kind)));
-        let (shapes, all): (Vec<Vec<f64>>, Vec<&'static Effect>) = match noise {
-            Some(noise) => (
-                best_shapes(&reference, candidates, fit, &weighing, noise)?,
-                candidates.baseline.iter().chain(&candidates.effects).copied().collect(),
-            ),
-            None => (
-                candidates.effects.iter().map(|effect| effect.neutral(scene.duration())).collect(),
-                fit.doses.iter().map(|dose| dose.effect).collect(),
-            ),
-        };
-        let columns = columns(&all);
-        let means = signatures(&reference, &columns, &|effect| candidates.shape(&shapes, effect))?;
-        let mut design = Design::new(scene, columns, &means, &fit.residual);
-        let chosen = fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect));
-        let restored: Vec<(usize, f64)> = chosen
-            .flat_map(|dose| design.of(dose.effect).into_iter().map(move |id| (id, dose)))
-            .map(|(id, dose)| {
-                let at = design.columns[id].parameter;
-                (id, dose.values[at] / dose.effect.parameters[at].prior_scale)
-            })
-            .collect();
-        design.restore(&restored);
-        let baseline = candidates.baseline.iter().flat_map(|term| design.of(term)).collect();
-        Some(Self { scene, candidates, design, weighing, baseline, shapes, normals: Normals::default() })
-    }
-
-    /// The same problem, with shapes of candidates that are best under another noise; `None` as well where those are the
-    /// same.
-    fn reshaped(&self, fit: &Fit, noise: &Noise) -> Option<Self> {
-        let reference = self.scene.reference(fit.doses.clone(), &self.scene.fine)?;
-        let shapes = best_shapes(&reference, self.candidates, fit, &self.weighing, noise)?;
-        let others: Vec<&'static Effect> = self
-            .candidates
-            .effects
-            .iter()
-            .zip(self.shapes.iter().zip(&shapes))
-            .filter(|(_, (own, other))| own != other)
-            .map(|(effect, _)| *effect)
-            .collect();
-        if others.is_empty() {
-            return None;
-        }
-        let changed = columns(&others);
-        let means = signatures(&reference, &changed, &|effect| self.candidates.shape(&shapes, effect))?;
-        let is_kept = |id: &usize| !others.iter().any(|effect| self.design.columns[*id].is_of(effect));
-        let kept: Vec<usize> = (0..self.design.columns.len()).filter(is_kept).collect();
-        let columns = kept.iter().map(|id| self.design.columns[*id]).chain(changed).collect();
-        let design = self.design.extended(&kept, columns, &means);
-        let baseline = self.candidates.baseline.iter().flat_map(|term| design.of(term)).collect();
-        let (scene, candidates) = (self.scene, self.candidates);
-        let weighing = Weighing::new(scene, self.weighing.given.clone());
-        Some(Self { scene, candidates, design, weighing, baseline, shapes, normals: Normals::default() })
-    }
-
-    fn shape_of(&self, effect: &Effect) -> Vec<f64> {
-        self.candidates.shape(&self.shapes, effect)
-    }
-
-    /// Columns of the baseline and of a set.
-    pub fn fitted(&self, set: &[&'static Effect]) -> Vec<usize> {
-        let of = |effect: &&'static Effect| self.design.of(effect);
-        self.baseline.iter().copied().chain(set.iter().flat_map(of)).collect()
-    }
-
-    /// Noise and evidence of a set; the noise is estimated anew for the sensors that `anew` reaches.
-    pub fn judge(
-        &self,
-        set: &[&'static Effect],
-        start: &Noise,
-        anew: &[SensorKind],
-        steps: &[f64],
-    ) -> Option<Judged> {
-        let fitted = self.fitted(set);
-        let mut noise = start.clone();
-        for kind in self.scene.kinds.iter().filter(|kind| anew.contains(kind)) {
-            noise.sensors[*kind as usize] = self.weighing.fit(&self.design, *kind, &fitted, start, steps);
-        }
-        let whitenings = self.weighing.whitenings(&self.design, &noise);
-        let normal = self.design.normal(&whitenings, &fitted);
-        let log_evidence = log_evidence(&normal, self.baseline.len(), &self.groups(set, &fitted))?
-            - set.iter().map(|effect| self.surprise(effect)).sum::<f64>();
-        Some(Judged { set: set.to_vec(), noise, log_evidence })
-    }
-
-    /// Places of each effect's columns among the fitted.
-    pub fn groups(&self, set: &[&'static Effect], fitted: &[usize]) -> Vec<Vec<usize>> {
-        let of = |effect: &&'static Effect| -> Vec<usize> {
-            (0..fitted.len()).filter(|at| self.design.columns[fitted[*at]].is_of(effect)).collect()
-        };
-        set.iter().map(of).collect()
-    }
-
-    /// −ln of an effect's prior: one of the candidates, in one of its shapes.
-    fn surprise(&self, effect: &Effect) -> f64 {
-        let shapes = shape::choices(effect, self.scene.duration());
-        ((self.candidates.effects.len() * shapes) as f64).ln()
-    }
-
-    /// Σ⁻¹ of each channel.
-    pub fn whitenings(&self, noise: &Noise) -> Vec<Whitening> {
-        self.weighing.whitenings(&self.design, noise)
-    }
-
-    /// Normal equations of all columns.
-    pub fn normal(&self, noise: &Noise) -> Arc<Normal> {
-        let known = |normals: &Vec<(Noise, Arc<Normal>)>| {
-            normals.iter().find(|(other, _)| other == noise).map(|(_, normal)| Arc::clone(normal))
-        };
-        let locked = || self.normals.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(normal) = known(&locked()) {
-            return normal;
-        }
-        let every: Vec<usize> = (0..self.design.columns.len()).collect();
-        let normal = Arc::new(self.design.normal(&self.whitenings(noise), &every));
-        let mut normals = locked();
-        normals.truncate(KEPT - 1);
-        normals.insert(0, (noise.clone(), Arc::clone(&normal)));
-        normal
-    }
-
-    /// Scores of all columns but the baseline's, with the baseline projected out.
-    pub fn projected(&self, noise: &Noise) -> Option<(Projected, Vec<usize>)> {
-        let every = 0..self.design.columns.len();
-        let others: Vec<usize> = every.filter(|id| !self.baseline.contains(id)).collect();
-        Some((Projected::new(&self.normal(noise), &self.baseline, &others)?, others))
-    }
-
-    /// Candidates by ln BF of a set with each of them added, best first; the set itself has the value returned beside.
-    pub fn ranked(
-        &self,
-        set: &[&'static Effect],
-        noise: &Noise,
-    ) -> Option<(f64, Vec<(f64, &'static Effect)>)> {
-        let (projected, others) = self.projected(noise)?;
-        let places = |effect: &Effect| -> Vec<usize> {
-            (0..others.len()).filter(|at| self.design.columns[others[*at]].is_of(effect)).collect()
-        };
-        let own: Vec<Vec<usize>> = set.iter().map(|effect| places(effect)).collect();
-        let value = |more: Option<&Vec<usize>>| {
-            let parts: Vec<&[usize]> = own.iter().chain(more).map(Vec::as_slice).collect();
-            projected.log_bayes_factor(&parts)
-        };
-        let mut ranked: Vec<(f64, &'static Effect)> = self
-            .candidates
-            .effects
-            .iter()
-            // Two of a class explain each other's noise and not the gap.
-            .filter(|effect| !set.iter().any(|other| class(&other.id) == class(&effect.id)))
-            .map(|effect| (value(Some(&places(effect))) - self.surprise(effect), *effect))
-            .collect();
-        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        Some((value(None), ranked))
-    }
-
+impl Linear<'_> {
     /// The best set with one effect more, judged with its own noise; of `among`.
     fn added(&self, from: &Judged, among: &dyn Fn(&'static Effect) -> bool) -> Option<Option<Judged>> {
         let mut shortlist: Vec<&'static Effect> = Vec::new();
@@ -291,61 +86,6 @@ impl<'s> Linear<'s> {
 
 fn either(one: &[SensorKind], other: &[SensorKind]) -> Vec<SensorKind> {
     SensorKind::ALL.into_iter().filter(|kind| one.contains(kind) || other.contains(kind)).collect()
-}
-
-/// The shape of each candidate that is best under a noise beside a fit; that of the fit for those it holds.
-fn best_shapes(
-    reference: &Reference<'_>,
-    candidates: &Candidates,
-    fit: &Fit,
-    weighing: &Weighing<'_>,
-    noise: &Noise,
-) -> Option<Vec<Vec<f64>>> {
-    let scene = reference.scene;
-    let fitted = columns(&fit.doses.iter().map(|dose| dose.effect).collect::<Vec<_>>());
-    let means = signatures(reference, &fitted, &|_| Vec::new())?;
-    let design = Design::new(scene, fitted, &means, &fit.residual);
-    let every: Vec<usize> = (0..design.columns.len()).collect();
-    let whitenings = weighing.whitenings(&design, noise);
-    let coarse = scene.reference(fit.doses.clone(), &scene.coarse)?;
-    // Where no rig guides the sensor, what a hand adds hides when an episode began and ended.
-    let quiet = match scene.swings {
-        Some(_) => None,
-        None => Some(weighing.whitenings(&design, &noise.quieter().even())),
-    };
-    let shape =
-        |effect: &&'static Effect| match fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, *effect)) {
-            Some(dose) => Some(dose.values.clone()),
-            None if is_shaped(effect) => {
-                let quiet = quiet.as_ref().filter(|_| shape::is_episode(effect));
-                let whitenings = quiet.unwrap_or(&whitenings);
-                let backdrop = Backdrop { scene, design: &design, fitted: &every, whitenings };
-                let best = shape::best(effect, &coarse, &backdrop)?;
-                match quiet {
-                    Some(_) => Some(shape::refine(effect, &best, &coarse, &backdrop)?.0),
-                    None => Some(best),
-                }
-            }
-            None => Some(effect.neutral(scene.duration())),
-        };
-    candidates.effects.iter().map(shape).collect()
-}
-
-/// ln of the probability of the data, but for a constant: columns of the baseline come first, then `groups` of columns,
-/// each an effect or what may stand for one.
-pub fn log_evidence(normal: &Normal, baseline: usize, groups: &[Vec<usize>]) -> Option<f64> {
-    let first: Vec<usize> = (0..baseline).collect();
-    let others: Vec<usize> = (baseline..normal.score.len()).collect();
-    let projected = Projected::new(normal, &first, &others)?;
-    let places: Vec<Vec<usize>> =
-        groups.iter().map(|group| group.iter().map(|column| column - baseline).collect()).collect();
-    let parts: Vec<&[usize]> = places.iter().map(Vec::as_slice).collect();
-    let alone = Normal {
-        information: normal.information.view((0, 0), (baseline, baseline)).into_owned(),
-        score: normal.score.rows(0, baseline).into_owned(),
-        ..normal.clone()
-    };
-    Some(projected.log_bayes_factor(&parts) - 0.5 * super::noise::restricted(&alone))
 }
 
 /// Searches. `None` where the simulator fails.

@@ -4,8 +4,8 @@ use super::{
     evidence::Projected,
     finding::{Absent, NotTestable},
     following::score_test,
+    linear::Linear,
     noise::Noise,
-    search::Linear,
 };
 use crate::effect::Effect;
 

@@ -9,10 +9,10 @@ use super::{
     diagnose,
     evidence::Projected,
     footing::Footing,
+    linear::Linear,
     noise::FAR,
     refit::refit,
     scene::{Means, Scene},
-    search::Linear,
 };
 use crate::{
     effect::find,
