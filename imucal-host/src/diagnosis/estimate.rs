@@ -1,6 +1,6 @@
 //! Parameters of the causes with their standard errors.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::{
     design::Column,
@@ -15,6 +15,8 @@ use crate::{
 
 /// Prior standard deviation in usual sizes: so loose that it only keeps what the data do not show finite.
 const LOOSE: f64 = 1e3;
+/// An instant was looked for at least as closely as this, s, where no block tells it.
+const SCANNED: f64 = 5.0;
 
 /// Parameters of each effect of the best set, shapes among them.
 pub fn amounts(explained: &Explained<'_>) -> Option<Vec<Vec<Amount>>> {
@@ -36,8 +38,15 @@ pub fn amounts(explained: &Explained<'_>) -> Option<Vec<Vec<Amount>>> {
     let design = linear.design.extended(&fitted, columns.clone(), &means);
     let every: Vec<usize> = (0..design.size).collect();
     let normal = design.normal(&linear.whitenings(&explained.best.noise), &every);
-    let n = every.len();
-    let information = normal.information + DMatrix::identity(n, n) / (LOOSE * LOOSE);
+    let precision = |column: &Column| {
+        let parameter = &column.effect.parameters[column.parameter];
+        match parameter.role {
+            Role::Instant { .. } => (parameter.prior_scale / SCANNED).powi(2),
+            _ => 1.0 / (LOOSE * LOOSE),
+        }
+    };
+    let prior = DVector::from_iterator(columns.len(), columns.iter().map(precision));
+    let information = normal.information + DMatrix::from_diagonal(&prior);
     let covariance = information.cholesky()?.inverse();
     let error = |effect: &Effect, parameter: usize| {
         let at = columns.iter().position(|c| c.is_of(effect) && c.parameter == parameter)?;

@@ -70,6 +70,7 @@ pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str
     if let Some(held) = &footing.held {
         scene = scene.through(held);
     }
+    scene = scene.without_passages();
     let setting = Setting {
         kinds: &scene.kinds,
         thermometer: recording.temperature.is_some(),

@@ -164,6 +164,17 @@ impl<'a> Scene<'a> {
         self
     }
 
+    /// Without the blocks in which something is brought near the magnetometer or taken away, where no rig guides it.
+    #[must_use]
+    pub fn without_passages(mut self) -> Self {
+        if self.swings.is_none() && self.view.is_none() && self.recording.reference.is_some() {
+            // A shock of a hand is movement, and no passage.
+            let of_mag = self.residual(&[]).map(|[_, _, mag]| [None, None, mag]);
+            unsteady::leave_out_passages(&of_mag.unwrap_or_default(), &self.blocks, &mut self.counts);
+        }
+        self
+    }
+
     /// Means as they are looked at.
     fn seen(&self, means: Means) -> Means {
         match &self.view {
