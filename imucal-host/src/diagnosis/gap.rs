@@ -35,6 +35,8 @@ const LOOSE: f64 = 1e4;
 const LARGE: f64 = 30.0;
 /// Standard deviation of a driver's statistic where there is nothing to follow: √(2·18).
 const SCATTER: f64 = 6.0;
+/// What a driver follows tells what is left within this share of it: it is another function than the one that is there.
+const VAGUE: f64 = 0.15;
 /// Whitened squared size of an effect that the search may miss.
 const UNSEEN: f64 = 50.0;
 
@@ -121,7 +123,8 @@ fn closed_in(
             .collect();
         let mean = left.iter().sum::<f64>() / n;
         let variance = (n - 1.0) / n * left.iter().map(|l| (l - mean).powi(2)).sum::<f64>();
-        let sigma = (variance + (SCATTER / whole).powi(2)).sqrt();
+        let vague = VAGUE * remainder / explainable;
+        let sigma = (variance + (SCATTER / whole).powi(2) + vague * vague).sqrt();
         let bound = |x: f64| x.clamp(0.0, 1.0);
         let least = bound(value - 1.96 * sigma) * whole / (whole + UNSEEN);
         Share { value: bound(value), interval: [least, bound(value + 1.96 * sigma)] }
