@@ -92,3 +92,16 @@ fn a_term_taken_out_of_the_baseline_is_named() {
         assert!(diagnosis.gap_closed_total.expect("a cause") > 0.99);
     }
 }
+
+#[test]
+fn every_recording_without_a_label_has_an_answer_of_its_own() {
+    let Some(folder) = data::folder() else { return };
+    let answers: Value = serde_json::from_str(include_str!("sealed-answers.json")).expect("JSON");
+    let answers = answers.as_object().expect("a map");
+    assert_eq!(answers.len(), 12);
+    for (name, answer) in answers {
+        assert!(folder.join("blind").join(format!("{name}.csv.gz")).exists(), "{name}");
+        assert_eq!(answer["format"], "imucal-diagnosis/1", "{name}");
+        assert_eq!(answer["recording"], format!("{name}.csv.gz"));
+    }
+}

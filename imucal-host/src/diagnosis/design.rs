@@ -2,7 +2,7 @@
 //!
 //! A channel is one axis of one sensor. Columns are in usual sizes of their parameters, so that one means usual.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use rayon::prelude::*;
 
 use super::{
@@ -10,6 +10,9 @@ use super::{
     whitening::Whitening,
 };
 use crate::{effect::Effect, recording::SensorKind};
+
+/// Standard deviation of a fitted column's prior, in usual sizes: it keeps an inverse finite, and no more.
+pub const LOOSE: f64 = 1e4;
 
 /// What a column stands for.
 #[derive(Clone, Copy, Debug)]
@@ -77,6 +80,11 @@ impl Normal {
         }
     }
 
+    /// The likeliest amounts of all columns, usual sizes; `None` where the information is not that of real columns.
+    pub fn amounts(&self) -> Option<DVector<f64>> {
+        Some(loosened(self.information.clone())?.solve(&self.score))
+    }
+
     /// Adds a channel's; `ids` tells where its columns stand.
     pub fn add(&mut self, part: &Self, ids: &[usize]) {
         for (i, row) in ids.iter().enumerate() {
@@ -90,7 +98,24 @@ impl Normal {
     }
 }
 
+/// The factor of an information matrix with loose priors added; `None` where it is not that of real columns.
+pub fn loosened(information: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+    let n = information.nrows();
+    (information + DMatrix::identity(n, n) / (LOOSE * LOOSE)).cholesky()
+}
+
 impl Channel {
+    /// Its residual less the columns `fitted`, by index, times their amounts.
+    pub fn less(&self, fitted: &[usize], amounts: &DVector<f64>) -> DVector<f64> {
+        let mut residual = self.y.clone();
+        for (id, amount) in fitted.iter().zip(amounts.iter()) {
+            if let Some(at) = self.ids.iter().position(|own| own == id) {
+                residual.axpy(-amount, &self.x.column(at), 1.0);
+            }
+        }
+        residual
+    }
+
     /// Its normal equations for some of its columns, by their place in `ids`.
     pub fn normal(&self, whitening: &Whitening, places: &[usize]) -> Normal {
         let blocks = self.y.len();

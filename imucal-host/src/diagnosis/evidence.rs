@@ -16,12 +16,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::design::Normal;
+use super::design::{LOOSE, Normal, loosened};
 
+/// A signature of this whitened squared size is found in four of five recordings.
+pub const SEEN: f64 = 25.0;
 /// Sizes an effect may have, in usual ones.
 const SCALES: [f64; 8] = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
-/// Standard deviation of a baseline parameter's prior, in usual sizes.
-const LOOSE: f64 = 1e4;
 
 /// Score and information of effects' columns after the baseline's projection.
 #[derive(Clone, Debug)]
@@ -42,9 +42,7 @@ impl Projected {
         };
         let score = |rows: &[usize]| DVector::from_fn(rows.len(), |i, _| normal.score[rows[i]]);
         let across = pick(baseline, others);
-        let n = baseline.len();
-        let loosened = pick(baseline, baseline) + DMatrix::identity(n, n) / (LOOSE * LOOSE);
-        let factor = loosened.cholesky()?;
+        let factor = loosened(pick(baseline, baseline))?;
         let information = pick(others, others) - across.transpose() * factor.solve(&across);
         let before = DVector::from_fn(others.len(), |i, _| normal.information[(others[i], others[i])]);
         Some(Self {

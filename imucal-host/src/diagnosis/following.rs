@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
-    design::{Design, Normal},
+    design::{Design, Normal, loosened},
     driver::{Driver, TIME},
     evidence::Projected,
     frequency,
@@ -24,10 +24,8 @@ const SUSPECT: f64 = 1e-9;
 const DRIFTING: f64 = 12.0;
 /// Drivers tested again, of those as slow as drift and of the others.
 const SUSPECTS: (usize, usize) = (2, 4);
-/// Standard deviation of a fitted column's prior, in usual sizes.
-const LOOSE: f64 = 1e4;
-/// Directions that keep less than this share of their information do not count.
-const RETAINED: f64 = 1e-4;
+/// Directions that keep less than this share of their information are others by another name, and do not count.
+pub const RETAINED: f64 = 1e-4;
 
 /// How a sensor's residual follows a driver.
 #[derive(Clone, Debug, PartialEq)]
@@ -82,9 +80,7 @@ struct Across {
 impl Across {
     /// With the fitted columns, of these normal equations, projected out.
     fn projected(self, fitted: &Normal) -> Option<Projected> {
-        let n = fitted.score.len();
-        let loosened = &fitted.information + DMatrix::identity(n, n) / (LOOSE * LOOSE);
-        let factor = loosened.cholesky()?;
+        let factor = loosened(fitted.information.clone())?;
         let solved = factor.solve(&self.cross);
         Some(Projected {
             score: self.score - solved.tr_mul(&fitted.score),

@@ -29,8 +29,6 @@ const LOWEST: usize = 7;
 const ABOUT: usize = 12;
 /// A peak this many times as high as its neighbours is looked at.
 const PEAK: f64 = 12.0;
-/// Standard deviation of a fitted column's prior, in usual sizes.
-const LOOSE: f64 = 1e4;
 
 /// The beat of a sensor that stands out most, if any does, and among how many it was looked for.
 pub fn beat(
@@ -80,18 +78,10 @@ fn weighed_residual(
     kind: SensorKind,
 ) -> Option<Vec<DVector<f64>>> {
     let fitted = linear.fitted(set);
-    let normal = linear.design.normal(whitenings, &fitted);
-    let n = fitted.len();
-    let loosened = &normal.information + nalgebra::DMatrix::identity(n, n) / (LOOSE * LOOSE);
-    let amounts = loosened.cholesky()?.solve(&normal.score);
+    let amounts = linear.design.normal(whitenings, &fitted).amounts()?;
     let channels = linear.design.channels.iter().zip(whitenings).filter(|(channel, _)| channel.kind == kind);
     let left = channels.map(|(channel, whitening)| {
-        let mut residual = channel.y.clone();
-        for (id, amount) in fitted.iter().zip(amounts.iter()) {
-            if let Some(at) = channel.ids.iter().position(|own| own == id) {
-                residual.axpy(-amount, &channel.x.column(at), 1.0);
-            }
-        }
+        let residual = channel.less(&fitted, &amounts);
         let mut weighed = DVector::zeros(residual.len());
         whitening.apply(residual.as_slice(), weighed.as_mut_slice());
         weighed

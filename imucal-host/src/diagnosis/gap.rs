@@ -17,7 +17,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{
-    design::{Design, Normal},
+    design::{Design, LOOSE, Normal},
     evidence::Projected,
     finding::Gap,
     linear::Linear,
@@ -29,9 +29,7 @@ use crate::effect::Effect;
 const FOLDS: usize = 8;
 /// Stretches dealt to folds, s.
 const STRETCH: f64 = 3.0;
-/// Standard deviation of a baseline parameter's prior, in usual sizes.
-const LOOSE: f64 = 1e4;
-/// Of an effect's: what few blocks tell of it must not run away on the others.
+/// Standard deviation of an effect's prior, in usual sizes: what few blocks tell of it must not run away on the others.
 const LARGE: f64 = 30.0;
 /// Standard deviation of a driver's statistic where there is nothing to follow: √(2·18).
 const SCATTER: f64 = 6.0;
@@ -194,23 +192,13 @@ fn held_out(folds: &[Normal], places: &[usize], baseline: usize) -> Option<Vec<F
 /// Root mean squares of each channel's block means, before and after, and what noise alone would leave.
 pub fn table(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise) -> Option<Vec<Gap>> {
     let whitenings = linear.whitenings(noise);
-    let solve = |fitted: &[usize]| -> Option<DVector<f64>> {
-        let normal = linear.design.normal(&whitenings, fitted);
-        let n = fitted.len();
-        let information = normal.information + DMatrix::identity(n, n) / (LOOSE * LOOSE);
-        Some(information.cholesky()?.solve(&normal.score))
-    };
+    let solve = |fitted: &[usize]| linear.design.normal(&whitenings, fitted).amounts();
     let all = linear.fitted(set);
     let (before, after) = (solve(&linear.baseline)?, solve(&all)?);
     let gaps = linear.design.channels.iter().map(|channel| {
         let counts = &linear.scene.counts[channel.kind as usize];
         let rms = |fitted: &[usize], amounts: &DVector<f64>| {
-            let mut residual = channel.y.clone();
-            for (id, amount) in fitted.iter().zip(amounts.iter()) {
-                if let Some(at) = channel.ids.iter().position(|own| own == id) {
-                    residual.axpy(-amount, &channel.x.column(at), 1.0);
-                }
-            }
+            let residual = channel.less(fitted, amounts);
             weighted(counts, |block| residual[block] * residual[block])
         };
         Gap {

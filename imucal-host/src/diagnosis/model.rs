@@ -3,15 +3,12 @@
 use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
 
-use super::finding::Cause;
+use super::{evidence::SEEN, finding::Cause};
 use crate::{
     apply::{self, ApplyError},
     recording::{Nominal, Recording, SensorKind},
     store::{StoredCalibration, StoredTriad},
 };
-
-/// Whitened squared size of what is more than a model's own error.
-const SEEN: f64 = 25.0;
 
 /// Triads that a simulation starts from.
 #[derive(Clone, Debug)]

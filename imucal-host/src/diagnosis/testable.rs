@@ -1,18 +1,13 @@
 //! Which effects would have been seen, and which this recording cannot show.
 
 use super::{
-    evidence::Projected,
+    evidence::{Projected, SEEN},
     finding::{Absent, NotTestable},
-    following::score_test,
+    following::{RETAINED, score_test},
     linear::Linear,
     noise::Noise,
 };
 use crate::effect::Effect;
-
-/// A signature of this whitened squared size is found in four of five recordings.
-const SEEN: f64 = 25.0;
-/// An effect that keeps less than this share of its information is another effect by another name.
-const RETAINED: f64 = 1e-4;
 
 /// Effects that are absent at sizes that matter, and effects that cannot be told, once baseline and `set` are fitted.
 pub fn testable(

@@ -47,16 +47,7 @@ mod tests {
 
     #[test]
     fn a_ramp_comes_out_late_by_the_time_constant() {
-        let input: Vec<Input> = (0..400)
-            .map(|k| Input {
-                time: 0.01 * f64::from(k),
-                temperature: 25.0,
-                f_q: Vector3::zeros(),
-                w_iq_q: Vector3::zeros(),
-                dw_iq_q: Vector3::zeros(),
-                b_q: Vector3::zeros(),
-            })
-            .collect();
+        let input = Input::empty(400);
         let mut output: Vec<Vector3<f64>> = input.iter().map(|row| Vector3::repeat(row.time)).collect();
         alter(&[0.037], &mut SensorRun { input: &input, sensed: &[], output: &mut output });
         assert!((output[399].x - (3.99 - 0.037)).abs() < 1e-9, "{}", output[399].x);

@@ -40,16 +40,7 @@ mod tests {
 
     #[test]
     fn a_row_shows_what_was_there_a_lag_before() {
-        let input: Vec<Input> = (0..100)
-            .map(|k| Input {
-                time: 0.01 * f64::from(k),
-                temperature: 25.0,
-                f_q: Vector3::zeros(),
-                w_iq_q: Vector3::zeros(),
-                dw_iq_q: Vector3::zeros(),
-                b_q: Vector3::zeros(),
-            })
-            .collect();
+        let input = Input::empty(100);
         for lag in [0.023, -0.017] {
             let mut output: Vec<Vector3<f64>> = input.iter().map(|row| Vector3::repeat(row.time)).collect();
             alter(&[lag], &mut SensorRun { input: &input, sensed: &[], output: &mut output });

@@ -60,6 +60,21 @@ pub struct Input {
 }
 
 impl Input {
+    /// Rows a hundredth of a second apart, in which nothing is sensed.
+    #[cfg(test)]
+    pub fn empty(rows: u32) -> Vec<Self> {
+        let zero = Vector3::zeros();
+        let row = |k| Self {
+            time: 0.01 * f64::from(k),
+            temperature: 25.0,
+            f_q: zero,
+            w_iq_q: zero,
+            dw_iq_q: zero,
+            b_q: zero,
+        };
+        (0..rows).map(row).collect()
+    }
+
     /// The truth as a unit sees it that is turned on the table; `c_t_q` takes the table's components to its own.
     pub fn of(truth: &Truth, c_t_q: &Matrix3<f64>) -> Self {
         Self {

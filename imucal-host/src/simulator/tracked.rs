@@ -123,10 +123,6 @@ impl Motion for Tracked {
         at_pose(time, &pose, [Swing::default(); 3], &self.place, temperature)
     }
 
-    fn encoders(&self, _: f64) -> Option<[f64; 3]> {
-        None
-    }
-
     fn rig(&self) -> Rig {
         Rig { kind: RigKind::Optical, axes: None }
     }
@@ -143,10 +139,6 @@ impl Recorded for Tracked {
 
     fn known(&self) -> &[bool] {
         &self.known
-    }
-
-    fn swings(&self) -> Option<&[[Swing; 3]]> {
-        None
     }
 
     fn steady(&self) -> &dyn Motion {

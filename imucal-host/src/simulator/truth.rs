@@ -47,7 +47,9 @@ pub trait Motion {
     fn truth(&self, time: f64, rig: &dyn Fn(&mut Machine)) -> Truth;
 
     /// Angles that exact encoders would show, rad, outermost first, not wrapped; `None` without a rig.
-    fn encoders(&self, time: f64) -> Option<[f64; 3]>;
+    fn encoders(&self, _time: f64) -> Option<[f64; 3]> {
+        None
+    }
 
     /// What turns the sensor.
     fn rig(&self) -> Rig;
@@ -65,7 +67,9 @@ pub trait Recorded: Motion + Sync {
     fn known(&self) -> &[bool];
 
     /// Swings of the gimbals at each row, outermost first, those of [`steady`](Self::steady); `None` without gimbals.
-    fn swings(&self) -> Option<&[[Swing; 3]]>;
+    fn swings(&self) -> Option<&[[Swing; 3]]> {
+        None
+    }
 
     /// The same movement told from more readings at a time, where they are noisy: less noise row by row, and bends cut.
     fn steady(&self) -> &dyn Motion;

@@ -93,10 +93,6 @@ impl Motion for Tumble {
         in_the_open(time, c_t_n.matrix(), rate, acceleration, &self.place)
     }
 
-    fn encoders(&self, _: f64) -> Option<[f64; 3]> {
-        None
-    }
-
     fn rig(&self) -> Rig {
         Rig { kind: RigKind::Hand, axes: None }
     }

@@ -18,7 +18,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use super::super::model::Model;
 use crate::{
     calibrate::{self, outlier::outliers},
-    effect::{Machine, Swing, Truth},
+    effect::{Machine, Truth},
     recording::{
         Recording, SensorKind,
         integrity::Integrity,
@@ -263,10 +263,6 @@ impl Motion for Held {
         }
     }
 
-    fn encoders(&self, _: f64) -> Option<[f64; 3]> {
-        None
-    }
-
     fn rig(&self) -> Rig {
         Rig { kind: RigKind::Hand, axes: None }
     }
@@ -284,10 +280,6 @@ impl Recorded for Held {
 
     fn known(&self) -> &[bool] {
         &self.known
-    }
-
-    fn swings(&self) -> Option<&[[Swing; 3]]> {
-        None
     }
 
     fn steady(&self) -> &dyn Motion {
