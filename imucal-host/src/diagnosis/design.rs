@@ -124,12 +124,7 @@ impl Channel {
             x.set_column(to, &self.x.column(*from));
         }
         x.set_column(places.len(), &self.y);
-        let mut u = DMatrix::zeros(blocks, places.len() + 1);
-        for (column, out) in x.as_slice().chunks_exact(blocks).zip(u.as_mut_slice().chunks_exact_mut(blocks))
-        {
-            whitening.apply(column, out);
-        }
-        let all = x.transpose() * &u;
+        let all = x.transpose() * whitening.apply_all(&x);
         let n = places.len();
         Normal {
             information: all.view((0, 0), (n, n)).into_owned(),

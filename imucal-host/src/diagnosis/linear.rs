@@ -15,6 +15,7 @@ use super::{
 use crate::{
     effect::{Effect, class::class},
     recording::SensorKind,
+    simulator::Dose,
 };
 
 /// Normal equations that are kept.
@@ -64,7 +65,7 @@ impl<'s> Linear<'s> {
         let weighing = Weighing::new(scene, SensorKind::ALL.map(|kind| reference.output(kind)));
         let (shapes, all): (Vec<Vec<f64>>, Vec<&'static Effect>) = match noise {
             Some(noise) => (
-                best_shapes(&reference, candidates, fit, &weighing, noise)?,
+                shapes_beside(&reference, candidates, fit, &weighing, noise)?,
                 candidates.baseline.iter().chain(&candidates.effects).copied().collect(),
             ),
             None => (
@@ -75,24 +76,32 @@ impl<'s> Linear<'s> {
         let columns = columns(&all);
         let means = signatures(&reference, &columns, &|effect| candidates.shape(&shapes, effect))?;
         let mut design = Design::new(scene, columns, &means, &fit.residual);
-        let chosen = fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect));
-        let restored: Vec<(usize, f64)> = chosen
-            .flat_map(|dose| design.of(dose.effect).into_iter().map(move |id| (id, dose)))
-            .map(|(id, dose)| {
-                let at = design.columns[id].parameter;
-                (id, dose.values[at] / dose.effect.parameters[at].prior_scale)
-            })
-            .collect();
-        design.restore(&restored);
+        restore(&mut design, fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect)));
         let baseline = candidates.baseline.iter().flat_map(|term| design.of(term)).collect();
         Some(Self { scene, candidates, design, weighing, baseline, shapes, normals: Normals::default() })
     }
 
-    /// The same problem, with shapes of candidates that are best under another noise; `None` as well where those are the
-    /// same.
-    pub fn reshaped(&self, fit: &Fit, noise: &Noise) -> Option<Self> {
-        let reference = self.scene.reference(fit.doses.clone(), &self.scene.fine)?;
-        let shapes = best_shapes(&reference, self.candidates, fit, &self.weighing, noise)?;
+    /// The same problem, with shapes of candidates that are best under another noise, or without some of the fit's
+    /// effects; `None` as well where those are the same.
+    pub fn reshaped(&self, fit: &Fit, noise: &Noise, without: &[&'static Effect]) -> Option<Self> {
+        let is_taken = |effect: &Effect| without.iter().any(|taken| std::ptr::eq(*taken, effect));
+        let doses: Vec<Dose> = fit.doses.iter().filter(|dose| !is_taken(dose.effect)).cloned().collect();
+        let reference = self.scene.reference(doses.clone(), &self.scene.fine)?;
+        let fitted: Vec<usize> = doses.iter().flat_map(|dose| self.design.of(dose.effect)).collect();
+        let beside = Beside {
+            candidates: self.candidates,
+            doses: &doses,
+            weighing: &self.weighing,
+            design: &self.design,
+            fitted: &fitted,
+        };
+        let meets = |effect: &Effect| {
+            let reached = |kind| without.iter().any(|taken| self.scene.reach(taken).contains(kind));
+            without.is_empty() || self.scene.reach(effect).iter().any(reached)
+        };
+        let kept =
+            |at: usize, effect: &Effect| if meets(effect) { None } else { self.shapes.get(at).cloned() };
+        let shapes = beside.best_shapes(self.scene, noise, &kept)?;
         let others: Vec<&'static Effect> = self
             .candidates
             .effects
@@ -196,30 +205,54 @@ impl<'s> Linear<'s> {
         set: &[&'static Effect],
         noise: &Noise,
     ) -> Option<(f64, Vec<(f64, &'static Effect)>)> {
+        // Two of a class explain each other's noise and not the gap.
+        let is_new = |effect: &&'static Effect| !set.iter().any(|own| class(&own.id) == class(&effect.id));
+        let others: Vec<[&'static Effect; 1]> =
+            self.candidates.effects.iter().copied().filter(is_new).map(|effect| [effect]).collect();
+        let (own, values) = self.values(set, &others, noise)?;
+        let mut ranked: Vec<(f64, &'static Effect)> =
+            values.into_iter().zip(others).map(|(value, [effect])| (value, effect)).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        Some((own, ranked))
+    }
+
+    /// ln BF of a set, and of the set with each of `additions` added.
+    pub fn values<const N: usize>(
+        &self,
+        set: &[&'static Effect],
+        additions: &[[&'static Effect; N]],
+        noise: &Noise,
+    ) -> Option<(f64, Vec<f64>)> {
         let (projected, others) = self.projected(noise)?;
-        let places = |effect: &Effect| -> Vec<usize> {
+        let places = |effect: &&'static Effect| -> Vec<usize> {
             (0..others.len()).filter(|at| self.design.columns[others[*at]].is_of(effect)).collect()
         };
-        let own: Vec<Vec<usize>> = set.iter().map(|effect| places(effect)).collect();
-        let value = |more: Option<&Vec<usize>>| {
-            let parts: Vec<&[usize]> = own.iter().chain(more).map(Vec::as_slice).collect();
+        let own: Vec<Vec<usize>> = set.iter().map(places).collect();
+        let value = |more: &[&'static Effect]| {
+            let more: Vec<Vec<usize>> = more.iter().map(places).collect();
+            let parts: Vec<&[usize]> = own.iter().chain(&more).map(Vec::as_slice).collect();
             projected.log_bayes_factor(&parts)
         };
-        let mut ranked: Vec<(f64, &'static Effect)> = self
-            .candidates
-            .effects
-            .iter()
-            // Two of a class explain each other's noise and not the gap.
-            .filter(|effect| !set.iter().any(|other| class(&other.id) == class(&effect.id)))
-            .map(|effect| (value(Some(&places(effect))) - self.surprise(effect), *effect))
-            .collect();
-        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        Some((value(None), ranked))
+        let surprise =
+            |more: &[&'static Effect]| more.iter().map(|effect| self.surprise(effect)).sum::<f64>();
+        Some((value(&[]), additions.iter().map(|more| value(more) - surprise(more)).collect()))
     }
 }
 
-/// The shape of each candidate that is best under a noise beside a fit; that of the fit for those it holds.
-fn best_shapes(
+/// Puts effects back into a design's residual.
+fn restore<'d>(design: &mut Design, doses: impl Iterator<Item = &'d Dose>) {
+    let restored: Vec<(usize, f64)> = doses
+        .flat_map(|dose| design.of(dose.effect).into_iter().map(move |id| (id, dose)))
+        .map(|(id, dose)| {
+            let at = design.columns[id].parameter;
+            (id, dose.values[at] / dose.effect.parameters[at].prior_scale)
+        })
+        .collect();
+    design.restore(&restored);
+}
+
+/// The best shapes beside a fit.
+fn shapes_beside(
     reference: &Reference<'_>,
     candidates: &Candidates,
     fit: &Fit,
@@ -227,33 +260,61 @@ fn best_shapes(
     noise: &Noise,
 ) -> Option<Vec<Vec<f64>>> {
     let scene = reference.scene;
-    let fitted = columns(&fit.doses.iter().map(|dose| dose.effect).collect::<Vec<_>>());
-    let means = signatures(reference, &fitted, &|_| Vec::new())?;
-    let design = Design::new(scene, fitted, &means, &fit.residual);
-    let every: Vec<usize> = (0..design.columns.len()).collect();
-    let whitenings = weighing.whitenings(&design, noise);
-    let coarse = scene.reference(fit.doses.clone(), &scene.coarse)?;
-    // Where no rig guides the sensor, what a hand adds hides when an episode began and ended.
-    let quiet = match scene.swings {
-        Some(_) => None,
-        None => Some(weighing.whitenings(&design, &noise.quieter().even())),
-    };
-    let shape =
-        |effect: &&'static Effect| match fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, *effect)) {
-            Some(dose) => Some(dose.values.clone()),
-            None if is_shaped(effect) => {
-                let quiet = quiet.as_ref().filter(|_| shape::is_episode(effect));
-                let whitenings = quiet.unwrap_or(&whitenings);
-                let backdrop = Backdrop { scene, design: &design, fitted: &every, whitenings };
-                let best = shape::best(effect, &coarse, &backdrop)?;
-                match quiet {
-                    Some(_) => Some(shape::refine(effect, &best, &coarse, &backdrop)?.0),
-                    None => Some(best),
-                }
-            }
-            None => Some(effect.neutral(scene.duration())),
+    let columns = columns(&fit.doses.iter().map(|dose| dose.effect).collect::<Vec<_>>());
+    let means = signatures(reference, &columns, &|_| Vec::new())?;
+    let design = Design::new(scene, columns, &means, &fit.residual);
+    let fitted: Vec<usize> = (0..design.columns.len()).collect();
+    let beside = Beside { candidates, doses: &fit.doses, weighing, design: &design, fitted: &fitted };
+    beside.best_shapes(scene, noise, &|_, _| None)
+}
+
+/// What candidates are shaped beside.
+struct Beside<'a> {
+    candidates: &'a Candidates,
+    /// Effects that have their shapes.
+    doses: &'a [Dose],
+    weighing: &'a Weighing<'a>,
+    /// Their columns, `fitted` by index, and a residual.
+    design: &'a Design,
+    fitted: &'a [usize],
+}
+
+impl Beside<'_> {
+    /// The shape of each candidate that is best under a noise; that of the doses for those they hold, and what `kept`
+    /// tells of others.
+    fn best_shapes(
+        &self,
+        scene: &Scene<'_>,
+        noise: &Noise,
+        kept: &dyn Fn(usize, &Effect) -> Option<Vec<f64>>,
+    ) -> Option<Vec<Vec<f64>>> {
+        let whitenings = self.weighing.whitenings(self.design, noise);
+        let coarse = scene.reference(self.doses.to_vec(), &scene.coarse)?;
+        // Where no rig guides the sensor, what a hand adds hides when an episode began and ended.
+        let quiet = match scene.swings {
+            Some(_) => None,
+            None => Some(self.weighing.whitenings(self.design, &noise.quieter().even())),
         };
-    candidates.effects.iter().map(shape).collect()
+        let best = |effect: &'static Effect| {
+            let quiet = quiet.as_ref().filter(|_| shape::is_episode(effect));
+            let whitenings = quiet.unwrap_or(&whitenings);
+            let backdrop = Backdrop { scene, design: self.design, fitted: self.fitted, whitenings };
+            let best = shape::best(effect, &coarse, &backdrop)?;
+            match quiet {
+                Some(_) => Some(shape::refine(effect, &best, &coarse, &backdrop)?.0),
+                None => Some(best),
+            }
+        };
+        let shape = |(at, effect): (usize, &&'static Effect)| {
+            let held = self.doses.iter().find(|dose| std::ptr::eq(dose.effect, *effect));
+            match held.map(|dose| dose.values.clone()).or_else(|| kept(at, effect)) {
+                Some(shape) => Some(shape),
+                None if is_shaped(effect) => best(effect),
+                None => Some(effect.neutral(scene.duration())),
+            }
+        };
+        self.candidates.effects.iter().enumerate().map(shape).collect()
+    }
 }
 
 /// ln of the probability of the data, but for a constant: columns of the baseline come first, then `groups` of columns,

@@ -18,6 +18,7 @@ pub mod gap;
 pub mod hand;
 pub mod linear;
 pub mod model;
+mod moves;
 pub mod noise;
 pub mod orientation;
 pub mod refit;

@@ -7,7 +7,7 @@
 use super::{
     candidates::{Candidates, is_shaped},
     linear::{Judged, Linear},
-    noise::{FAR, NEAR, Noise},
+    noise::{FAR, Noise},
     refit::{Fit, refit},
     scene::Scene,
     shape::{self, Backdrop},
@@ -17,11 +17,11 @@ use crate::{effect::Effect, recording::SensorKind, simulator::Dose};
 
 /// Most effects in a set; where no rig guides the sensor, the latter: a hand and a reference add gaps of their own.
 const MOST: (usize, usize) = (3, 5);
-/// An addition must raise the evidence by this, beyond its share of the prior: odds of seven. False
-/// alarms are fewer by far than one in seven (`imucal blind`), since the noise is estimated for each set.
-const GAIN: f64 = 2.0;
-/// Sets judged with a noise of their own at each turn: of the likeliest, and of those that a quieter noise would have.
-const JUDGED: (usize, usize) = (6, 3);
+/// An addition must raise the evidence by this, beyond its share of the prior: odds of three. False alarms
+/// are fewer by far than one in three (`imucal blind`), since the noise is estimated for each set.
+const GAIN: f64 = 1.0;
+/// A set of no more effects must raise it by this.
+const CHANGE: f64 = 0.5;
 /// Fits of the baseline, each with the noise that the last one left, where no rig guides the sensor.
 const SETTLING: usize = 2;
 
@@ -35,58 +35,6 @@ pub struct Explained<'s> {
     pub fit: Fit,
     /// The problem about that fit.
     pub linear: Linear<'s>,
-}
-
-impl Linear<'_> {
-    /// The best set with one effect more, judged with its own noise; of `among`.
-    fn added(&self, from: &Judged, among: &dyn Fn(&'static Effect) -> bool) -> Option<Option<Judged>> {
-        let mut shortlist: Vec<&'static Effect> = Vec::new();
-        // Less noise than is true makes evidence, never takes it.
-        for (noise, most) in [(&from.noise, JUDGED.0), (&from.noise.quieter(), JUDGED.1)] {
-            let (own, ranked) = self.ranked(&from.set, noise)?;
-            let likely = ranked.into_iter().filter(|(value, effect)| *value > own && among(effect));
-            for (_, effect) in likely.take(most) {
-                if !shortlist.iter().any(|other| std::ptr::eq(*other, effect)) {
-                    shortlist.push(effect);
-                }
-            }
-        }
-        let sets = shortlist.into_iter().map(|effect| {
-            let mut set = from.set.clone();
-            set.push(effect);
-            (set, self.scene.reach(effect).to_vec())
-        });
-        Some(self.best_of(sets.collect(), &from.noise))
-    }
-
-    /// The best of some sets, the noise of the sensors beside each estimated anew.
-    fn best_of(&self, sets: Vec<(Vec<&'static Effect>, Vec<SensorKind>)>, noise: &Noise) -> Option<Judged> {
-        sets.iter()
-            .filter_map(|(set, anew)| self.judge(set, noise, anew, &NEAR))
-            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
-    }
-
-    /// The best set with one effect replaced or taken out.
-    fn changed(&self, from: &Judged) -> Option<Option<Judged>> {
-        let mut sets = Vec::new();
-        for at in 0..from.set.len() {
-            let mut fewer = from.set.clone();
-            let taken = fewer.remove(at);
-            let (_, ranked) = self.ranked(&fewer, &from.noise)?;
-            let others = ranked.into_iter().filter(|(_, effect)| !std::ptr::eq(*effect, taken));
-            for (_, effect) in others.take(JUDGED.1) {
-                let mut set = fewer.clone();
-                set.push(effect);
-                sets.push((set, either(taken.sensors, effect.sensors)));
-            }
-            sets.push((fewer, taken.sensors.to_vec()));
-        }
-        Some(self.best_of(sets, &from.noise))
-    }
-}
-
-fn either(one: &[SensorKind], other: &[SensorKind]) -> Vec<SensorKind> {
-    SensorKind::ALL.into_iter().filter(|kind| one.contains(kind) || other.contains(kind)).collect()
 }
 
 /// Searches. `None` where the simulator fails.
@@ -124,35 +72,62 @@ pub fn search<'s>(
     let mut seen = Vec::new();
     loop {
         best = linear.judge(&best.set, &best.noise, &SensorKind::ALL, &FAR)?;
-        let mut next: Option<Judged> = None;
-        if best.set.len() < most {
-            next = linear
-                .added(&best, &|_| true)?
-                .filter(|judged| judged.log_evidence > best.log_evidence + GAIN);
-        }
-        if next.is_none() && best.set.len() > 1 {
-            next = linear.changed(&best)?.filter(|judged| judged.log_evidence > best.log_evidence + 0.5);
-        }
-        let mut from_quiet = None;
-        if next.is_none() && best.set.len() < most {
-            // A step or a sway that stands in the drift is not where that drift would have it.
-            from_quiet = linear.reshaped(&fit, &best.noise.quieter());
-            if let Some(quiet) = &from_quiet {
-                let moved = |effect: &'static Effect| quiet.shape_of(effect) != linear.shape_of(effect);
-                next = quiet
-                    .added(&best, &moved)?
-                    .filter(|judged| judged.log_evidence > best.log_evidence + GAIN);
-            }
-        }
+        let (next, elsewhere) = improved(&linear, &fit, &best, most)?;
         // Two sets may each be better than the other with the noise that the other leaves.
         let Some(next) = next.filter(|judged| !seen.contains(&key(&judged.set))) else { break };
         seen.push(key(&next.set));
         let names: Vec<&str> = next.set.iter().map(|effect| effect.id.as_str()).collect();
         trace(&format!("{:.1} → {:.1} {names:?}", best.log_evidence, next.log_evidence));
-        (fit, linear, best) = advance(scene, candidates, &fit, from_quiet.as_ref().unwrap_or(&linear), next)?;
+        (fit, linear, best) = advance(scene, candidates, &fit, elsewhere.as_ref().unwrap_or(&linear), next)?;
         trace("refitted");
     }
     Some(Explained { best, none, fit, linear })
+}
+
+/// A likelier set, and the problem in which it was found where that is not `linear`: the cheapest move that gains.
+fn improved<'s>(
+    linear: &Linear<'s>,
+    fit: &Fit,
+    best: &Judged,
+    most: usize,
+) -> Option<(Option<Judged>, Option<Linear<'s>>)> {
+    let gains = |judged: &Judged, least: f64| judged.log_evidence > best.log_evidence + least;
+    let room = most.saturating_sub(best.set.len());
+    if room > 0
+        && let Some(next) = linear.added(best, &|_| true)?.filter(|next| gains(next, GAIN))
+    {
+        return Some((Some(next), None));
+    }
+    if best.set.len() > 1
+        && let Some(next) = linear.changed(best)?.filter(|next| gains(next, CHANGE))
+    {
+        return Some((Some(next), None));
+    }
+    // A step or a sway that stands in the drift is not where that drift would have it.
+    let quiet = if room > 0 { linear.reshaped(fit, &best.noise.quieter(), &[]) } else { None };
+    let moved = |effect: &'static Effect| {
+        quiet.as_ref().is_some_and(|quiet| quiet.shape_of(effect) != linear.shape_of(effect))
+    };
+    let from_quiet = match &quiet {
+        Some(quiet) => quiet.added(best, &moved)?.filter(|next| gains(next, GAIN)),
+        None => None,
+    };
+    if from_quiet.is_some() {
+        return Some((from_quiet, quiet));
+    }
+    if room > 1 {
+        let next = quiet.as_ref().unwrap_or(linear).paired(best)?.filter(|next| gains(next, 2.0 * GAIN));
+        if next.is_some() {
+            return Some((next, quiet));
+        }
+    }
+    if best.set.len() < 2 {
+        return Some((None, None));
+    }
+    match linear.changed_anew(fit, best)?.filter(|(_, next)| gains(next, CHANGE)) {
+        Some((anew, next)) => Some((Some(next), Some(anew))),
+        None => Some((None, None)),
+    }
 }
 
 /// A set, whatever the order of its effects.
@@ -170,7 +145,11 @@ fn advance<'s>(
     linear: &Linear<'s>,
     mut next: Judged,
 ) -> Option<(Fit, Linear<'s>, Judged)> {
-    let kept = |effect: &'static Effect| fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, effect));
+    // An effect whose shape the problem has changed begins anew.
+    let kept = |effect: &'static Effect| {
+        let is_same = |dose: &&Dose| candidates.has_term(effect) || linear.shape_of(effect) == dose.values;
+        fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, effect)).filter(is_same)
+    };
     let mut doses: Vec<Dose> = candidates.baseline.iter().filter_map(|term| kept(term).cloned()).collect();
     let fresh: Vec<&'static Effect> =
         next.set.iter().copied().filter(|effect| kept(effect).is_none()).collect();

@@ -7,38 +7,46 @@
 //! A. George, J. Liu, Computer Solution of Large Sparse Positive Definite Systems (1981), ch. 4. nalgebra's sparse
 //! factor lacks the envelope, and a dense one costs a hundred times more here.
 
+/// Columns of right-hand sides side by side: one row of each.
+pub type Lanes<const L: usize> = [f64; L];
+
 /// A symmetric matrix of which each row is kept from its first entry to the diagonal.
 #[derive(Clone, Debug)]
 pub struct Skyline {
     first: Vec<usize>,
-    rows: Vec<Vec<f64>>,
+    /// Where each row begins in `values`, and where the last one ends.
+    begins: Vec<usize>,
+    values: Vec<f64>,
 }
 
 impl Skyline {
     /// Zeros, with room in row i from column `first[i]` ≤ i on.
     pub fn new(first: Vec<usize>) -> Self {
-        let rows =
-            first.iter().enumerate().map(|(row, first)| vec![0.0; row + 1 - first.min(&row)]).collect();
-        Self { first, rows }
+        let mut begins = vec![0];
+        for (row, first) in first.iter().enumerate() {
+            begins.push(begins[row] + row + 1 - first.min(&row));
+        }
+        let values = vec![0.0; begins[first.len()]];
+        Self { first, begins, values }
     }
 
     /// Adds to the entry at (row, column) and its mirror; outside of the envelope it is lost, which `debug` refuses.
     pub fn add(&mut self, row: usize, column: usize, value: f64) {
         let (row, column) = (row.max(column), row.min(column));
         debug_assert!(column >= self.first[row]);
-        self.rows[row][column - self.first[row]] += value;
+        self.values[self.begins[row] + column - self.first[row]] += value;
     }
 
     /// Factorises in place. `None` where the matrix is not positive definite.
     pub fn factorised(mut self) -> Option<Factor> {
         let mut log_determinant = 0.0;
-        for i in 0..self.rows.len() {
-            let (above, rest) = self.rows.split_at_mut(i);
-            let (row, from) = (&mut rest[0], self.first[i]);
+        for i in 0..self.first.len() {
+            let (above, rest) = self.values.split_at_mut(self.begins[i]);
+            let (row, from) = (&mut rest[..self.begins[i + 1] - self.begins[i]], self.first[i]);
             for j in from..i {
                 let start = self.first[j].max(from);
                 let left = &row[start - from..j - from];
-                let other = &above[j][start - self.first[j]..];
+                let other = &above[self.begins[j] + start - self.first[j]..self.begins[j + 1]];
                 let sum: f64 = left.iter().zip(other).map(|(a, b)| a * b).sum();
                 row[j - from] = (row[j - from] - sum) / other[j - start];
             }
@@ -52,6 +60,12 @@ impl Skyline {
         }
         Some(Factor { skyline: self, log_determinant })
     }
+
+    /// The entries of a row to the left of the diagonal, and that on it.
+    fn row(&self, row: usize) -> (&[f64], f64) {
+        let row = &self.values[self.begins[row]..self.begins[row + 1]];
+        (&row[..row.len() - 1], row[row.len() - 1])
+    }
 }
 
 /// A factorised matrix.
@@ -63,19 +77,24 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Puts A⁻¹ x in the place of x.
-    pub fn solve(&self, x: &mut [f64]) {
-        let Skyline { first, rows } = &self.skyline;
-        for (i, (row, from)) in rows.iter().zip(first).enumerate() {
-            let (left, diagonal) = row.split_at(i - from);
-            let sum: f64 = left.iter().zip(&x[*from..i]).map(|(a, b)| a * b).sum();
-            x[i] = (x[i] - sum) / diagonal[0];
+    /// Puts A⁻¹ x in the place of x, column by column.
+    pub fn solve<const L: usize>(&self, x: &mut [Lanes<L>]) {
+        let skyline = &self.skyline;
+        for (i, from) in skyline.first.iter().enumerate() {
+            let (left, diagonal) = skyline.row(i);
+            let mut sum = [0.0; L];
+            for (a, b) in left.iter().zip(&x[*from..i]) {
+                sum.iter_mut().zip(b).for_each(|(sum, b)| *sum += a * b);
+            }
+            x[i].iter_mut().zip(sum).for_each(|(x, sum)| *x = (*x - sum) / diagonal);
         }
-        for (i, (row, from)) in rows.iter().zip(first).enumerate().rev() {
-            let (left, diagonal) = row.split_at(i - from);
-            let value = x[i] / diagonal[0];
+        for (i, from) in skyline.first.iter().enumerate().rev() {
+            let (left, diagonal) = skyline.row(i);
+            let value = x[i].map(|x| x / diagonal);
             x[i] = value;
-            x[*from..i].iter_mut().zip(left).for_each(|(x, a)| *x -= a * value);
+            for (x, a) in x[*from..i].iter_mut().zip(left) {
+                x.iter_mut().zip(value).for_each(|(x, value)| *x -= a * value);
+            }
         }
     }
 }
@@ -107,9 +126,12 @@ mod tests {
             }
             let factor = skyline.factorised().unwrap();
             let expected = dense.clone().lu().solve(&DVector::from_vec(x.clone())).unwrap();
-            let mut found = x;
+            let mut found: Vec<Lanes<3>> = x.iter().map(|x| [*x, 0.0, -2.0 * x]).collect();
             factor.solve(&mut found);
-            prop_assert!((DVector::from_vec(found) - expected).amax() < 1e-10);
+            for (lane, times) in [1.0, 0.0, -2.0].into_iter().enumerate() {
+                let found = DVector::from_iterator(20, found.iter().map(|found| found[lane]));
+                prop_assert!((found - &expected * times).amax() < 1e-10);
+            }
             prop_assert!((factor.log_determinant - dense.determinant().ln()).abs() < 1e-9);
         }
     }

@@ -16,10 +16,14 @@
 
 use std::ops::Range;
 
-use super::skyline::{Factor, Skyline};
+use nalgebra::DMatrix;
+
+use super::skyline::{Factor, Lanes, Skyline};
 
 /// Distance between knots, s.
 const SPACING: f64 = 2.5;
+/// Columns that are worked on side by side.
+const LANES: usize = 4;
 
 /// A first-order Gauss–Markov process.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -153,41 +157,80 @@ impl Whitening {
 
     /// Σ⁻¹ x of one column over the blocks.
     pub fn apply(&self, x: &[f64], out: &mut [f64]) {
-        for ((out, x), w) in out.iter_mut().zip(x).zip(&self.weights) {
-            *out = x * w;
+        let weighted = self.weighted(x.iter().map(|x| [*x]));
+        out.iter_mut().zip(weighted).for_each(|(out, [value])| *out = value);
+    }
+
+    /// Σ⁻¹ X, a column for each of X.
+    pub fn apply_all(&self, x: &DMatrix<f64>) -> DMatrix<f64> {
+        let (blocks, mut at) = (x.nrows(), 0);
+        let mut out = DMatrix::zeros(blocks, x.ncols());
+        while at < x.ncols() {
+            if at + LANES <= x.ncols() {
+                self.columns::<LANES>(x, at, &mut out);
+                at += LANES;
+            } else {
+                self.columns::<1>(x, at, &mut out);
+                at += 1;
+            }
         }
-        self.share(out);
-        let Some(factor) = &self.factor else { return };
+        out
+    }
+
+    /// Columns of X from `at` on.
+    fn columns<const L: usize>(&self, x: &DMatrix<f64>, at: usize, out: &mut DMatrix<f64>) {
+        let (blocks, from) = (x.nrows(), at * x.nrows());
+        let columns: [&[f64]; L] =
+            std::array::from_fn(|lane| &x.as_slice()[from + lane * blocks..from + (lane + 1) * blocks]);
+        let weighted = self.weighted((0..blocks).map(|row| columns.map(|column| column[row])));
+        for (lane, out) in out.as_mut_slice()[from..].chunks_exact_mut(blocks.max(1)).take(L).enumerate() {
+            out.iter_mut().zip(&weighted).for_each(|(out, row)| *out = row[lane]);
+        }
+    }
+
+    /// Σ⁻¹ x of columns side by side.
+    fn weighted<const L: usize>(&self, x: impl Iterator<Item = Lanes<L>>) -> Vec<Lanes<L>> {
+        let mut out: Vec<Lanes<L>> = x.zip(&self.weights).map(|(x, w)| x.map(|x| x * w)).collect();
+        self.share(&mut out);
+        let Some(factor) = &self.factor else { return out };
         let p = self.processes;
-        let mut state = vec![0.0; self.states];
-        for ((knot, share), out) in self.knots.iter().zip(out.iter()) {
-            state[knot * p] += out * (1.0 - share);
-            state[(knot + 1) * p] += out * share;
+        let mut knots = vec![[0.0; L]; self.states / p];
+        for ((knot, share), out) in self.knots.iter().zip(&out) {
+            for lane in 0..L {
+                knots[*knot][lane] += out[lane] * (1.0 - share);
+                knots[knot + 1][lane] += out[lane] * share;
+            }
         }
-        for knot in state.chunks_exact_mut(p) {
-            let value = knot[0];
-            knot.fill(value);
-        }
+        let mut state: Vec<Lanes<L>> = knots.iter().flat_map(|knot| std::iter::repeat_n(*knot, p)).collect();
         factor.solve(&mut state);
-        let mut drift: Vec<f64> = self
+        for (knot, state) in knots.iter_mut().zip(state.chunks_exact(p)) {
+            *knot = std::array::from_fn(|lane| state.iter().map(|state| state[lane]).sum());
+        }
+        let mut drift: Vec<Lanes<L>> = self
             .knots
             .iter()
             .zip(&self.weights)
             .map(|((knot, share), w)| {
-                let sum = |knot: usize| state[knot * p..(knot + 1) * p].iter().sum::<f64>();
-                w * (sum(*knot) * (1.0 - share) + sum(knot + 1) * share)
+                let (before, after) = (&knots[*knot], &knots[knot + 1]);
+                std::array::from_fn(|lane| w * (before[lane] * (1.0 - share) + after[lane] * share))
             })
             .collect();
         self.share(&mut drift);
-        out.iter_mut().zip(drift).for_each(|(out, drift)| *out -= drift);
+        for (out, drift) in out.iter_mut().zip(&drift) {
+            out.iter_mut().zip(drift).for_each(|(out, drift)| *out -= drift);
+        }
+        out
     }
 
     /// From D⁻¹ x to (D + shared)⁻¹ x.
-    fn share(&self, weighted: &mut [f64]) {
+    fn share<const L: usize>(&self, weighted: &mut [Lanes<L>]) {
         for (blocks, factor) in &self.shared {
-            let sum: f64 = weighted[blocks.clone()].iter().sum();
-            for (value, w) in weighted[blocks.clone()].iter_mut().zip(&self.weights[blocks.clone()]) {
-                *value -= w * factor * sum;
+            let mut sum = [0.0; L];
+            for row in &weighted[blocks.clone()] {
+                sum.iter_mut().zip(row).for_each(|(sum, row)| *sum += row);
+            }
+            for (row, w) in weighted[blocks.clone()].iter_mut().zip(&self.weights[blocks.clone()]) {
+                row.iter_mut().zip(sum).for_each(|(row, sum)| *row -= w * factor * sum);
             }
         }
     }
@@ -202,7 +245,7 @@ fn innovation(drift: &Process) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{DMatrix, DVector};
+    use nalgebra::DVector;
 
     /// Σ by its definition.
     fn dense(times: &[f64], weights: &[f64], rests: &[Shared], drifts: &[Process]) -> DMatrix<f64> {
@@ -240,7 +283,9 @@ mod tests {
             let x = DVector::from_fn(60, |k, _| ((k * k) as f64).sin());
             let mut found = vec![0.0; 60];
             whitening.apply(x.as_slice(), &mut found);
-            assert!((sigma * DVector::from_vec(found) - x).amax() < 1e-9);
+            assert!((&sigma * DVector::from_vec(found) - &x).amax() < 1e-9);
+            let several = DMatrix::from_fn(60, 6, |row, column| x[row] * (column as f64 - 1.5));
+            assert!((sigma * whitening.apply_all(&several) - several).amax() < 1e-9);
         }
     }
 }

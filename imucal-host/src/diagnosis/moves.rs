@@ -1,0 +1,171 @@
+//! Moves of the search: from a set of effects to another that may be likelier.
+
+use super::{
+    linear::{Judged, Linear},
+    noise::{NEAR, Noise},
+    refit::Fit,
+};
+use crate::{
+    effect::{Effect, class::class},
+    recording::SensorKind,
+};
+
+/// Sets judged with a noise of their own at each move: the likeliest, and for each sensor those that a quieter noise
+/// would have.
+const JUDGED: (usize, usize) = (6, 2);
+/// Effects replaced by the likeliest others.
+const REPLACED: usize = 3;
+/// Of the effects that a quieter noise would have on a sensor, those that are tried in pairs.
+const PAIRED: usize = 8;
+
+type Set = Vec<&'static Effect>;
+/// A set, and the sensors whose noise it may change.
+type Reaching = (Set, Vec<SensorKind>);
+
+impl Linear<'_> {
+    /// The best set with one effect more, judged with its own noise; of `among`.
+    pub fn added(&self, from: &Judged, among: &dyn Fn(&'static Effect) -> bool) -> Option<Option<Judged>> {
+        let (own, ranked) = self.ranked(&from.set, &from.noise)?;
+        let likely = |own: f64, ranked: Vec<(f64, &'static Effect)>| -> Set {
+            ranked
+                .into_iter()
+                .filter(|(value, effect)| *value > own && among(effect))
+                .map(|(_, e)| e)
+                .collect()
+        };
+        let mut shortlist: Set = likely(own, ranked).into_iter().take(JUDGED.0).collect();
+        // Less noise than is true makes evidence, never takes it; most where the noise is furthest from true.
+        let (own, ranked) = self.ranked(&from.set, &from.noise.quieter())?;
+        let quiet = likely(own, ranked);
+        for kind in &self.scene.kinds {
+            for effect in quiet.iter().filter(|effect| self.reaches(effect, *kind)).take(JUDGED.1) {
+                if !is_among(&shortlist, effect) {
+                    shortlist.push(effect);
+                }
+            }
+        }
+        let sets = shortlist.into_iter().map(|effect| {
+            let mut set = from.set.clone();
+            set.push(effect);
+            (set, self.scene.reach(effect).to_vec())
+        });
+        Some(self.best_of(sets.collect(), &from.noise))
+    }
+
+    /// The best set with two effects of one sensor more. Each alone may leave the other in the drift, and so gain nothing.
+    pub fn paired(&self, from: &Judged) -> Option<Option<Judged>> {
+        let mut sets = Vec::new();
+        for kind in &self.scene.kinds {
+            sets.extend(self.pairs(&from.set, *kind, &from.noise.quieter())?);
+        }
+        Some(self.best_of(sets, &from.noise))
+    }
+
+    /// A set with the likeliest pairs of effects that reach a sensor.
+    fn pairs(&self, set: &[&'static Effect], kind: SensorKind, noise: &Noise) -> Option<Vec<Reaching>> {
+        let (_, ranked) = self.ranked(set, noise)?;
+        let likely = ranked.into_iter().map(|(_, effect)| effect).filter(|effect| self.reaches(effect, kind));
+        let likely: Set = likely.take(PAIRED).collect();
+        let pairs: Vec<[&'static Effect; 2]> = (0..likely.len())
+            .flat_map(|i| (0..i).map(move |j| (j, i)))
+            .map(|(i, j)| [likely[i], likely[j]])
+            .filter(|[one, other]| class(&one.id) != class(&other.id))
+            .collect();
+        let (_, values) = self.values(set, &pairs, noise)?;
+        let mut valued: Vec<(f64, [&'static Effect; 2])> = values.into_iter().zip(pairs).collect();
+        valued.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let with = |(_, pair): (f64, [&'static Effect; 2])| {
+            let reach = either(self.scene.reach(pair[0]), self.scene.reach(pair[1]));
+            (set.iter().copied().chain(pair).collect(), reach)
+        };
+        Some(valued.into_iter().take(JUDGED.1).map(with).collect())
+    }
+
+    /// The best set with one effect replaced or taken out.
+    pub fn changed(&self, from: &Judged) -> Option<Option<Judged>> {
+        let mut sets = Vec::new();
+        for at in 0..from.set.len() {
+            let (fewer, taken) = without(&from.set, at);
+            let other = |effect: &'static Effect| !std::ptr::eq(effect, taken);
+            sets.extend(self.replaced(&fewer, taken.sensors, &other, &from.noise)?);
+            sets.push((fewer, taken.sensors.to_vec()));
+        }
+        Some(self.best_of(sets, &from.noise))
+    }
+
+    /// The best set with one effect replaced by another, or all those of a sensor by one or two, in the shapes that are
+    /// best where the first ones are not: together they may be what two others do. With the problem of these shapes.
+    pub fn changed_anew(&self, fit: &Fit, from: &Judged) -> Option<Option<(Self, Judged)>> {
+        let mut best: Option<(Self, Judged)> = None;
+        let mut better = |linear: Self, sets: Vec<Reaching>| {
+            let found = linear.best_of(sets, &from.noise);
+            if let Some(found) = found
+                && best.as_ref().is_none_or(|(_, most)| found.log_evidence > most.log_evidence)
+            {
+                best = Some((linear, found));
+            }
+        };
+        for at in 0..from.set.len() {
+            let (fewer, taken) = without(&from.set, at);
+            let Some(linear) = self.reshaped(fit, &from.noise, &[taken]) else { continue };
+            let moved = |effect: &'static Effect| linear.shape_of(effect) != self.shape_of(effect);
+            let sets = linear.replaced(&fewer, self.scene.reach(taken), &moved, &from.noise)?;
+            better(linear, sets);
+        }
+        for kind in &self.scene.kinds {
+            let (taken, others): (Set, Set) = from.set.iter().partition(|effect| self.reaches(effect, *kind));
+            if taken.len() > 1
+                && let Some(linear) = self.reshaped(fit, &from.noise.quieter(), &taken)
+            {
+                let quiet = from.noise.quieter();
+                let mut sets = linear.pairs(&others, *kind, &quiet)?;
+                sets.extend(linear.replaced(&others, &[*kind], &|_| true, &quiet)?);
+                better(linear, sets);
+            }
+        }
+        Some(best)
+    }
+
+    /// Sets with one effect more, of `among`, that take the place of what reached some sensors.
+    fn replaced(
+        &self,
+        fewer: &Set,
+        reach: &[SensorKind],
+        among: &dyn Fn(&'static Effect) -> bool,
+        noise: &Noise,
+    ) -> Option<Vec<Reaching>> {
+        let (_, ranked) = self.ranked(fewer, noise)?;
+        let others = ranked.into_iter().map(|(_, effect)| effect).filter(|effect| among(effect));
+        let with = |effect: &'static Effect| {
+            let set = fewer.iter().copied().chain([effect]).collect();
+            (set, either(reach, self.scene.reach(effect)))
+        };
+        Some(others.take(REPLACED).map(with).collect())
+    }
+
+    /// The best of some sets, the noise of the sensors beside each estimated anew.
+    fn best_of(&self, sets: Vec<Reaching>, noise: &Noise) -> Option<Judged> {
+        sets.iter()
+            .filter_map(|(set, anew)| self.judge(set, noise, anew, &NEAR))
+            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
+    }
+
+    fn reaches(&self, effect: &Effect, kind: SensorKind) -> bool {
+        self.scene.reach(effect).contains(&kind)
+    }
+}
+
+fn is_among(set: &[&'static Effect], effect: &Effect) -> bool {
+    set.iter().any(|other| std::ptr::eq(*other, effect))
+}
+
+/// A set without one of its effects, and that effect.
+fn without(set: &[&'static Effect], at: usize) -> (Set, &'static Effect) {
+    let mut fewer = set.to_vec();
+    let taken = fewer.remove(at);
+    (fewer, taken)
+}
+
+fn either(one: &[SensorKind], other: &[SensorKind]) -> Vec<SensorKind> {
+    SensorKind::ALL.into_iter().filter(|kind| one.contains(kind) || other.contains(kind)).collect()
+}
