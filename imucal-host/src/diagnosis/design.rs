@@ -2,6 +2,8 @@
 //!
 //! A channel is one axis of one sensor. Columns are in usual sizes of their parameters, so that one means usual.
 
+use std::borrow::Borrow;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use rayon::prelude::*;
 
@@ -148,7 +150,12 @@ impl Design {
     }
 
     /// Some of its columns, by index, and further ones behind them; `columns` names the first of these.
-    pub fn extended(&self, kept: &[usize], columns: Vec<Column>, further: &[Means]) -> Self {
+    pub fn extended<M: Borrow<Means> + Sync>(
+        &self,
+        kept: &[usize],
+        columns: Vec<Column>,
+        further: &[M],
+    ) -> Self {
         let channels = self
             .channels
             .par_iter()
@@ -166,6 +173,17 @@ impl Design {
             })
             .collect();
         Self { columns, size: kept.len() + further.len(), channels }
+    }
+
+    /// With another residual.
+    #[must_use]
+    pub fn leaving(mut self, residual: &Means) -> Self {
+        for channel in &mut self.channels {
+            if let Some(values) = along(residual, channel.kind, channel.axis) {
+                channel.y = DVector::from_vec(values);
+            }
+        }
+        self
     }
 
     /// With the residual as it would be without some effects: their columns times `amplitudes` added, usual sizes.
@@ -217,12 +235,13 @@ fn append(
     kind: SensorKind,
     axis: usize,
     first: usize,
-    signatures: &[Means],
+    signatures: &[impl Borrow<Means>],
     ids: &mut Vec<usize>,
     data: &mut Vec<f64>,
 ) {
     for (id, signature) in signatures.iter().enumerate() {
-        let reaching = along(signature, kind, axis).filter(|column| column.iter().any(|v| *v != 0.0));
+        let reaching =
+            along(signature.borrow(), kind, axis).filter(|column| column.iter().any(|v| *v != 0.0));
         if let Some(column) = reaching {
             ids.push(first + id);
             data.extend(column);

@@ -3,17 +3,18 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{
-    candidates::{Candidates, is_shaped},
+    candidates::Candidates,
     design::{Design, Normal},
     evidence::Projected,
     noise::{Noise, Weighing},
     refit::{Fit, columns, signatures},
-    scene::{Reference, Scene},
-    shape::{self, Backdrop},
+    scan::{Beside, Scan},
+    scene::Scene,
+    shape,
     whitening::Whitening,
 };
 use crate::{
-    effect::{Effect, class::class},
+    effect::{Act, Effect, Role, class::class},
     recording::SensorKind,
     simulator::Dose,
 };
@@ -46,6 +47,9 @@ pub struct Linear<'s> {
     pub baseline: Vec<usize>,
     /// Parameters of each candidate at which its signature was taken.
     pub shapes: Vec<Vec<f64>>,
+    scan: Scan<'s>,
+    /// Effects of the fit beside the baseline.
+    held: Vec<Dose>,
     normals: Normals,
 }
 
@@ -53,32 +57,84 @@ pub struct Linear<'s> {
 type Normals = Mutex<Vec<(Noise, Arc<Normal>)>>;
 
 impl<'s> Linear<'s> {
-    /// About a fit; shapes of candidates that it does not hold are those best under `noise`. Without a noise, about the
-    /// fitted columns alone: nothing can be added.
+    /// About a fit, with its columns alone: nothing can be added.
+    pub fn fitted_alone(scene: &'s Scene<'s>, candidates: &'s Candidates, fit: &Fit) -> Option<Self> {
+        let reference = scene.reference(fit.doses.clone(), &scene.fine)?;
+        let shapes = candidates.effects.iter().map(|effect| effect.neutral(scene.duration())).collect();
+        let columns = columns(&fit.doses.iter().map(|dose| dose.effect).collect::<Vec<_>>());
+        let means = signatures(&reference, &columns, &|_| Vec::new())?;
+        let design = Design::new(scene, columns, &means, &fit.residual);
+        let scan = Scan::new(scene, candidates, fit.doses.clone())?;
+        let weighing = Weighing::new(scene, SensorKind::ALL.map(|kind| reference.output(kind)));
+        Some(Self::of(scene, candidates, scan, fit, design, weighing, shapes))
+    }
+
+    /// About a fit; shapes of candidates that it does not hold are those best under `noise`. What reaches no sensor on
+    /// which this fit and another differ is taken from the problem about that.
     pub fn new(
         scene: &'s Scene<'s>,
         candidates: &'s Candidates,
         fit: &Fit,
-        noise: Option<&Noise>,
+        noise: &Noise,
+        before: Option<&Self>,
     ) -> Option<Self> {
+        let alone = Self::fitted_alone(scene, candidates, fit)?;
+        let scan = before.map_or(alone.scan, |before| before.scan.clone());
         let reference = scene.reference(fit.doses.clone(), &scene.fine)?;
-        let weighing = Weighing::new(scene, SensorKind::ALL.map(|kind| reference.output(kind)));
-        let (shapes, all): (Vec<Vec<f64>>, Vec<&'static Effect>) = match noise {
-            Some(noise) => (
-                shapes_beside(&reference, candidates, fit, &weighing, noise)?,
-                candidates.baseline.iter().chain(&candidates.effects).copied().collect(),
-            ),
-            None => (
-                candidates.effects.iter().map(|effect| effect.neutral(scene.duration())).collect(),
-                fit.doses.iter().map(|dose| dose.effect).collect(),
-            ),
+        let every: Vec<usize> = (0..alone.design.columns.len()).collect();
+        let beside =
+            Beside { doses: &fit.doses, weighing: &alone.weighing, design: &alone.design, fitted: &every };
+        let lasts = |effect: &Effect| before.is_some_and(|before| before.lasts(effect, fit));
+        let kept = |at: usize, effect: &Effect| {
+            before.filter(|_| lasts(effect)).and_then(|before| before.shapes.get(at).cloned())
         };
-        let columns = columns(&all);
-        let means = signatures(&reference, &columns, &|effect| candidates.shape(&shapes, effect))?;
-        let mut design = Design::new(scene, columns, &means, &fit.residual);
+        let shapes = scan.shapes(&beside, noise, &kept)?;
+        let (old, new): (Vec<&'static Effect>, Vec<&'static Effect>) =
+            candidates.effects.iter().copied().partition(|effect| {
+                lasts(effect) && fit.doses.iter().all(|dose| !std::ptr::eq(dose.effect, *effect))
+            });
+        let fresh = columns(&candidates.baseline.iter().copied().chain(new).collect::<Vec<_>>());
+        let means = signatures(&reference, &fresh, &|effect| candidates.shape(&shapes, effect))?;
+        let mut design = match before {
+            Some(before) => {
+                let kept: Vec<usize> = old.iter().flat_map(|effect| before.design.of(effect)).collect();
+                let columns = kept.iter().map(|id| before.design.columns[*id]).chain(fresh).collect();
+                before.design.extended(&kept, columns, &means).leaving(&fit.residual)
+            }
+            None => Design::new(scene, fresh, &means, &fit.residual),
+        };
         restore(&mut design, fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect)));
+        Some(Self::of(scene, candidates, scan, fit, design, alone.weighing, shapes))
+    }
+
+    fn of(
+        scene: &'s Scene<'s>,
+        candidates: &'s Candidates,
+        scan: Scan<'s>,
+        fit: &Fit,
+        design: Design,
+        weighing: Weighing<'s>,
+        shapes: Vec<Vec<f64>>,
+    ) -> Self {
         let baseline = candidates.baseline.iter().flat_map(|term| design.of(term)).collect();
-        Some(Self { scene, candidates, design, weighing, baseline, shapes, normals: Normals::default() })
+        let held = fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect)).cloned().collect();
+        let normals = Normals::default();
+        Self { scene, candidates, design, weighing, baseline, shapes, scan, held, normals }
+    }
+
+    /// An effect's signature is the same about another fit but for the second order: no sensor it reaches has an effect in
+    /// the one and not in the other, or in another shape.
+    fn lasts(&self, effect: &Effect, fit: &Fit) -> bool {
+        let moves = |effect: &Effect| matches!(effect.act, Act::Rig(_) | Act::Clock(_));
+        let meets = |changed: &Dose| {
+            let met = |kind| self.scene.reach(changed.effect).contains(kind);
+            // What moves the rig reaches all sensors by the same path, whatever a sensor makes of it.
+            if moves(effect) { moves(changed.effect) } else { self.scene.reach(effect).iter().any(met) }
+        };
+        let has = |doses: &[Dose], dose: &Dose| doses.iter().any(|other| has_same_shape(dose, other));
+        let gone = self.held.iter().filter(|dose| !has(&fit.doses, dose));
+        let come = fit.doses.iter().filter(|dose| !self.candidates.has_term(dose.effect));
+        !gone.chain(come.filter(|dose| !has(&self.held, dose))).any(meets)
     }
 
     /// The same problem, with shapes of candidates that are best under another noise, or without some of the fit's
@@ -86,22 +142,16 @@ impl<'s> Linear<'s> {
     pub fn reshaped(&self, fit: &Fit, noise: &Noise, without: &[&'static Effect]) -> Option<Self> {
         let is_taken = |effect: &Effect| without.iter().any(|taken| std::ptr::eq(*taken, effect));
         let doses: Vec<Dose> = fit.doses.iter().filter(|dose| !is_taken(dose.effect)).cloned().collect();
-        let reference = self.scene.reference(doses.clone(), &self.scene.fine)?;
         let fitted: Vec<usize> = doses.iter().flat_map(|dose| self.design.of(dose.effect)).collect();
-        let beside = Beside {
-            candidates: self.candidates,
-            doses: &doses,
-            weighing: &self.weighing,
-            design: &self.design,
-            fitted: &fitted,
-        };
+        let (design, weighing) = (&self.design, &self.weighing);
+        let beside = Beside { doses: &doses, weighing, design, fitted: &fitted };
         let meets = |effect: &Effect| {
             let reached = |kind| without.iter().any(|taken| self.scene.reach(taken).contains(kind));
             without.is_empty() || self.scene.reach(effect).iter().any(reached)
         };
         let kept =
             |at: usize, effect: &Effect| if meets(effect) { None } else { self.shapes.get(at).cloned() };
-        let shapes = beside.best_shapes(self.scene, noise, &kept)?;
+        let shapes = self.scan.shapes(&beside, noise, &kept)?;
         let others: Vec<&'static Effect> = self
             .candidates
             .effects
@@ -113,16 +163,15 @@ impl<'s> Linear<'s> {
         if others.is_empty() {
             return None;
         }
+        let reference = self.scene.reference(doses.clone(), &self.scene.fine)?;
         let changed = columns(&others);
         let means = signatures(&reference, &changed, &|effect| self.candidates.shape(&shapes, effect))?;
         let is_kept = |id: &usize| !others.iter().any(|effect| self.design.columns[*id].is_of(effect));
         let kept: Vec<usize> = (0..self.design.columns.len()).filter(is_kept).collect();
         let columns = kept.iter().map(|id| self.design.columns[*id]).chain(changed).collect();
         let design = self.design.extended(&kept, columns, &means);
-        let baseline = self.candidates.baseline.iter().flat_map(|term| design.of(term)).collect();
-        let (scene, candidates) = (self.scene, self.candidates);
-        let weighing = Weighing::new(scene, self.weighing.given.clone());
-        Some(Self { scene, candidates, design, weighing, baseline, shapes, normals: Normals::default() })
+        let weighing = Weighing::new(self.scene, self.weighing.given.clone());
+        Some(Self::of(self.scene, self.candidates, self.scan.clone(), fit, design, weighing, shapes))
     }
 
     /// Parameters at which a candidate's signature was taken.
@@ -239,6 +288,12 @@ impl<'s> Linear<'s> {
     }
 }
 
+/// The same effect with the same parameters beside its amplitudes.
+fn has_same_shape(one: &Dose, other: &Dose) -> bool {
+    let mut values = one.effect.parameters.iter().zip(one.values.iter().zip(&other.values));
+    std::ptr::eq(one.effect, other.effect) && values.all(|(p, (a, b))| p.role == Role::Amplitude || a == b)
+}
+
 /// Puts effects back into a design's residual.
 fn restore<'d>(design: &mut Design, doses: impl Iterator<Item = &'d Dose>) {
     let restored: Vec<(usize, f64)> = doses
@@ -249,72 +304,6 @@ fn restore<'d>(design: &mut Design, doses: impl Iterator<Item = &'d Dose>) {
         })
         .collect();
     design.restore(&restored);
-}
-
-/// The best shapes beside a fit.
-fn shapes_beside(
-    reference: &Reference<'_>,
-    candidates: &Candidates,
-    fit: &Fit,
-    weighing: &Weighing<'_>,
-    noise: &Noise,
-) -> Option<Vec<Vec<f64>>> {
-    let scene = reference.scene;
-    let columns = columns(&fit.doses.iter().map(|dose| dose.effect).collect::<Vec<_>>());
-    let means = signatures(reference, &columns, &|_| Vec::new())?;
-    let design = Design::new(scene, columns, &means, &fit.residual);
-    let fitted: Vec<usize> = (0..design.columns.len()).collect();
-    let beside = Beside { candidates, doses: &fit.doses, weighing, design: &design, fitted: &fitted };
-    beside.best_shapes(scene, noise, &|_, _| None)
-}
-
-/// What candidates are shaped beside.
-struct Beside<'a> {
-    candidates: &'a Candidates,
-    /// Effects that have their shapes.
-    doses: &'a [Dose],
-    weighing: &'a Weighing<'a>,
-    /// Their columns, `fitted` by index, and a residual.
-    design: &'a Design,
-    fitted: &'a [usize],
-}
-
-impl Beside<'_> {
-    /// The shape of each candidate that is best under a noise; that of the doses for those they hold, and what `kept`
-    /// tells of others.
-    fn best_shapes(
-        &self,
-        scene: &Scene<'_>,
-        noise: &Noise,
-        kept: &dyn Fn(usize, &Effect) -> Option<Vec<f64>>,
-    ) -> Option<Vec<Vec<f64>>> {
-        let whitenings = self.weighing.whitenings(self.design, noise);
-        let coarse = scene.reference(self.doses.to_vec(), &scene.coarse)?;
-        // Where no rig guides the sensor, what a hand adds hides when an episode began and ended.
-        let quiet = match scene.swings {
-            Some(_) => None,
-            None => Some(self.weighing.whitenings(self.design, &noise.quieter().even())),
-        };
-        let best = |effect: &'static Effect| {
-            let quiet = quiet.as_ref().filter(|_| shape::is_episode(effect));
-            let whitenings = quiet.unwrap_or(&whitenings);
-            let backdrop = Backdrop { scene, design: self.design, fitted: self.fitted, whitenings };
-            let best = shape::best(effect, &coarse, &backdrop)?;
-            match quiet {
-                Some(_) => Some(shape::refine(effect, &best, &coarse, &backdrop)?.0),
-                None => Some(best),
-            }
-        };
-        let shape = |(at, effect): (usize, &&'static Effect)| {
-            let held = self.doses.iter().find(|dose| std::ptr::eq(dose.effect, *effect));
-            match held.map(|dose| dose.values.clone()).or_else(|| kept(at, effect)) {
-                Some(shape) => Some(shape),
-                None if is_shaped(effect) => best(effect),
-                None => Some(effect.neutral(scene.duration())),
-            }
-        };
-        self.candidates.effects.iter().enumerate().map(shape).collect()
-    }
 }
 
 /// ln of the probability of the data, but for a constant: columns of the baseline come first, then `groups` of columns,

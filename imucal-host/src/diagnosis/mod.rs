@@ -23,6 +23,7 @@ pub mod noise;
 pub mod orientation;
 pub mod refit;
 pub mod revisits;
+mod scan;
 pub mod scene;
 pub mod search;
 pub mod shape;

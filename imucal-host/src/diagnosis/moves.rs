@@ -12,7 +12,7 @@ use crate::{
 
 /// Sets judged with a noise of their own at each move: the likeliest, and for each sensor those that a quieter noise
 /// would have.
-const JUDGED: (usize, usize) = (6, 2);
+const JUDGED: (usize, usize) = (6, 3);
 /// Effects replaced by the likeliest others.
 const REPLACED: usize = 3;
 /// Of the effects that a quieter noise would have on a sensor, those that are tried in pairs.

@@ -3,6 +3,11 @@
 //! Residuals are means over blocks of recorded less simulated samples, at the recording's full rate. A signature is the
 //! simulator's own derivative, from a run at nodes a few rows apart, since it need not hold what a residual must.
 
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex, PoisonError},
+};
+
 use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
 
@@ -268,7 +273,7 @@ impl<'a> Scene<'a> {
         let truth = self.truth(&doses, nodes);
         let input = inputs(&truth, &Matrix3::identity());
         let outputs = self.outputs(&doses, &SensorKind::ALL, &input)?;
-        Some(Reference { scene: self, nodes, doses, truth, input, outputs })
+        Some(Reference { scene: self, nodes, doses, truth, input, outputs, known: Known::default() })
     }
 }
 
@@ -282,7 +287,11 @@ pub struct Reference<'s> {
     truth: Vec<Truth>,
     input: Vec<Input>,
     outputs: [Vec<Vector3<f64>>; 3],
+    known: Known,
 }
+
+/// Signatures that were asked for: effect, parameter, and the bits of all parameters.
+type Known = Mutex<HashMap<(&'static str, usize, Vec<u64>), Arc<Means>>>;
 
 impl Reference<'_> {
     /// What a sensor puts out, block by block.
@@ -296,6 +305,23 @@ impl Reference<'_> {
     /// The truth at each block's last node, in the order of the nodes.
     pub fn truth(&self) -> &[Truth] {
         &self.truth
+    }
+
+    /// A signature, computed once.
+    pub fn known_signature(
+        &self,
+        effect: &'static Effect,
+        parameter: usize,
+        shape: &[f64],
+    ) -> Option<Arc<Means>> {
+        let key = (effect.id.as_str(), parameter, shape.iter().map(|value| value.to_bits()).collect());
+        let locked = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = locked().get(&key) {
+            return Some(Arc::clone(known));
+        }
+        let signature = Arc::new(self.signature(effect, parameter, shape)?);
+        locked().insert(key, Arc::clone(&signature));
+        Some(signature)
     }
 
     /// What a usual size of one parameter changes, block by block, by the simulator's difference quotient. Where the

@@ -17,9 +17,10 @@ use crate::{effect::Effect, recording::SensorKind, simulator::Dose};
 
 /// Most effects in a set; where no rig guides the sensor, the latter: a hand and a reference add gaps of their own.
 const MOST: (usize, usize) = (3, 5);
-/// An addition must raise the evidence by this, beyond its share of the prior: odds of three. False alarms
-/// are fewer by far than one in three (`imucal blind`), since the noise is estimated for each set.
-const GAIN: f64 = 1.0;
+/// The first effect must raise the evidence by this, beyond its share of the prior, and each further one by the latter:
+/// where one thing is wrong, another is less of a surprise. False alarms are fewer by far than one in seven
+/// (`imucal blind`), since the noise is estimated for each set.
+const GAIN: (f64, f64) = (2.0, 1.0);
 /// A set of no more effects must raise it by this.
 const CHANGE: f64 = 0.5;
 /// Fits of the baseline, each with the noise that the last one left, where no rig guides the sensor.
@@ -53,32 +54,36 @@ pub fn search<'s>(
         None => start::start(scene, doses)?,
     };
     trace("baseline fitted");
-    let mut linear = Linear::new(scene, candidates, &fit, None)?;
+    let mut linear = Linear::fitted_alone(scene, candidates, &fit)?;
     let white = linear.weighing.white(&fit.residual);
     let mut none = linear.judge(&[], &white, &SensorKind::ALL, &FAR)?;
     trace(&format!("none: {:.1} {:?}", none.log_evidence, none.noise));
     // Where no rig guides the sensor, the first noise holds much of the misfit that the first fit began with.
     for _ in 0..if scene.swings.is_none() { SETTLING } else { 0 } {
         fit = refit(scene, fit.doses, Some(&none.noise))?;
-        linear = Linear::new(scene, candidates, &fit, None)?;
+        linear = Linear::fitted_alone(scene, candidates, &fit)?;
         let start = with_white(&none.noise, &linear.weighing.white(&fit.residual));
         none = linear.judge(&[], &start, &SensorKind::ALL, &FAR)?;
         trace(&format!("none again: {:.1} {:?}", none.log_evidence, none.noise));
     }
     let most = if scene.swings.is_some() { MOST.0 } else { MOST.1 };
     let mut best = none.clone();
-    linear = Linear::new(scene, candidates, &fit, Some(&best.noise))?;
+    linear = Linear::new(scene, candidates, &fit, &best.noise, None)?;
     trace("shapes");
     let mut seen = Vec::new();
     loop {
         best = linear.judge(&best.set, &best.noise, &SensorKind::ALL, &FAR)?;
         let (next, elsewhere) = improved(&linear, &fit, &best, most)?;
-        // Two sets may each be better than the other with the noise that the other leaves.
-        let Some(next) = next.filter(|judged| !seen.contains(&key(&judged.set))) else { break };
+        // Two sets may each be better than the other with the noise that the other leaves; a set may be better once in
+        // shapes of another place.
+        let visits = if elsewhere.is_some() { 2 } else { 1 };
+        let is_new = |judged: &Judged| seen.iter().filter(|set| **set == key(&judged.set)).count() < visits;
+        let Some(next) = next.filter(is_new) else { break };
         seen.push(key(&next.set));
         let names: Vec<&str> = next.set.iter().map(|effect| effect.id.as_str()).collect();
         trace(&format!("{:.1} → {:.1} {names:?}", best.log_evidence, next.log_evidence));
-        (fit, linear, best) = advance(scene, candidates, &fit, elsewhere.as_ref().unwrap_or(&linear), next)?;
+        let found_in = elsewhere.as_ref().unwrap_or(&linear);
+        (fit, linear, best) = advance(scene, candidates, &fit, &linear, found_in, next)?;
         trace("refitted");
     }
     Some(Explained { best, none, fit, linear })
@@ -92,9 +97,10 @@ fn improved<'s>(
     most: usize,
 ) -> Option<(Option<Judged>, Option<Linear<'s>>)> {
     let gains = |judged: &Judged, least: f64| judged.log_evidence > best.log_evidence + least;
+    let gain = if best.set.is_empty() { GAIN.0 } else { GAIN.1 };
     let room = most.saturating_sub(best.set.len());
     if room > 0
-        && let Some(next) = linear.added(best, &|_| true)?.filter(|next| gains(next, GAIN))
+        && let Some(next) = linear.added(best, &|_| true)?.filter(|next| gains(next, gain))
     {
         return Some((Some(next), None));
     }
@@ -109,14 +115,14 @@ fn improved<'s>(
         quiet.as_ref().is_some_and(|quiet| quiet.shape_of(effect) != linear.shape_of(effect))
     };
     let from_quiet = match &quiet {
-        Some(quiet) => quiet.added(best, &moved)?.filter(|next| gains(next, GAIN)),
+        Some(quiet) => quiet.added(best, &moved)?.filter(|next| gains(next, gain)),
         None => None,
     };
     if from_quiet.is_some() {
         return Some((from_quiet, quiet));
     }
     if room > 1 {
-        let next = quiet.as_ref().unwrap_or(linear).paired(best)?.filter(|next| gains(next, 2.0 * GAIN));
+        let next = quiet.as_ref().unwrap_or(linear).paired(best)?.filter(|next| gains(next, gain + GAIN.1));
         if next.is_some() {
             return Some((next, quiet));
         }
@@ -137,11 +143,13 @@ fn key(set: &[&'static Effect]) -> Vec<&'static str> {
     key
 }
 
-/// Fits a set through the simulator and looks at all candidates from there.
+/// Fits a set, found in a problem that may have other shapes than `before`, through the simulator, and looks at all
+/// candidates from there.
 fn advance<'s>(
     scene: &'s Scene<'s>,
     candidates: &'s Candidates,
     fit: &Fit,
+    before: &Linear<'s>,
     linear: &Linear<'s>,
     mut next: Judged,
 ) -> Option<(Fit, Linear<'s>, Judged)> {
@@ -175,7 +183,7 @@ fn advance<'s>(
     let fit = refit(scene, doses, Some(&next.noise))?;
     let white = linear.weighing.white(&fit.residual);
     next.noise = with_white(&next.noise, &white);
-    let linear = Linear::new(scene, candidates, &fit, Some(&next.noise))?;
+    let linear = Linear::new(scene, candidates, &fit, &next.noise, Some(before))?;
     Some((fit, linear, next))
 }
 

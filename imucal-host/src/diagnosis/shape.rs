@@ -2,6 +2,8 @@
 //!
 //! A menu of shapes for each, the best by evidence, and from there a search by halved steps.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::{
@@ -88,8 +90,10 @@ fn project(
     let fitted: Vec<usize> = (0..columns.len()).collect();
     let asked: Vec<(&Vec<f64>, usize)> =
         shapes.iter().flat_map(|shape| own.iter().map(move |parameter| (shape, *parameter))).collect();
-    let means: Option<Vec<Means>> =
-        asked.par_iter().map(|(shape, parameter)| reference.signature(effect, *parameter, shape)).collect();
+    let means: Option<Vec<Arc<Means>>> = asked
+        .par_iter()
+        .map(|(shape, parameter)| reference.known_signature(effect, *parameter, shape))
+        .collect();
     columns.extend(asked.iter().map(|(_, parameter)| Column { effect, parameter: *parameter }));
     let design = backdrop.design.extended(backdrop.fitted, columns, &means?);
     let every: Vec<usize> = (0..design.columns.len()).collect();

@@ -45,8 +45,8 @@ fn with_linear<T>(check: impl FnOnce(&Linear<'_>) -> T) -> T {
         .map(|effect| Dose { effect, values: vec![0.0; effect.parameters.len()] })
         .collect();
     let fit = refit(&scene, doses, None).unwrap();
-    let noise = Linear::new(&scene, &candidates, &fit, None).unwrap().weighing.white(&fit.residual);
-    check(&Linear::new(&scene, &candidates, &fit, Some(&noise)).unwrap())
+    let noise = Linear::fitted_alone(&scene, &candidates, &fit).unwrap().weighing.white(&fit.residual);
+    check(&Linear::new(&scene, &candidates, &fit, &noise, None).unwrap())
 }
 
 #[test]

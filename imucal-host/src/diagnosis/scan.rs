@@ -1,0 +1,76 @@
+//! Where in time, and in what shape, each candidate is likeliest.
+
+use std::sync::Arc;
+
+use super::{
+    candidates::{Candidates, is_shaped},
+    design::Design,
+    noise::{Noise, Weighing},
+    scene::{Reference, Scene},
+    shape::{self, Backdrop},
+};
+use crate::{effect::Effect, simulator::Dose};
+
+/// Scans the shapes of candidates. Signatures are those about the fit it was made with: what is fitted later changes where
+/// they lie in the second order only, and they are taken anew where their size counts.
+#[derive(Clone)]
+pub struct Scan<'s> {
+    scene: &'s Scene<'s>,
+    candidates: &'s Candidates,
+    coarse: Arc<Reference<'s>>,
+}
+
+/// What candidates are shaped beside.
+pub struct Beside<'a> {
+    /// Effects that have their shapes.
+    pub doses: &'a [Dose],
+    /// Weighs the blocks.
+    pub weighing: &'a Weighing<'a>,
+    /// The columns of those effects, and a residual.
+    pub design: &'a Design,
+    /// Indices of those columns.
+    pub fitted: &'a [usize],
+}
+
+impl<'s> Scan<'s> {
+    /// About a fit. `None` where the simulator fails.
+    pub fn new(scene: &'s Scene<'s>, candidates: &'s Candidates, doses: Vec<Dose>) -> Option<Self> {
+        Some(Self { scene, candidates, coarse: Arc::new(scene.reference(doses, &scene.coarse)?) })
+    }
+
+    /// The shape of each candidate that is best under a noise; that of the doses for those they hold, and what `kept`
+    /// tells of others.
+    pub fn shapes(
+        &self,
+        beside: &Beside<'_>,
+        noise: &Noise,
+        kept: &dyn Fn(usize, &Effect) -> Option<Vec<f64>>,
+    ) -> Option<Vec<Vec<f64>>> {
+        let (scene, design) = (self.scene, beside.design);
+        let whitenings = beside.weighing.whitenings(design, noise);
+        // Where no rig guides the sensor, what a hand adds hides when an episode began and ended.
+        let quiet = match scene.swings {
+            Some(_) => None,
+            None => Some(beside.weighing.whitenings(design, &noise.quieter().even())),
+        };
+        let best = |effect: &'static Effect| {
+            let quiet = quiet.as_ref().filter(|_| shape::is_episode(effect));
+            let whitenings = quiet.unwrap_or(&whitenings);
+            let backdrop = Backdrop { scene, design, fitted: beside.fitted, whitenings };
+            let best = shape::best(effect, &self.coarse, &backdrop)?;
+            match quiet {
+                Some(_) => Some(shape::refine(effect, &best, &self.coarse, &backdrop)?.0),
+                None => Some(best),
+            }
+        };
+        let shape = |(at, effect): (usize, &&'static Effect)| {
+            let held = beside.doses.iter().find(|dose| std::ptr::eq(dose.effect, *effect));
+            match held.map(|dose| dose.values.clone()).or_else(|| kept(at, effect)) {
+                Some(shape) => Some(shape),
+                None if is_shaped(effect) => best(effect),
+                None => Some(effect.neutral(scene.duration())),
+            }
+        };
+        self.candidates.effects.iter().enumerate().map(shape).collect()
+    }
+}
