@@ -4,6 +4,7 @@
 
 use imucal_host::{
     blind::{
+        case::{Case, draw},
         judgement::Judgement,
         score::{Goal, Share, score},
         seal::Nonce,
@@ -45,4 +46,21 @@ fn a_small_set_of_sealed_trials_is_answered_no_worse_than_the_contract_allows() 
         assert!(!is_beyond_chance(share), "{}: {} of {}", share.name, share.hits, share.trials);
     }
     assert!(judged.iter().all(|judged| judged.answer.verdict.is_some()), "a diagnosis came to no end");
+}
+
+/// Drawn once by chance, and missed by a search that adds one effect at a time: linear drift and the square of the
+/// temperature, each of which leaves the other in the noise's drift.
+const SLOW: (&str, usize) = ("cdab6a47e7b7db51f0c1509043cfcf9431e67f05e905309a3cc97e6c8aa06353", 16);
+
+#[test]
+fn two_slow_effects_of_one_sensor_are_found_together() {
+    let drawn = draw(&Nonce::parse(SLOW.0).expect("a nonce"), Case::Afflicted(SLOW.1)).expect("a case");
+    let recording = drawn.simulation.record("slow").expect("a recording");
+    let diagnosis = diagnose(&recording, &Options::default(), &|_| ());
+    let mut named: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.effect.as_str()).collect();
+    let mut there: Vec<&str> = drawn.label.effects.iter().map(|effect| effect.effect.as_str()).collect();
+    named.sort_unstable();
+    there.sort_unstable();
+    assert_eq!(there.iter().filter(|id| id.starts_with("gyr.")).count(), 2, "{there:?}");
+    assert_eq!(named, there);
 }

@@ -67,13 +67,14 @@ pub fn search<'s>(
         trace(&format!("none again: {:.1} {:?}", none.log_evidence, none.noise));
     }
     let most = if scene.swings.is_some() { MOST.0 } else { MOST.1 };
-    let mut best = none.clone();
-    linear = Linear::new(scene, candidates, &fit, &best.noise, None)?;
+    linear = Linear::new(scene, candidates, &fit, &none.noise, None)?;
     trace("shapes");
+    let mut at = Explained { best: none.clone(), none, fit, linear };
+    let mut likeliest: Option<Explained<'s>> = None;
     let mut seen = Vec::new();
     loop {
-        best = linear.judge(&best.set, &best.noise, &SensorKind::ALL, &FAR)?;
-        let (next, elsewhere) = improved(&linear, &fit, &best, most)?;
+        at.best = at.linear.judge(&at.best.set, &at.best.noise, &SensorKind::ALL, &FAR)?;
+        let (next, elsewhere) = improved(&at, most)?;
         // Two sets may each be better than the other with the noise that the other leaves; a set may be better once in
         // shapes of another place.
         let visits = if elsewhere.is_some() { 2 } else { 1 };
@@ -81,21 +82,70 @@ pub fn search<'s>(
         let Some(next) = next.filter(is_new) else { break };
         seen.push(key(&next.set));
         let names: Vec<&str> = next.set.iter().map(|effect| effect.id.as_str()).collect();
-        trace(&format!("{:.1} → {:.1} {names:?}", best.log_evidence, next.log_evidence));
-        let found_in = elsewhere.as_ref().unwrap_or(&linear);
-        (fit, linear, best) = advance(scene, candidates, &fit, &linear, found_in, next)?;
+        trace(&format!("{:.1} → {:.1} {names:?}", at.best.log_evidence, next.log_evidence));
+        let next = at.advanced(elsewhere.as_ref().unwrap_or(&at.linear), next)?;
         trace("refitted");
+        let left = std::mem::replace(&mut at, next);
+        if likeliest.as_ref().is_none_or(|most| left.is_likelier(most)) {
+            likeliest = Some(left);
+        }
     }
-    Some(Explained { best, none, fit, linear })
+    // What a move promises by linear algebra the fit through the simulator need not keep.
+    Some(likeliest.filter(|most| most.is_likelier(&at)).unwrap_or(at))
+}
+
+impl<'s> Explained<'s> {
+    fn is_likelier(&self, other: &Self) -> bool {
+        self.best.log_evidence > other.best.log_evidence
+    }
+
+    /// Fits a set, found in a problem that may have other shapes than the own, through the simulator, and looks at all
+    /// candidates from there.
+    fn advanced(&self, found_in: &Linear<'s>, mut next: Judged) -> Option<Self> {
+        let Linear { scene, candidates, .. } = *found_in;
+        // An effect whose shape that problem has changed begins anew.
+        let kept = |effect: &'static Effect| {
+            let is_same =
+                |dose: &&Dose| candidates.has_term(effect) || found_in.shape_of(effect) == dose.values;
+            self.fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, effect)).filter(is_same)
+        };
+        let all = candidates.baseline.iter().chain(&next.set);
+        let mut doses: Vec<Dose> = all.filter_map(|effect| kept(effect).cloned()).collect();
+        for effect in next.set.iter().copied().filter(|effect| kept(effect).is_none()) {
+            let rest: Vec<&'static Effect> =
+                next.set.iter().copied().filter(|other| !std::ptr::eq(*other, effect)).collect();
+            let values = refined(effect, found_in, &doses, &rest, &next.noise)?;
+            doses.push(Dose { effect, values });
+        }
+        let fit = refit(scene, doses, Some(&next.noise))?;
+        next.noise = with_white(&next.noise, &found_in.weighing.white(&fit.residual));
+        let linear = Linear::new(scene, candidates, &fit, &next.noise, Some(&self.linear))?;
+        Some(Self { best: next, none: self.none.clone(), fit, linear })
+    }
+}
+
+/// An effect's parameters at which its signature was taken; a shape is refined against what is fitted without it.
+fn refined(
+    effect: &'static Effect,
+    linear: &Linear<'_>,
+    doses: &[Dose],
+    rest: &[&'static Effect],
+    noise: &Noise,
+) -> Option<Vec<f64>> {
+    let (scene, values) = (linear.scene, linear.shape_of(effect));
+    if !is_shaped(effect) {
+        return Some(values);
+    }
+    let fitted = linear.fitted(rest);
+    let whitenings = linear.whitenings(noise);
+    let backdrop = Backdrop { scene, design: &linear.design, fitted: &fitted, whitenings: &whitenings };
+    let reference = scene.reference(doses.to_vec(), &scene.fine)?;
+    Some(shape::refine(effect, &values, &reference, &backdrop).map_or(values, |(refined, _)| refined))
 }
 
 /// A likelier set, and the problem in which it was found where that is not `linear`: the cheapest move that gains.
-fn improved<'s>(
-    linear: &Linear<'s>,
-    fit: &Fit,
-    best: &Judged,
-    most: usize,
-) -> Option<(Option<Judged>, Option<Linear<'s>>)> {
+fn improved<'s>(at: &Explained<'s>, most: usize) -> Option<(Option<Judged>, Option<Linear<'s>>)> {
+    let Explained { linear, fit, best, .. } = at;
     let gains = |judged: &Judged, least: f64| judged.log_evidence > best.log_evidence + least;
     let gain = if best.set.is_empty() { GAIN.0 } else { GAIN.1 };
     let room = most.saturating_sub(best.set.len());
@@ -141,50 +191,6 @@ fn key(set: &[&'static Effect]) -> Vec<&'static str> {
     let mut key: Vec<&'static str> = set.iter().map(|effect| effect.id.as_str()).collect();
     key.sort_unstable();
     key
-}
-
-/// Fits a set, found in a problem that may have other shapes than `before`, through the simulator, and looks at all
-/// candidates from there.
-fn advance<'s>(
-    scene: &'s Scene<'s>,
-    candidates: &'s Candidates,
-    fit: &Fit,
-    before: &Linear<'s>,
-    linear: &Linear<'s>,
-    mut next: Judged,
-) -> Option<(Fit, Linear<'s>, Judged)> {
-    // An effect whose shape the problem has changed begins anew.
-    let kept = |effect: &'static Effect| {
-        let is_same = |dose: &&Dose| candidates.has_term(effect) || linear.shape_of(effect) == dose.values;
-        fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, effect)).filter(is_same)
-    };
-    let mut doses: Vec<Dose> = candidates.baseline.iter().filter_map(|term| kept(term).cloned()).collect();
-    let fresh: Vec<&'static Effect> =
-        next.set.iter().copied().filter(|effect| kept(effect).is_none()).collect();
-    doses.extend(next.set.iter().filter_map(|effect| kept(effect).cloned()));
-    for effect in fresh {
-        let at = candidates.effects.iter().position(|other| std::ptr::eq(*other, effect))?;
-        let values = linear.shapes[at].clone();
-        let values = if is_shaped(effect) {
-            // Refined against what is fitted without it.
-            let rest: Vec<&'static Effect> =
-                next.set.iter().copied().filter(|other| !std::ptr::eq(*other, effect)).collect();
-            let fitted = linear.fitted(&rest);
-            let whitenings = linear.whitenings(&next.noise);
-            let backdrop =
-                Backdrop { scene, design: &linear.design, fitted: &fitted, whitenings: &whitenings };
-            let reference = scene.reference(doses.clone(), &scene.fine)?;
-            shape::refine(effect, &values, &reference, &backdrop).map_or(values, |(refined, _)| refined)
-        } else {
-            values
-        };
-        doses.push(Dose { effect, values });
-    }
-    let fit = refit(scene, doses, Some(&next.noise))?;
-    let white = linear.weighing.white(&fit.residual);
-    next.noise = with_white(&next.noise, &white);
-    let linear = Linear::new(scene, candidates, &fit, &next.noise, Some(before))?;
-    Some((fit, linear, next))
 }
 
 /// A noise with the white noise of another, where that is less: a misfit that a fit has gone through is no noise.

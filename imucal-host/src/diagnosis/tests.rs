@@ -4,18 +4,18 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::{
     Options, Verdict,
-    candidates::{Candidates, Setting},
-    design::Normal,
+    candidates::{Candidates, Setting, is_shaped},
+    design::{Channel, Normal},
     diagnose,
     evidence::Projected,
     footing::Footing,
     linear::Linear,
     noise::FAR,
-    refit::refit,
+    refit::{Fit, refit},
     scene::{Means, Scene},
 };
 use crate::{
-    effect::find,
+    effect::{Effect, find},
     recording::{Recording, SensorKind},
     simulator::{Dose, Programme, Simulation, UnitKind},
 };
@@ -27,7 +27,7 @@ fn simulation(seed: u64) -> Simulation {
 static HEALTHY: LazyLock<Recording> = LazyLock::new(|| simulation(11).record("healthy").unwrap());
 
 /// The problem about a healthy recording's baseline.
-fn with_linear<T>(check: impl FnOnce(&Linear<'_>) -> T) -> T {
+fn with_linear<T>(check: impl FnOnce(Linear<'_>) -> T) -> T {
     let footing = Footing::new(&HEALTHY, None).unwrap();
     let scene = Scene::new(&HEALTHY, footing.usable.clone(), &*footing.movement, footing.triads);
     let setting = Setting {
@@ -46,7 +46,7 @@ fn with_linear<T>(check: impl FnOnce(&Linear<'_>) -> T) -> T {
         .collect();
     let fit = refit(&scene, doses, None).unwrap();
     let noise = Linear::fitted_alone(&scene, &candidates, &fit).unwrap().weighing.white(&fit.residual);
-    check(&Linear::new(&scene, &candidates, &fit, &noise, None).unwrap())
+    check(Linear::new(&scene, &candidates, &fit, &noise, None).unwrap())
 }
 
 #[test]
@@ -62,6 +62,37 @@ fn a_healthy_residual_whitened_by_its_own_noise_has_the_energy_of_noise() {
         let freedom = (3 * counts - n) as f64;
         // Noise in motion is the larger of two estimates: too much of it costs power, too little would cost honesty.
         assert!((0.87..1.03).contains(&(left / freedom)), "{left} of {freedom}");
+    });
+}
+
+#[test]
+fn a_signature_that_lasts_from_one_fit_to_the_next_is_the_one_taken_anew() {
+    with_linear(|linear| {
+        let effect = find("acc.scale_quadratic").unwrap();
+        let zero = |term: &&'static Effect| Dose { effect: term, values: vec![0.0; term.parameters.len()] };
+        let mut doses: Vec<Dose> = linear.candidates.baseline.iter().map(zero).collect();
+        doses.push(Dose { effect, values: effect.parameters.iter().map(|p| p.prior_scale).collect() });
+        let residual = linear.scene.residual(&doses).unwrap();
+        let fit = Fit { doses, residual };
+        let noise = linear.weighing.white(&fit.residual);
+        let about = |before| Linear::new(linear.scene, linear.candidates, &fit, &noise, before).unwrap();
+        let (lasting, anew) = (about(Some(&linear)), about(None));
+        for other in linear.candidates.effects.iter().filter(|other| !is_shaped(other)) {
+            let columns = |linear: &Linear<'_>| -> Vec<f64> {
+                let ids = linear.design.of(other);
+                let of = |channel: &Channel| -> Vec<f64> {
+                    let at = |id: &usize| channel.ids.iter().position(|own| own == id);
+                    ids.iter()
+                        .filter_map(at)
+                        .flat_map(|at| channel.x.column(at).iter().copied().collect::<Vec<_>>())
+                        .collect()
+                };
+                linear.design.channels.iter().flat_map(of).collect()
+            };
+            let (old, new) = (DVector::from_vec(columns(&lasting)), DVector::from_vec(columns(&anew)));
+            let change = (&old - &new).norm() / new.norm();
+            assert!(change < 0.05, "{}: {change}", other.id);
+        }
     });
 }
 
@@ -108,7 +139,7 @@ fn the_twin_of_an_effect_with_its_sign_broken_is_not_explained_by_it() {
             let own = linear.design.of(effect);
             let kept: Vec<usize> = linear.baseline.iter().chain(&own).copied().collect();
             let columns = kept.iter().map(|id| linear.design.columns[*id]).collect();
-            let design = linear.design.extended(&kept, columns, &[twin(linear, &own)]);
+            let design = linear.design.extended(&kept, columns, &[twin(&linear, &own)]);
             let every: Vec<usize> = (0..design.size).collect();
             let normal = design.normal(&whitenings, &every);
             let left = |fitted: usize| {

@@ -25,17 +25,18 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
 }
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {
-    let ratio = run.interval() / values.first().copied().unwrap_or(0.0);
-    let (Some(first), true) = (run.output.first().copied(), ratio.is_finite() && ratio > 0.0) else {
-        return;
-    };
-    let kept = libm::exp(-ratio);
-    let lag = (1.0 - kept) / ratio;
+    let tau = values.first().copied().unwrap_or(0.0);
+    let (Some(first), true) = (run.output.first().copied(), tau > 0.0) else { return };
     let (mut state, mut before) = (first, first);
-    for output in run.output.iter_mut() {
-        state = state * kept + before * (lag - kept) + *output * (1.0 - lag);
-        before = *output;
-        *output = state;
+    for row in 1..run.output.len() {
+        let ratio = run.since_before(row) / tau;
+        if ratio > 0.0 {
+            let kept = libm::exp(-ratio);
+            let lag = (1.0 - kept) / ratio;
+            state = state * kept + before * (lag - kept) + run.output[row] * (1.0 - lag);
+        }
+        before = run.output[row];
+        run.output[row] = state;
     }
 }
 
@@ -51,5 +52,20 @@ mod tests {
         let mut output: Vec<Vector3<f64>> = input.iter().map(|row| Vector3::repeat(row.time)).collect();
         alter(&[0.037], &mut SensorRun { input: &input, sensed: &[], output: &mut output });
         assert!((output[399].x - (3.99 - 0.037)).abs() < 1e-9, "{}", output[399].x);
+    }
+
+    #[test]
+    fn rows_that_are_not_evenly_apart_come_out_late_by_as_much() {
+        let mut input = Input::empty(400);
+        let mut time = 0.0;
+        for (row, input) in input.iter_mut().enumerate() {
+            time += if row % 40 < 4 { 0.25 } else { 0.045 };
+            input.time = time;
+        }
+        let mut output: Vec<Vector3<f64>> = input.iter().map(|row| Vector3::repeat(row.time)).collect();
+        alter(&[0.0006], &mut SensorRun { input: &input, sensed: &[], output: &mut output });
+        for (output, input) in output.iter().zip(&input).skip(1) {
+            assert!((output.x - (input.time - 0.0006)).abs() < 1e-9, "{}", output.x);
+        }
     }
 }

@@ -23,12 +23,23 @@ impl SensorRun<'_> {
         }
     }
 
-    /// Interval between rows, s; 0 below two rows.
-    pub fn interval(&self) -> f64 {
-        match self.input {
-            [first, second, ..] => second.time - first.time,
+    /// Time since the row before, s; 0 for the first. Rows need not be evenly apart.
+    pub fn since_before(&self, row: usize) -> f64 {
+        match (row.checked_sub(1).and_then(|before| self.input.get(before)), self.input.get(row)) {
+            (Some(before), Some(input)) => input.time - before.time,
             _ => 0.0,
         }
+    }
+
+    /// Square of the rate of turn at each row, (rad/s)², as what it heats or shakes follows it within `tau`, s.
+    pub fn squared_rate_within(&self, tau: f64) -> Vec<f64> {
+        let mut power = 0.0;
+        let follow = |(row, input): (usize, &Input)| {
+            let share = 1.0 - libm::exp(-self.since_before(row) / tau);
+            power += share * (input.w_iq_q.norm_squared() - power);
+            power
+        };
+        self.input.iter().enumerate().map(follow).collect()
     }
 }
 

@@ -24,10 +24,6 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {
     let (c, tau) = (vector(values, 0), values.get(3).copied().unwrap_or(1.0));
-    let share = 1.0 - libm::exp(-run.interval() / tau);
-    let mut power = 0.0;
-    for (output, input) in run.output.iter_mut().zip(run.input) {
-        power += share * (input.w_iq_q.norm_squared() - power);
-        *output += c * power;
-    }
+    let power = run.squared_rate_within(tau);
+    run.output.iter_mut().zip(power).for_each(|(output, power)| *output += c * power);
 }

@@ -19,12 +19,13 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {
     let c = vector(values, 0);
-    let (input, interval) = (run.input, run.interval());
+    let input = run.input;
     for (row, output) in run.output.iter_mut().enumerate() {
         let (from, to) = (row.saturating_sub(1), (row + 1).min(input.len() - 1));
-        if to > from && interval > 0.0 {
+        let time = input[to].time - input[from].time;
+        if time > 0.0 {
             let change = input[to].temperature - input[from].temperature;
-            *output += c * (change / (interval * (to - from) as f64));
+            *output += c * (change / time);
         }
     }
 }
