@@ -118,16 +118,28 @@ impl Channel {
         residual
     }
 
-    /// Its normal equations for some of its columns, by their place in `ids`.
-    pub fn normal(&self, whitening: &Whitening, places: &[usize]) -> Normal {
-        let blocks = self.y.len();
-        let mut x = DMatrix::zeros(blocks, places.len() + 1);
+    /// Some of its columns, by their place in `ids`, and its residual.
+    pub fn gathered(&self, places: &[usize]) -> Gathered {
+        let mut x = DMatrix::zeros(self.y.len(), places.len() + 1);
         for (to, from) in places.iter().enumerate() {
             x.set_column(to, &self.x.column(*from));
         }
         x.set_column(places.len(), &self.y);
-        let all = x.transpose() * whitening.apply_all(&x);
-        let n = places.len();
+        Gathered { transposed: x.transpose(), x }
+    }
+}
+
+/// Columns of a channel side by side, the last being its residual.
+pub struct Gathered {
+    x: DMatrix<f64>,
+    transposed: DMatrix<f64>,
+}
+
+impl Gathered {
+    /// Their normal equations.
+    pub fn normal(&self, whitening: &Whitening) -> Normal {
+        let all = &self.transposed * whitening.apply_all(&self.x);
+        let n = self.x.ncols() - 1;
         Normal {
             information: all.view((0, 0), (n, n)).into_owned(),
             score: all.view((0, n), (n, 1)).column(0).into_owned(),
@@ -213,7 +225,7 @@ impl Design {
             .map(|(channel, whitening)| {
                 let (from, to): (Vec<usize>, Vec<usize>) =
                     (0..channel.ids.len()).filter_map(|at| place[channel.ids[at]].map(|to| (at, to))).unzip();
-                (channel.normal(whitening, &from), to)
+                (channel.gathered(&from).normal(whitening), to)
             })
             .collect();
         let mut normal = Normal::zeros(wanted.len());

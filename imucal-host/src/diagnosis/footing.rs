@@ -30,6 +30,8 @@ const SHORTEST: f64 = 30.0;
 
 /// Samples closer to a limit than this many standard deviations of their noise are not used.
 const CLIPPED: f64 = 5.0;
+/// Samples so close in time to one beyond that are left out with it, s.
+const BESIDE: f64 = 0.5;
 
 /// What a diagnosis stands on.
 pub struct Footing {
@@ -156,11 +158,15 @@ fn leave_out(finding: &Finding, recording: &Recording, kind: SensorKind, usable:
         && let (Some(shortfall), Some(full_scale)) =
             (finding.parameters.first().and_then(|amount| amount.value), triple.full_scale_si())
     {
-        // Just below the limit noise is clipped on one side.
-        let limit = full_scale / (1.0 + shortfall);
-        let noise = noise(triple);
-        for (usable, value) in usable.iter_mut().zip(&triple.values) {
-            *usable &= value.amax() < limit - CLIPPED * noise;
+        // Just below the limit noise is clipped on one side; and to choose samples by their noise would be a bias as well.
+        let most = full_scale / (1.0 + shortfall) - CLIPPED * noise(triple);
+        let beyond: Vec<f64> = (triple.values.iter().zip(&recording.time))
+            .filter(|(value, _)| value.amax() >= most)
+            .map(|(_, time)| *time)
+            .collect();
+        for (usable, time) in usable.iter_mut().zip(&recording.time) {
+            let next = beyond.partition_point(|beyond| *beyond < time - BESIDE);
+            *usable &= beyond.get(next).is_none_or(|beyond| *beyond > time + BESIDE);
         }
     }
     if finding.effect.id.ends_with(".noise_burst") {

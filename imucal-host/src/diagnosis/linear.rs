@@ -2,11 +2,13 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use rayon::prelude::*;
+
 use super::{
     candidates::Candidates,
     design::{Design, Normal},
     evidence::Projected,
-    noise::{Noise, Weighing},
+    noise::{Noise, SensorNoise, Weighing},
     refit::{Fit, columns, signatures},
     scan::{Beside, Scan},
     scene::Scene,
@@ -195,9 +197,11 @@ impl<'s> Linear<'s> {
     ) -> Option<Judged> {
         let fitted = self.fitted(set);
         let mut noise = start.clone();
-        for kind in self.scene.kinds.iter().filter(|kind| anew.contains(kind)) {
-            noise.sensors[*kind as usize] = self.weighing.fit(&self.design, *kind, &fitted, start, steps);
-        }
+        let fit = |kind: &SensorKind| self.weighing.fit(&self.design, *kind, &fitted, start, steps);
+        let asked: Vec<SensorKind> =
+            self.scene.kinds.iter().copied().filter(|kind| anew.contains(kind)).collect();
+        let found: Vec<SensorNoise> = asked.par_iter().map(fit).collect();
+        asked.into_iter().zip(found).for_each(|(kind, found)| noise.sensors[kind as usize] = found);
         let whitenings = self.weighing.whitenings(&self.design, &noise);
         let normal = self.design.normal(&whitenings, &fitted);
         let log_evidence = log_evidence(&normal, self.baseline.len(), &self.groups(set, &fitted))?

@@ -1,6 +1,9 @@
 //! Moves of the search: from a set of effects to another that may be likelier.
 
+use rayon::prelude::*;
+
 use super::{
+    candidates::is_shaped,
     linear::{Judged, Linear},
     noise::{NEAR, Noise},
     refit::Fit,
@@ -107,6 +110,10 @@ impl Linear<'_> {
         };
         for at in 0..from.set.len() {
             let (fewer, taken) = without(&from.set, at);
+            // Alone, it was chosen among all others.
+            if fewer.is_empty() {
+                continue;
+            }
             let Some(linear) = self.reshaped(fit, &from.noise, &[taken]) else { continue };
             let moved = |effect: &'static Effect| linear.shape_of(effect) != self.shape_of(effect);
             let sets = linear.replaced(&fewer, self.scene.reach(taken), &moved, &from.noise)?;
@@ -114,7 +121,8 @@ impl Linear<'_> {
         }
         for kind in &self.scene.kinds {
             let (taken, others): (Set, Set) = from.set.iter().partition(|effect| self.reaches(effect, *kind));
-            if taken.len() > 1
+            // A step that was placed in a drift which held the half of it is placed anew where little drifts.
+            if (taken.len() > 1 || taken.iter().any(|effect| is_shaped(effect)))
                 && let Some(linear) = self.reshaped(fit, &from.noise.quieter(), &taken)
             {
                 let quiet = from.noise.quieter();
@@ -145,9 +153,9 @@ impl Linear<'_> {
 
     /// The best of some sets, the noise of the sensors beside each estimated anew.
     fn best_of(&self, sets: Vec<Reaching>, noise: &Noise) -> Option<Judged> {
-        sets.iter()
-            .filter_map(|(set, anew)| self.judge(set, noise, anew, &NEAR))
-            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
+        let judged: Vec<Option<Judged>> =
+            sets.par_iter().map(|(set, anew)| self.judge(set, noise, anew, &NEAR)).collect();
+        judged.into_iter().flatten().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
     }
 
     fn reaches(&self, effect: &Effect, kind: SensorKind) -> bool {

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::{
     block::Block,
-    design::{Channel, Design, Normal},
+    design::{Channel, Design, Gathered, Normal},
     scene::{Means, Scene},
     whitening::{Process, Shared, Whitening},
 };
@@ -304,26 +304,26 @@ impl<'s> Weighing<'s> {
         steps: &[f64],
     ) -> SensorNoise {
         let channels: Vec<&Channel> = design.channels.iter().filter(|channel| channel.kind == kind).collect();
-        let places: Vec<Vec<usize>> = channels
+        let gathered: Vec<(Gathered, Vec<usize>)> = channels
             .iter()
-            .map(|channel| (0..channel.ids.len()).filter(|at| columns.contains(&channel.ids[*at])).collect())
+            .map(|channel| {
+                let place = |id: &usize| columns.iter().position(|column| column == id);
+                let (from, to): (Vec<usize>, Vec<usize>) = (0..channel.ids.len())
+                    .filter_map(|at| place(&channel.ids[at]).map(|to| (at, to)))
+                    .unzip();
+                (channel.gathered(&from), to)
+            })
             .collect();
         let likelihood = |sensor: &SensorNoise| {
             let mut noise = start.clone();
             noise.sensors[kind as usize] = *sensor;
-            let mut normal = Normal::zeros(columns.len());
             let parts: Vec<Normal> = channels
                 .par_iter()
-                .zip(&places)
-                .map(|(channel, places)| channel.normal(&self.whitening(channel, &noise), places))
+                .zip(&gathered)
+                .map(|(channel, (columns, _))| columns.normal(&self.whitening(channel, &noise)))
                 .collect();
-            for ((channel, places), part) in channels.iter().zip(&places).zip(&parts) {
-                let to: Vec<usize> = places
-                    .iter()
-                    .filter_map(|at| columns.iter().position(|column| *column == channel.ids[*at]))
-                    .collect();
-                normal.add(part, &to);
-            }
+            let mut normal = Normal::zeros(columns.len());
+            parts.iter().zip(&gathered).for_each(|(part, (_, to))| normal.add(part, to));
             restricted(&normal)
         };
         let mut best = start.sensors[kind as usize];

@@ -177,9 +177,6 @@ fn improved<'s>(at: &Explained<'s>, most: usize) -> Option<(Option<Judged>, Opti
             return Some((next, quiet));
         }
     }
-    if best.set.len() < 2 {
-        return Some((None, None));
-    }
     match linear.changed_anew(fit, best)?.filter(|(_, next)| gains(next, CHANGE)) {
         Some((anew, next)) => Some((Some(next), Some(anew))),
         None => Some((None, None)),
