@@ -15,7 +15,7 @@ use super::{
     scene::{Means, Scene},
 };
 use crate::{
-    effect::{Effect, find},
+    effect::find,
     recording::{Recording, SensorKind},
     simulator::{Dose, Programme, Simulation, UnitKind},
 };
@@ -28,6 +28,11 @@ static HEALTHY: LazyLock<Recording> = LazyLock::new(|| simulation(11).record("he
 
 /// The problem about a healthy recording's baseline.
 fn with_linear<T>(check: impl FnOnce(Linear<'_>) -> T) -> T {
+    with_fit(|linear, _| check(linear))
+}
+
+/// Likewise, and the fit.
+fn with_fit<T>(check: impl FnOnce(Linear<'_>, &Fit) -> T) -> T {
     let footing = Footing::new(&HEALTHY, None).unwrap();
     let scene = Scene::new(&HEALTHY, footing.usable.clone(), &*footing.movement, footing.triads);
     let setting = Setting {
@@ -46,7 +51,7 @@ fn with_linear<T>(check: impl FnOnce(Linear<'_>) -> T) -> T {
         .collect();
     let fit = refit(&scene, doses, None).unwrap();
     let noise = Linear::fitted_alone(&scene, &candidates, &fit).unwrap().weighing.white(&fit.residual);
-    check(Linear::new(&scene, &candidates, &fit, &noise, None).unwrap())
+    check(Linear::new(&scene, &candidates, &fit, &noise, None).unwrap(), &fit)
 }
 
 #[test]
@@ -67,10 +72,9 @@ fn a_healthy_residual_whitened_by_its_own_noise_has_the_energy_of_noise() {
 
 #[test]
 fn a_signature_that_lasts_from_one_fit_to_the_next_is_the_one_taken_anew() {
-    with_linear(|linear| {
+    with_fit(|linear, fit| {
         let effect = find("acc.scale_quadratic").unwrap();
-        let zero = |term: &&'static Effect| Dose { effect: term, values: vec![0.0; term.parameters.len()] };
-        let mut doses: Vec<Dose> = linear.candidates.baseline.iter().map(zero).collect();
+        let mut doses = fit.doses.clone();
         doses.push(Dose { effect, values: effect.parameters.iter().map(|p| p.prior_scale).collect() });
         let residual = linear.scene.residual(&doses).unwrap();
         let fit = Fit { doses, residual };
@@ -79,15 +83,14 @@ fn a_signature_that_lasts_from_one_fit_to_the_next_is_the_one_taken_anew() {
         let (lasting, anew) = (about(Some(&linear)), about(None));
         for other in linear.candidates.effects.iter().filter(|other| !is_shaped(other)) {
             let columns = |linear: &Linear<'_>| -> Vec<f64> {
-                let ids = linear.design.of(other);
-                let of = |channel: &Channel| -> Vec<f64> {
-                    let at = |id: &usize| channel.ids.iter().position(|own| own == id);
-                    ids.iter()
-                        .filter_map(at)
-                        .flat_map(|at| channel.x.column(at).iter().copied().collect::<Vec<_>>())
-                        .collect()
+                let of = |(id, channel): (usize, &Channel)| -> Vec<f64> {
+                    let at = channel.ids.iter().position(|own| *own == id);
+                    at.map_or(vec![0.0; channel.y.len()], |at| channel.x.column(at).iter().copied().collect())
                 };
-                linear.design.channels.iter().flat_map(of).collect()
+                let ids = linear.design.of(other).into_iter();
+                ids.flat_map(|id| linear.design.channels.iter().map(move |channel| (id, channel)))
+                    .flat_map(of)
+                    .collect()
             };
             let (old, new) = (DVector::from_vec(columns(&lasting)), DVector::from_vec(columns(&anew)));
             let change = (&old - &new).norm() / new.norm();
