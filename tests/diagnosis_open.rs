@@ -1,5 +1,7 @@
 //! Recordings by an independent simulator whose effects are known: the diagnosis names them, and no others.
 
+use std::sync::OnceLock;
+
 use imucal_host::{
     diagnosis::{Diagnosis, Options, Verdict, diagnose},
     recording::Recording,
@@ -7,14 +9,18 @@ use imucal_host::{
 use imucal_tests::data;
 use serde_json::Value;
 
+/// Each is made once.
+static DIAGNOSES: [OnceLock<Diagnosis>; 12] = [const { OnceLock::new() }; 12];
+
 /// A recording's diagnosis and its label; `None` without the data.
-fn open(number: u32) -> Option<(Diagnosis, Value)> {
+fn open(number: usize) -> Option<(&'static Diagnosis, Value)> {
     let folder = data::folder()?.join("blind");
-    let recording =
-        Recording::read(&folder.join(format!("open-{number:02}.csv.gz"))).expect("a good recording");
     let label =
         std::fs::read_to_string(folder.join(format!("open-{number:02}.label.json"))).expect("a label");
-    let diagnosis = diagnose(&recording, &Options::default(), &|_| ());
+    let diagnosis = DIAGNOSES[number - 1].get_or_init(|| {
+        let path = folder.join(format!("open-{number:02}.csv.gz"));
+        diagnose(&Recording::read(&path).expect("a good recording"), &Options::default(), &|_| ())
+    });
     Some((diagnosis, serde_json::from_str(&label).expect("JSON")))
 }
 
@@ -36,7 +42,7 @@ fn the_effects_of_the_labelled_recordings_are_named_and_no_others() {
     for number in 1..=12 {
         let Some((diagnosis, label)) = open(number) else { return };
         let effects = label["effects"].as_object().expect("a map");
-        let found = names(&diagnosis);
+        let found = names(diagnosis);
         if effects.contains_key("outside the catalogue") {
             let honest = matches!(diagnosis.verdict, Verdict::Unknown | Verdict::Partly);
             assert!(honest && found.is_empty(), "{number}: {:?} {found:?}", diagnosis.verdict);
@@ -62,14 +68,14 @@ fn the_size_of_what_is_named_is_that_of_the_label() {
     let truth = label["effects"]["mag.gimbal_hard_iron_outer"].as_array().expect("a vector");
     // Along the outer axis it is the field's own vertical part, which the sensor's K shares in.
     for (axis, name) in ["x", "y"].iter().enumerate() {
-        let (value, error) = amount(&outer, "mag.gimbal_hard_iron_outer", name);
+        let (value, error) = amount(outer, "mag.gimbal_hard_iron_outer", name);
         let truth = truth[axis].as_f64().expect("a number");
         assert!((value - truth).abs() < 4.0 * error, "{name}: {value} ± {error}, {truth}");
         assert!(error < 0.02, "{name}: ± {error}");
     }
     let Some((late, label)) = open(6) else { return };
     let truth = label["effects"]["clk.time_offset"].as_f64().expect("a number");
-    let (value, _) = amount(&late, "clk.time_offset", "offset");
+    let (value, _) = amount(late, "clk.time_offset", "offset");
     assert!((value - truth).abs() < 1e-4, "{value} against {truth}");
 }
 
