@@ -71,6 +71,24 @@ fn a_healthy_residual_whitened_by_its_own_noise_has_the_energy_of_noise() {
 }
 
 #[test]
+fn samples_beside_clipped_ones_are_left_out_whatever_their_own_noise() {
+    let mut simulation = simulation(7);
+    let full_scale = HEALTHY.acc.as_ref().unwrap().full_scale_si().unwrap();
+    let effect = find("acc.saturation").unwrap();
+    simulation.doses.push(Dose { effect, values: vec![full_scale / 9.5 - 1.0] });
+    let recording = simulation.record("clipped").unwrap();
+    let footing = Footing::new(&recording, None).unwrap();
+    let (values, usable) =
+        (&recording.acc.as_ref().unwrap().values, &footing.usable[SensorKind::Acc as usize]);
+    let clipped: Vec<f64> =
+        values.iter().zip(&recording.time).filter(|(v, _)| v.amax() > 9.49).map(|(_, t)| *t).collect();
+    assert!(!clipped.is_empty() && usable.iter().any(|usable| *usable));
+    for (time, _) in recording.time.iter().zip(usable).filter(|(_, usable)| **usable) {
+        assert!(clipped.iter().all(|clipped| (clipped - time).abs() > 0.5), "{time} s");
+    }
+}
+
+#[test]
 fn a_signature_that_lasts_from_one_fit_to_the_next_is_the_one_taken_anew() {
     with_fit(|linear, fit| {
         let effect = find("acc.scale_quadratic").unwrap();
