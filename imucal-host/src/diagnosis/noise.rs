@@ -22,8 +22,10 @@ use super::{
 };
 use crate::recording::SensorKind;
 
-/// Correlation times of the two drifts, s.
-const TIMES: [f64; 2] = [8.0, 120.0];
+/// Correlation time of the fast drift, s.
+const FAST: f64 = 8.0;
+/// Correlation times that the slow drift may have, s: a walk forgets nothing while it is recorded.
+const SLOW: [f64; 2] = [120.0, 1200.0];
 /// Factors of a search that begins anywhere.
 pub const FAR: [f64; 2] = [4.0, 1.7];
 /// Factors of a search that begins near its end.
@@ -46,6 +48,8 @@ pub struct SensorNoise {
     pub moving: [f64; 3],
     /// Standard deviations of the fast and the slow drift.
     pub drift: [f64; 2],
+    /// Correlation time of the slow drift, s.
+    pub slow: f64,
     /// Angle by which a rest stands off its encoders, rad.
     pub scatter: f64,
 }
@@ -114,7 +118,7 @@ impl<'s> Weighing<'s> {
             let white = self.still(kind, residual);
             let moving = self.moving(kind, residual, &white);
             let typical = white.iter().fold(0.0f64, |a, b| a.max(*b));
-            SensorNoise { white, moving, drift: [0.05 * typical, 0.1 * typical], scatter }
+            SensorNoise { white, moving, drift: [0.05 * typical, 0.1 * typical], slow: SLOW[0], scatter }
         });
         Noise { sensors }
     }
@@ -288,8 +292,11 @@ impl<'s> Weighing<'s> {
                 from = at;
             }
         }
-        let drifts: Vec<Process> =
-            TIMES.iter().zip(sensor.drift).map(|(time, sigma)| Process { time: *time, sigma }).collect();
+        let drifts: Vec<Process> = [FAST, sensor.slow]
+            .into_iter()
+            .zip(sensor.drift)
+            .map(|(time, sigma)| Process { time, sigma })
+            .collect();
         Whitening::new(&self.times, weights, &rests, &drifts)
     }
 
@@ -334,6 +341,12 @@ impl<'s> Weighing<'s> {
             while improved && rounds < ROUNDS {
                 improved = false;
                 rounds += 1;
+                for tried in best.otherwise_slow() {
+                    let found = likelihood(&tried);
+                    if found < least - 0.05 {
+                        (best, least, improved) = (tried, found, true);
+                    }
+                }
                 for coordinate in 0..if kind == SensorKind::Gyr { 2 } else { 3 } {
                     for step in [*factor, 1.0 / factor] {
                         loop {
@@ -361,6 +374,15 @@ impl<'s> Weighing<'s> {
 }
 
 impl SensorNoise {
+    /// With other correlation times of the slow drift, which goes as far from one moment to the next.
+    fn otherwise_slow(self) -> impl Iterator<Item = Self> {
+        let with = move |slow: f64| {
+            let drift = [self.drift[0], self.drift[1] * libm::sqrt(slow / self.slow)];
+            Self { slow, drift, ..self }
+        };
+        SLOW.into_iter().filter(move |slow| *slow != self.slow).map(with)
+    }
+
     fn coordinate(&mut self, index: usize) -> &mut f64 {
         match index {
             0 | 1 => &mut self.drift[index],

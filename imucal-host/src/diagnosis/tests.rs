@@ -17,7 +17,7 @@ use super::{
 use crate::{
     effect::find,
     recording::{Recording, SensorKind},
-    simulator::{Dose, Programme, Simulation, UnitKind},
+    simulator::{Dose, DriftKind, NoiseLevel, Programme, Simulation, UnitKind},
 };
 
 fn simulation(seed: u64) -> Simulation {
@@ -28,13 +28,13 @@ static HEALTHY: LazyLock<Recording> = LazyLock::new(|| simulation(11).record("he
 
 /// The problem about a healthy recording's baseline.
 fn with_linear<T>(check: impl FnOnce(Linear<'_>) -> T) -> T {
-    with_fit(|linear, _| check(linear))
+    with_fit(&HEALTHY, |linear, _| check(linear))
 }
 
 /// Likewise, and the fit.
-fn with_fit<T>(check: impl FnOnce(Linear<'_>, &Fit) -> T) -> T {
-    let footing = Footing::new(&HEALTHY, None).unwrap();
-    let scene = Scene::new(&HEALTHY, footing.usable.clone(), &*footing.movement, footing.triads);
+fn with_fit<T>(recording: &Recording, check: impl FnOnce(Linear<'_>, &Fit) -> T) -> T {
+    let footing = Footing::new(recording, None).unwrap();
+    let scene = Scene::new(recording, footing.usable.clone(), &*footing.movement, footing.triads);
     let setting = Setting {
         kinds: &scene.kinds,
         thermometer: true,
@@ -71,6 +71,24 @@ fn a_healthy_residual_whitened_by_its_own_noise_has_the_energy_of_noise() {
 }
 
 #[test]
+fn a_drift_that_forgets_nothing_is_told_from_one_that_does() {
+    for (kind, forgets) in [(DriftKind::Walk, false), (DriftKind::Quick, true)] {
+        let mut simulation = simulation(5);
+        simulation.conditions.noise.fill(NoiseLevel { drift: 3.0, kind, ..NoiseLevel::default() });
+        let recording = simulation.record("drifting").unwrap();
+        with_fit(&recording, |linear, fit| {
+            let white = linear.weighing.white(&fit.residual);
+            let noise = linear.judge(&[], &white, &SensorKind::ALL, &FAR).unwrap().noise;
+            // The gyroscope's drift is hardly more than its white noise here.
+            for sensor in [SensorKind::Acc, SensorKind::Mag] {
+                let slow = noise.sensors[sensor as usize].slow;
+                assert_eq!(slow < linear.scene.duration(), forgets, "{kind:?} {noise:?}");
+            }
+        });
+    }
+}
+
+#[test]
 fn samples_beside_clipped_ones_are_left_out_whatever_their_own_noise() {
     let mut simulation = simulation(7);
     let full_scale = HEALTHY.acc.as_ref().unwrap().full_scale_si().unwrap();
@@ -90,7 +108,7 @@ fn samples_beside_clipped_ones_are_left_out_whatever_their_own_noise() {
 
 #[test]
 fn a_signature_that_lasts_from_one_fit_to_the_next_is_the_one_taken_anew() {
-    with_fit(|linear, fit| {
+    with_fit(&HEALTHY, |linear, fit| {
         let effect = find("acc.scale_quadratic").unwrap();
         let mut doses = fit.doses.clone();
         doses.push(Dose { effect, values: effect.parameters.iter().map(|p| p.prior_scale).collect() });
