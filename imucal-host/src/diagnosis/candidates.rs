@@ -1,5 +1,6 @@
 //! Terms of the baseline and effects that may explain what it leaves.
 
+use super::shape::Shaped;
 use crate::{
     effect::{Act, CATALOGUE, Effect, NUISANCES, Role},
     recording::SensorKind,
@@ -101,9 +102,9 @@ impl Candidates {
     }
 
     /// An effect's parameters among those of all candidates, in their order; none for a term of the baseline.
-    pub fn shape(&self, shapes: &[Vec<f64>], effect: &Effect) -> Vec<f64> {
+    pub fn shape(&self, shapes: &[Shaped], effect: &Effect) -> Vec<f64> {
         let at = self.effects.iter().position(|other| std::ptr::eq(*other, effect));
-        at.and_then(|at| shapes.get(at).cloned()).unwrap_or_default()
+        at.and_then(|at| shapes.get(at)).map(|shape| shape.values.clone()).unwrap_or_default()
     }
 }
 

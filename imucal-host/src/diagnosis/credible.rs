@@ -16,7 +16,7 @@ const CREDIBLE: f64 = 0.95;
 /// A cause among those that could stand in its place.
 #[derive(Clone, Debug)]
 pub struct Standing {
-    /// Its probability.
+    /// Its probability, among all that could stand in its place and nothing at all.
     pub probability: f64,
     /// The others of the credible set, likeliest first.
     pub equivalents: Vec<&'static Effect>,
@@ -39,7 +39,9 @@ pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> O
         best.set.iter().copied().filter(|effect| !std::ptr::eq(*effect, cause)).collect();
     let (_, ranked) = linear.ranked(&rest, &best.noise)?;
     let own = ranked.iter().find(|(_, effect)| std::ptr::eq(*effect, cause))?.0;
-    let mut judged: Vec<(f64, &'static Effect)> = vec![(best.log_evidence, cause)];
+    let none = linear.judge(&rest, &best.noise, linear.scene.reach(cause), &NEAR)?;
+    let mut judged: Vec<(f64, Option<&'static Effect>)> =
+        vec![(best.log_evidence, Some(cause)), (none.log_evidence, None)];
     let others = ranked.iter().filter(|(value, effect)| !std::ptr::eq(*effect, cause) && *value > own - FAR);
     for (_, effect) in others.take(JUDGED) {
         let mut set = rest.clone();
@@ -47,7 +49,7 @@ pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> O
         let anew: Vec<_> =
             linear.scene.reach(cause).iter().chain(linear.scene.reach(effect)).copied().collect();
         if let Some(found) = linear.judge(&set, &best.noise, &anew, &NEAR) {
-            judged.push((found.log_evidence, effect));
+            judged.push((found.log_evidence, Some(effect)));
         }
     }
     judged.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -58,7 +60,7 @@ pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> O
     let mut held = 0.0;
     for (value, effect) in &judged {
         if held < CREDIBLE {
-            set.push(*effect);
+            set.extend(*effect);
         }
         held += probability(*value);
     }

@@ -129,7 +129,7 @@ fn information<'m>(
     let columns = linear.design.columns.clone();
     let shape = |effect: &'static Effect| {
         let at = linear.candidates.effects.iter().position(|other| std::ptr::eq(*other, effect));
-        at.and_then(|at| linear.shapes.get(at).cloned()).unwrap_or_default()
+        at.and_then(|at| linear.shapes.get(at)).map(|shape| shape.values.clone()).unwrap_or_default()
     };
     let means = signatures(&reference, &columns, &shape)?;
     let design = Design::new(&scene, columns, &means, &Default::default());

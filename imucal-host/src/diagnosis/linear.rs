@@ -12,7 +12,7 @@ use super::{
     refit::{Fit, columns, signatures},
     scan::{Beside, Scan},
     scene::Scene,
-    shape,
+    shape::{self, Shaped},
     whitening::Whitening,
 };
 use crate::{
@@ -47,8 +47,8 @@ pub struct Linear<'s> {
     pub weighing: Weighing<'s>,
     /// Columns of the baseline.
     pub baseline: Vec<usize>,
-    /// Parameters of each candidate at which its signature was taken.
-    pub shapes: Vec<Vec<f64>>,
+    /// Where each candidate's signature was taken.
+    pub shapes: Vec<Shaped>,
     scan: Scan<'s>,
     /// Effects of the fit beside the baseline.
     held: Vec<Dose>,
@@ -62,7 +62,8 @@ impl<'s> Linear<'s> {
     /// About a fit, with its columns alone: nothing can be added.
     pub fn fitted_alone(scene: &'s Scene<'s>, candidates: &'s Candidates, fit: &Fit) -> Option<Self> {
         let reference = scene.reference(fit.doses.clone(), &scene.fine)?;
-        let shapes = candidates.effects.iter().map(|effect| effect.neutral(scene.duration())).collect();
+        let neutral = |effect: &&'static Effect| Shaped::alone(effect.neutral(scene.duration()));
+        let shapes = candidates.effects.iter().map(neutral).collect();
         let columns = columns(&fit.doses.iter().map(|dose| dose.effect).collect::<Vec<_>>());
         let means = signatures(&reference, &columns, &|_| Vec::new())?;
         let design = Design::new(scene, columns, &means, &fit.residual);
@@ -87,10 +88,10 @@ impl<'s> Linear<'s> {
         let beside =
             Beside { doses: &fit.doses, weighing: &alone.weighing, design: &alone.design, fitted: &every };
         let lasts = |effect: &Effect| before.is_some_and(|before| before.lasts(effect, fit));
-        let kept = |at: usize, effect: &Effect| {
-            before.filter(|_| lasts(effect)).and_then(|before| before.shapes.get(at).cloned())
-        };
-        let shapes = scan.shapes(&beside, noise, &kept)?;
+        let known = |at: usize| before.and_then(|before| before.shapes.get(at));
+        let spread = |at: usize| known(at).map_or(0.0, |shape| shape.spread);
+        let kept = |at: usize| known(at).filter(|_| lasts(candidates.effects[at])).cloned();
+        let shapes = scan.shapes(&beside, noise, &spread, &kept)?;
         let (old, new): (Vec<&'static Effect>, Vec<&'static Effect>) =
             candidates.effects.iter().copied().partition(|effect| {
                 lasts(effect) && fit.doses.iter().all(|dose| !std::ptr::eq(dose.effect, *effect))
@@ -116,7 +117,7 @@ impl<'s> Linear<'s> {
         fit: &Fit,
         design: Design,
         weighing: Weighing<'s>,
-        shapes: Vec<Vec<f64>>,
+        shapes: Vec<Shaped>,
     ) -> Self {
         let baseline = candidates.baseline.iter().flat_map(|term| design.of(term)).collect();
         let held = fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect)).cloned().collect();
@@ -151,15 +152,16 @@ impl<'s> Linear<'s> {
             let reached = |kind| without.iter().any(|taken| self.scene.reach(taken).contains(kind));
             without.is_empty() || self.scene.reach(effect).iter().any(reached)
         };
+        let spread = |at: usize| self.shapes[at].spread;
         let kept =
-            |at: usize, effect: &Effect| if meets(effect) { None } else { self.shapes.get(at).cloned() };
-        let shapes = self.scan.shapes(&beside, noise, &kept)?;
+            |at: usize| Some(&self.shapes[at]).filter(|_| !meets(self.candidates.effects[at])).cloned();
+        let shapes = self.scan.shapes(&beside, noise, &spread, &kept)?;
         let others: Vec<&'static Effect> = self
             .candidates
             .effects
             .iter()
             .zip(self.shapes.iter().zip(&shapes))
-            .filter(|(_, (own, other))| own != other)
+            .filter(|(_, (own, other))| own.values != other.values)
             .map(|(effect, _)| *effect)
             .collect();
         if others.is_empty() {
@@ -204,7 +206,7 @@ impl<'s> Linear<'s> {
         asked.into_iter().zip(found).for_each(|(kind, found)| noise.sensors[kind as usize] = found);
         let whitenings = self.weighing.whitenings(&self.design, &noise);
         let normal = self.design.normal(&whitenings, &fitted);
-        let log_evidence = log_evidence(&normal, self.baseline.len(), &self.groups(set, &fitted))?
+        let log_evidence = log_evidence(&normal, &noise, self.baseline.len(), &self.groups(set, &fitted))?
             - set.iter().map(|effect| self.surprise(effect)).sum::<f64>();
         Some(Judged { set: set.to_vec(), noise, log_evidence })
     }
@@ -217,10 +219,12 @@ impl<'s> Linear<'s> {
         set.iter().map(of).collect()
     }
 
-    /// −ln of an effect's prior: one of the candidates, in one of its shapes.
+    /// −ln of an effect's prior: one of the candidates, in one of its shapes or such as are as likely.
     fn surprise(&self, effect: &Effect) -> f64 {
-        let shapes = shape::choices(effect, self.scene.duration());
-        ((self.candidates.effects.len() * shapes) as f64).ln()
+        let at = self.candidates.effects.iter().position(|other| std::ptr::eq(*other, effect));
+        let spread = at.map_or(0.0, |at| self.shapes[at].spread);
+        let shapes = (shape::choices(effect, self.scene.duration()) as f64).ln();
+        (self.candidates.effects.len() as f64).ln() + (shapes - spread).max(0.0)
     }
 
     /// Σ⁻¹ of each channel.
@@ -310,9 +314,9 @@ fn restore<'d>(design: &mut Design, doses: impl Iterator<Item = &'d Dose>) {
     design.restore(&restored);
 }
 
-/// ln of the probability of the data, but for a constant: columns of the baseline come first, then `groups` of columns,
-/// each an effect or what may stand for one.
-pub fn log_evidence(normal: &Normal, baseline: usize, groups: &[Vec<usize>]) -> Option<f64> {
+/// ln of the probability of the data and of the noise that they are weighed by, but for a constant: columns of the
+/// baseline come first, then `groups` of columns, each an effect or what may stand for one.
+pub fn log_evidence(normal: &Normal, noise: &Noise, baseline: usize, groups: &[Vec<usize>]) -> Option<f64> {
     let first: Vec<usize> = (0..baseline).collect();
     let others: Vec<usize> = (baseline..normal.score.len()).collect();
     let projected = Projected::new(normal, &first, &others)?;
@@ -324,5 +328,5 @@ pub fn log_evidence(normal: &Normal, baseline: usize, groups: &[Vec<usize>]) -> 
         score: normal.score.rows(0, baseline).into_owned(),
         ..normal.clone()
     };
-    Some(projected.log_bayes_factor(&parts) - 0.5 * super::noise::restricted(&alone))
+    Some(projected.log_bayes_factor(&parts) - 0.5 * super::noise::restricted(&alone) - noise.surprise())
 }

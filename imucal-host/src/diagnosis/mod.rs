@@ -24,6 +24,7 @@ pub mod orientation;
 pub mod refit;
 pub mod revisits;
 mod scan;
+pub mod scatter;
 pub mod scene;
 pub mod search;
 pub mod shape;
@@ -31,6 +32,7 @@ mod skyline;
 pub mod start;
 pub mod testable;
 mod unsteady;
+mod white;
 pub mod whitening;
 
 pub use self::finding::{Diagnosis, Verdict};

@@ -7,7 +7,7 @@ use super::{
     design::Design,
     noise::{Noise, Weighing},
     scene::{Reference, Scene},
-    shape::{self, Backdrop},
+    shape::{self, Backdrop, Shaped},
 };
 use crate::{effect::Effect, simulator::Dose};
 
@@ -38,14 +38,15 @@ impl<'s> Scan<'s> {
         Some(Self { scene, candidates, coarse: Arc::new(scene.reference(doses, &scene.coarse)?) })
     }
 
-    /// The shape of each candidate that is best under a noise; that of the doses for those they hold, and what `kept`
-    /// tells of others.
+    /// The shape of each candidate that is best under a noise; that of the doses for those they hold, as widely `spread`
+    /// as it was when it was found, and what `kept` tells of others.
     pub fn shapes(
         &self,
         beside: &Beside<'_>,
         noise: &Noise,
-        kept: &dyn Fn(usize, &Effect) -> Option<Vec<f64>>,
-    ) -> Option<Vec<Vec<f64>>> {
+        spread: &dyn Fn(usize) -> f64,
+        kept: &dyn Fn(usize) -> Option<Shaped>,
+    ) -> Option<Vec<Shaped>> {
         let (scene, design) = (self.scene, beside.design);
         let whitenings = beside.weighing.whitenings(design, noise);
         // Where no rig guides the sensor, what a hand adds hides when an episode began and ended.
@@ -59,16 +60,20 @@ impl<'s> Scan<'s> {
             let backdrop = Backdrop { scene, design, fitted: beside.fitted, whitenings };
             let best = shape::best(effect, &self.coarse, &backdrop)?;
             match quiet {
-                Some(_) => Some(shape::refine(effect, &best, &self.coarse, &backdrop)?.0),
+                Some(_) => {
+                    let (values, _) = shape::refine(effect, &best.values, &self.coarse, &backdrop)?;
+                    Some(Shaped { values, ..best })
+                }
                 None => Some(best),
             }
         };
         let shape = |(at, effect): (usize, &&'static Effect)| {
             let held = beside.doses.iter().find(|dose| std::ptr::eq(dose.effect, *effect));
-            match held.map(|dose| dose.values.clone()).or_else(|| kept(at, effect)) {
+            let held = held.map(|dose| Shaped { values: dose.values.clone(), spread: spread(at) });
+            match held.or_else(|| kept(at)) {
                 Some(shape) => Some(shape),
                 None if is_shaped(effect) => best(effect),
-                None => Some(effect.neutral(scene.duration())),
+                None => Some(Shaped::alone(effect.neutral(scene.duration()))),
             }
         };
         self.candidates.effects.iter().enumerate().map(shape).collect()

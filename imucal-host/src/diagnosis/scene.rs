@@ -14,6 +14,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::{
     block::{Block, cut},
     hand::{Held, View},
+    scatter::Turned,
     unsteady,
 };
 use crate::{
@@ -106,6 +107,8 @@ pub struct Scene<'a> {
     pub fine: Nodes,
     /// One node a block: to look where in time an effect without memory lies.
     pub coarse: Nodes,
+    /// What the outputs are turned by when the gimbals stand off their encoders.
+    pub turned: Turned,
 }
 
 impl<'a> Scene<'a> {
@@ -149,6 +152,7 @@ impl<'a> Scene<'a> {
             triads,
             fine,
             coarse,
+            turned: Turned::default(),
         }
     }
 

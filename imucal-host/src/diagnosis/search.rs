@@ -20,7 +20,7 @@ const MOST: (usize, usize) = (3, 5);
 /// The first effect must raise the evidence by this, beyond its share of the prior, and each further one by the latter:
 /// where one thing is wrong, another is less of a surprise. False alarms are fewer by far than one in seven
 /// (`imucal blind`), since the noise is estimated for each set.
-const GAIN: (f64, f64) = (2.0, 1.0);
+const GAIN: (f64, f64) = (1.0, 0.5);
 /// A set of no more effects must raise it by this.
 const CHANGE: f64 = 0.5;
 /// Fits of the baseline, each with the noise that the last one left, where no rig guides the sensor.
@@ -73,18 +73,23 @@ pub fn search<'s>(
     let mut likeliest: Option<Explained<'s>> = None;
     let mut seen = Vec::new();
     loop {
-        at.best = at.linear.judge(&at.best.set, &at.best.noise, &SensorKind::ALL, &FAR)?;
+        at = at.settled()?;
         let (next, elsewhere) = improved(&at, most)?;
         // Two sets may each be better than the other with the noise that the other leaves; a set may be better once in
         // shapes of another place.
         let visits = if elsewhere.is_some() { 2 } else { 1 };
         let is_new = |judged: &Judged| seen.iter().filter(|set| **set == key(&judged.set)).count() < visits;
-        let Some(next) = next.filter(is_new) else { break };
+        let Some(next) = next else { break };
+        let comes_round = !is_new(&next);
         seen.push(key(&next.set));
         let names: Vec<&str> = next.set.iter().map(|effect| effect.id.as_str()).collect();
         trace(&format!("{:.1} → {:.1} {names:?}", at.best.log_evidence, next.log_evidence));
         let next = at.advanced(elsewhere.as_ref().unwrap_or(&at.linear), next)?;
         trace("refitted");
+        if comes_round {
+            // The fit of the other set has not kept what its linear problem promised.
+            return next.settled();
+        }
         let left = std::mem::replace(&mut at, next);
         if likeliest.as_ref().is_none_or(|most| left.is_likelier(most)) {
             likeliest = Some(left);
@@ -95,6 +100,12 @@ pub fn search<'s>(
 }
 
 impl<'s> Explained<'s> {
+    /// With the noise that suits its set.
+    fn settled(mut self) -> Option<Self> {
+        self.best = self.linear.judge(&self.best.set, &self.best.noise, &SensorKind::ALL, &FAR)?;
+        Some(self)
+    }
+
     fn is_likelier(&self, other: &Self) -> bool {
         self.best.log_evidence > other.best.log_evidence
     }

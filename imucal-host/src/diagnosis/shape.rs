@@ -33,23 +33,41 @@ pub struct Backdrop<'a> {
     pub whitenings: &'a [Whitening],
 }
 
-/// The most evident shape of an effect: all its parameters, amplitudes zero. `None` where no shape can be judged.
-pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backdrop<'_>) -> Option<Vec<f64>> {
+/// A shape of an effect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shaped {
+    /// All its parameters, amplitudes zero.
+    pub values: Vec<f64>,
+    /// ln of the number of shapes that are as likely: the sum over the menu, as shares of the likeliest.
+    pub spread: f64,
+}
+
+impl Shaped {
+    /// The only one.
+    pub fn alone(values: Vec<f64>) -> Self {
+        Self { values, spread: 0.0 }
+    }
+}
+
+/// The most evident shape of an effect. `None` where no shape can be judged.
+pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backdrop<'_>) -> Option<Shaped> {
     let duration = backdrop.scene.duration();
     if is_episode(effect) {
         return episode(effect, reference, backdrop, duration);
     }
     let menu = menu(effect, duration);
-    let mut best: Option<(f64, Vec<f64>)> = None;
+    let mut judged = Vec::with_capacity(menu.len());
     for shapes in menu.chunks(BATCH) {
-        let judged = judge(effect, shapes, reference, backdrop)?;
-        for (value, shape) in judged.into_iter().zip(shapes) {
-            if best.as_ref().is_none_or(|(most, _)| value > *most) {
-                best = Some((value, shape.clone()));
-            }
-        }
+        judged.extend(judge(effect, shapes, reference, backdrop)?);
     }
-    best.map(|(_, shape)| shape)
+    let best = (0..menu.len()).max_by(|a, b| judged[*a].total_cmp(&judged[*b]))?;
+    Some(Shaped { values: menu[best].clone(), spread: spread(&judged) })
+}
+
+/// ln Σ e^(v − v_max).
+fn spread(values: &[f64]) -> f64 {
+    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    values.iter().map(|value| (value - most).exp()).sum::<f64>().ln()
 }
 
 /// It begins and ends.
@@ -160,17 +178,17 @@ fn episode(
     reference: &Reference<'_>,
     backdrop: &Backdrop<'_>,
     duration: f64,
-) -> Option<Vec<f64>> {
+) -> Option<Shaped> {
     let step = GRID.0.max(GRID.1 * duration);
     let all: Vec<f64> = (1..(duration / step) as usize).map(|k| step * k as f64).collect();
-    let (start, end) = pair(effect, reference, backdrop, &all, &all)?;
+    let ((start, end), spread) = pair(effect, reference, backdrop, &all, &all)?;
     let about = |instant: f64| -> Vec<f64> {
         let closer = (1 - CLOSER..CLOSER).map(|k| instant + step * f64::from(k) / f64::from(CLOSER));
         closer.filter(|time| (0.0..duration).contains(time)).collect()
     };
     let ends = if end.is_finite() { about(end) } else { Vec::new() };
-    let (start, end) = pair(effect, reference, backdrop, &about(start), &ends)?;
-    Some(placed(effect, duration, start, end))
+    let ((start, end), _) = pair(effect, reference, backdrop, &about(start), &ends)?;
+    Some(Shaped { values: placed(effect, duration, start, end), spread })
 }
 
 /// Its parameters with these instants, s.
@@ -182,14 +200,15 @@ fn placed(effect: &Effect, duration: f64, start: f64, end: f64) -> Vec<f64> {
     shape
 }
 
-/// The most evident beginning and end of those given; an end that never comes is among them.
+/// The most evident beginning and end of those given, an end that never comes among them, and ln of how many are as
+/// likely.
 fn pair(
     effect: &'static Effect,
     reference: &Reference<'_>,
     backdrop: &Backdrop<'_>,
     starts: &[f64],
     ends: &[f64],
-) -> Option<(f64, f64)> {
+) -> Option<((f64, f64), f64)> {
     let mut times: Vec<f64> = starts.iter().chain(ends).copied().collect();
     times.sort_by(f64::total_cmp);
     times.dedup();
@@ -197,18 +216,17 @@ fn pair(
         times.iter().map(|time| placed(effect, backdrop.scene.duration(), *time, f64::INFINITY)).collect();
     let (projected, each) = project(effect, &shapes, reference, backdrop)?;
     let own: Vec<usize> = (0..each).collect();
-    let mut best: Option<(f64, (f64, f64))> = None;
+    let (mut values, mut pairs) = (Vec::new(), Vec::new());
     for (i, start) in times.iter().enumerate().filter(|(_, time)| starts.contains(time)) {
         let later = (i + 1..times.len()).filter(|j| ends.contains(&times[*j]));
         for j in later.map(Some).chain([None]) {
             let pair = projected.combined(&places(i, each), j.map(|j| places(j, each)).as_deref());
-            let value = pair.log_bayes_factor(&[&own]);
-            if best.is_none_or(|(most, _)| value > most) {
-                best = Some((value, (*start, j.map_or(f64::INFINITY, |j| times[j]))));
-            }
+            values.push(pair.log_bayes_factor(&[&own]));
+            pairs.push((*start, j.map_or(f64::INFINITY, |j| times[j])));
         }
     }
-    best.map(|(_, pair)| pair)
+    let best = (0..pairs.len()).max_by(|a, b| values[*a].total_cmp(&values[*b]))?;
+    Some((pairs[best], spread(&values)))
 }
 
 /// Improves a shape by steps that are halved, and tells how far each parameter may move before the evidence falls by a

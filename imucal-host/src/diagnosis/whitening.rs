@@ -1,17 +1,17 @@
 //! The covariance of a channel's block means, and its inverse.
 //!
 //! ```text
-//! Σ = D + Σ_r v_r 1_r 1_rᵀ + Z K Zᵀ
+//! Σ = D + Σ_r U_r U_rᵀ + Z K Zᵀ
 //! ```
 //!
 //! | symbol | meaning |
 //! | --- | --- |
 //! | D | white noise of each block mean |
-//! | v_r | variance of what a rest r has in common: the table stands off its encoders |
+//! | U_r | what a stretch r has in common, a column for each way the table may stand off its encoders |
 //! | K | drift: first-order Gauss–Markov processes, at knots |
 //! | Z | straight lines between knots |
 //!
-//! By Woodbury's identity, twice: what a rest has in common first, the knots after it. Not modelled: drift within the
+//! By Woodbury's identity, twice: what stretches have in common first, column by column, the knots after it. Not modelled: drift within the
 //! distance of two knots, what the axes of a triad have in common.
 
 use std::ops::Range;
@@ -34,13 +34,30 @@ pub struct Process {
     pub sigma: f64,
 }
 
-/// Blocks of one rest and the variance of what they share.
+/// Blocks of one stretch and what they share: random numbers of variance one times these courses.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shared {
     /// Blocks, consecutive.
     pub blocks: Range<usize>,
-    /// Variance, channel's unit squared.
-    pub variance: f64,
+    /// A value for each of the blocks, channel's unit.
+    pub courses: Vec<Vec<f64>>,
+}
+
+/// Most courses of a stretch: one for each gimbal.
+const COURSES: usize = 3;
+
+/// Blocks of one stretch and B, such that (D + U Uᵀ)⁻¹ = D⁻¹ − D⁻¹ B Bᵀ D⁻¹.
+#[derive(Clone, Debug)]
+struct Common {
+    blocks: Range<usize>,
+    /// Columns of B.
+    courses: usize,
+    /// B, row by row.
+    b: Vec<f64>,
+    /// First knot that its blocks lie beside.
+    base: usize,
+    /// Zᵀ D⁻¹ B over the knots from there on, row by row.
+    beside: Vec<f64>,
 }
 
 /// Σ⁻¹ of one channel.
@@ -48,7 +65,7 @@ pub struct Shared {
 pub struct Whitening {
     weights: Vec<f64>,
     knots: Vec<(usize, f64)>,
-    shared: Vec<(Range<usize>, f64)>,
+    shared: Vec<Common>,
     processes: usize,
     states: usize,
     factor: Option<Factor>,
@@ -58,8 +75,8 @@ pub struct Whitening {
 
 impl Whitening {
     /// From the blocks' times, s, increasing; their inverse white variances, zero where a block holds nothing; what
-    /// rests share; and drifts. Drifts that make the matrix indefinite by rounding are left out.
-    pub fn new(times: &[f64], weights: Vec<f64>, rests: &[Shared], drifts: &[Process]) -> Self {
+    /// stretches share; and drifts. Drifts that make the matrix indefinite by rounding are left out.
+    pub fn new(times: &[f64], weights: Vec<f64>, stretches: &[Shared], drifts: &[Process]) -> Self {
         let start = times.first().copied().unwrap_or(0.0);
         let length = times.last().copied().unwrap_or(0.0) - start;
         let count = (length / SPACING).ceil() as usize + 1;
@@ -72,13 +89,13 @@ impl Whitening {
             })
             .collect();
         let mut log_determinant: f64 = weights.iter().filter(|w| **w > 0.0).map(|w| -w.ln()).sum();
-        let shared: Vec<(Range<usize>, f64)> = rests
+        let shared: Vec<Common> = stretches
             .iter()
-            .filter(|rest| rest.variance > 0.0)
-            .map(|rest| {
-                let sum: f64 = weights[rest.blocks.clone()].iter().sum();
-                log_determinant += (1.0 + rest.variance * sum).ln();
-                (rest.blocks.clone(), 1.0 / (1.0 / rest.variance + sum))
+            .filter(|stretch| !stretch.courses.is_empty())
+            .map(|stretch| {
+                let (common, share) = Common::new(stretch, &weights, &knots);
+                log_determinant += share;
+                common
             })
             .collect();
         let mut whitening = Self {
@@ -107,9 +124,9 @@ impl Whitening {
             return None;
         }
         let mut first: Vec<usize> = (0..count * p).map(|state| (state / p).saturating_sub(1) * p).collect();
-        for (blocks, _) in &self.shared {
-            let (from, to) = (self.knots[blocks.start].0, self.knots[blocks.end - 1].0 + 1);
-            for reach in &mut first[from * p..(to + 1) * p] {
+        for common in &self.shared {
+            let (from, to) = (common.base, common.base + common.beside.len() / common.courses);
+            for reach in &mut first[from * p..to * p] {
                 *reach = (*reach).min(from * p);
             }
         }
@@ -138,17 +155,11 @@ impl Whitening {
             spread(knot + 1, *knot, w * share * (1.0 - share));
             spread(knot + 1, knot + 1, w * share * share);
         }
-        for (blocks, factor) in &self.shared {
-            let base = self.knots[blocks.start].0;
-            let mut q = vec![0.0; self.knots[blocks.end - 1].0 + 2 - base];
-            for k in blocks.clone() {
-                let (knot, share) = self.knots[k];
-                q[knot - base] += self.weights[k] * (1.0 - share);
-                q[knot + 1 - base] += self.weights[k] * share;
-            }
-            for (i, a) in q.iter().enumerate() {
-                for (j, b) in q.iter().enumerate().take(i + 1) {
-                    spread(base + i, base + j, -factor * a * b);
+        for Common { courses, base, beside, .. } in &self.shared {
+            for (i, one) in beside.chunks_exact(*courses).enumerate() {
+                for (j, other) in beside.chunks_exact(*courses).enumerate().take(i + 1) {
+                    let both: f64 = one.iter().zip(other).map(|(a, b)| a * b).sum();
+                    spread(base + i, base + j, -both);
                 }
             }
         }
@@ -206,7 +217,7 @@ impl Whitening {
         for (knot, state) in knots.iter_mut().zip(state.chunks_exact(p)) {
             *knot = std::array::from_fn(|lane| state.iter().map(|state| state[lane]).sum());
         }
-        let mut drift: Vec<Lanes<L>> = self
+        let drift: Vec<Lanes<L>> = self
             .knots
             .iter()
             .zip(&self.weights)
@@ -215,22 +226,78 @@ impl Whitening {
                 std::array::from_fn(|lane| w * (before[lane] * (1.0 - share) + after[lane] * share))
             })
             .collect();
-        self.share(&mut drift);
         for (out, drift) in out.iter_mut().zip(&drift) {
             out.iter_mut().zip(drift).for_each(|(out, drift)| *out -= drift);
+        }
+        for common in &self.shared {
+            let along = common.along(&common.beside, &knots[common.base..]);
+            common.take(&along.map(|sum| sum.map(|sum| -sum)), &self.weights, &mut out);
         }
         out
     }
 
     /// From D⁻¹ x to (D + shared)⁻¹ x.
     fn share<const L: usize>(&self, weighted: &mut [Lanes<L>]) {
-        for (blocks, factor) in &self.shared {
-            let mut sum = [0.0; L];
-            for row in &weighted[blocks.clone()] {
-                sum.iter_mut().zip(row).for_each(|(sum, row)| *sum += row);
+        for common in &self.shared {
+            let along = common.along(&common.b, &weighted[common.blocks.clone()]);
+            common.take(&along, &self.weights, weighted);
+        }
+    }
+}
+
+impl Common {
+    /// B of a stretch, one course after the other, and ln |I + Uᵀ D⁻¹ U|.
+    fn new(stretch: &Shared, weights: &[f64], knots: &[(usize, f64)]) -> (Self, f64) {
+        let Shared { blocks, courses } = stretch;
+        let (weights, knots) = (&weights[blocks.clone()], &knots[blocks.clone()]);
+        let inner =
+            |a: &[f64], b: &[f64]| -> f64 { (0..weights.len()).map(|k| a[k] * b[k] * weights[k]).sum() };
+        let mut columns: Vec<Vec<f64>> = Vec::with_capacity(courses.len());
+        let mut log_determinant = 0.0;
+        for course in courses.iter().take(COURSES) {
+            let mut own = course.clone();
+            for before in &columns {
+                let along = inner(before, course);
+                own.iter_mut().zip(before).for_each(|(own, before)| *own -= along * before);
             }
-            for (row, w) in weighted[blocks.clone()].iter_mut().zip(&self.weights[blocks.clone()]) {
-                row.iter_mut().zip(sum).for_each(|(row, sum)| *row -= w * factor * sum);
+            let square = 1.0 + inner(course, &own);
+            log_determinant += square.ln();
+            let factor = 1.0 / square.sqrt();
+            own.iter_mut().for_each(|own| *own *= factor);
+            columns.push(own);
+        }
+        let n = columns.len();
+        let (base, last) = (knots[0].0, knots[knots.len() - 1].0);
+        let mut b = vec![0.0; n * weights.len()];
+        let mut beside = vec![0.0; n * (last + 2 - base)];
+        for (course, column) in columns.iter().enumerate() {
+            for (row, value) in column.iter().enumerate() {
+                b[row * n + course] = *value;
+                let ((knot, share), weighted) = (knots[row], weights[row] * value);
+                beside[(knot - base) * n + course] += weighted * (1.0 - share);
+                beside[(knot + 1 - base) * n + course] += weighted * share;
+            }
+        }
+        (Self { blocks: blocks.clone(), courses: n, b, base, beside }, log_determinant)
+    }
+
+    /// Sums of rows times each column of `factors`, row by row.
+    fn along<const L: usize>(&self, factors: &[f64], rows: &[Lanes<L>]) -> [Lanes<L>; COURSES] {
+        let mut sums = [[0.0; L]; COURSES];
+        for (row, factors) in rows.iter().zip(factors.chunks_exact(self.courses)) {
+            for (sum, factor) in sums.iter_mut().zip(factors) {
+                sum.iter_mut().zip(row).for_each(|(sum, row)| *sum += factor * row);
+            }
+        }
+        sums
+    }
+
+    /// Takes D⁻¹ B times these amounts from the rows of its blocks.
+    fn take<const L: usize>(&self, amounts: &[Lanes<L>; COURSES], weights: &[f64], rows: &mut [Lanes<L>]) {
+        let (rows, weights) = (&mut rows[self.blocks.clone()], &weights[self.blocks.clone()]);
+        for ((row, w), b) in rows.iter_mut().zip(weights).zip(self.b.chunks_exact(self.courses)) {
+            for (amount, b) in amounts.iter().zip(b) {
+                row.iter_mut().zip(amount).for_each(|(row, amount)| *row -= w * b * amount);
             }
         }
     }
@@ -248,7 +315,7 @@ mod tests {
     use nalgebra::DVector;
 
     /// Σ by its definition.
-    fn dense(times: &[f64], weights: &[f64], rests: &[Shared], drifts: &[Process]) -> DMatrix<f64> {
+    fn dense(times: &[f64], weights: &[f64], shared: &[Shared], drifts: &[Process]) -> DMatrix<f64> {
         let n = times.len();
         let count = ((times[n - 1] - times[0]) / SPACING).ceil() as usize + 1;
         let z = DMatrix::from_fn(n, count, |row, knot| {
@@ -261,9 +328,10 @@ mod tests {
             });
             sigma += &z * k * z.transpose();
         }
-        for rest in rests {
-            for (a, b) in rest.blocks.clone().flat_map(|a| rest.blocks.clone().map(move |b| (a, b))) {
-                sigma[(a, b)] += rest.variance;
+        for Shared { blocks, courses } in shared {
+            for (a, b) in blocks.clone().flat_map(|a| blocks.clone().map(move |b| (a, b))) {
+                let both = |u: &Vec<f64>| u[a - blocks.start] * u[b - blocks.start];
+                sigma[(a, b)] += courses.iter().map(both).sum::<f64>();
             }
         }
         sigma
@@ -273,11 +341,23 @@ mod tests {
     fn it_is_the_inverse_of_the_covariance_it_stands_for() {
         let times: Vec<f64> = (0..60).map(|k| 0.37 * f64::from(k)).collect();
         let weights: Vec<f64> = (0..60).map(|k| 1.0 + 0.5 * f64::from(k % 3)).collect();
-        let rests = [Shared { blocks: 3..9, variance: 0.4 }, Shared { blocks: 20..41, variance: 1.3 }];
+        let course =
+            |count: usize, f: &dyn Fn(f64) -> f64| (0..count).map(|k| f(k as f64)).collect::<Vec<_>>();
+        let shared = [
+            Shared { blocks: 3..9, courses: vec![course(6, &|_| 0.6)] },
+            Shared {
+                blocks: 20..41,
+                courses: vec![
+                    course(21, &|k| (0.3 * k).sin()),
+                    course(21, &|k| 0.1 * k),
+                    course(21, &|_| 0.0),
+                ],
+            },
+        ];
         let drifts = [Process { time: 8.0, sigma: 0.9 }, Process { time: 150.0, sigma: 2.0 }];
         for drifts in [&drifts[..], &drifts[..1], &[]] {
-            let sigma = dense(&times, &weights, &rests, drifts);
-            let whitening = Whitening::new(&times, weights.clone(), &rests, drifts);
+            let sigma = dense(&times, &weights, &shared, drifts);
+            let whitening = Whitening::new(&times, weights.clone(), &shared, drifts);
             let log_determinant = sigma.clone().cholesky().unwrap().ln_determinant();
             assert!((whitening.log_determinant - log_determinant).abs() < 1e-8);
             let x = DVector::from_fn(60, |k, _| ((k * k) as f64).sin());
