@@ -4,13 +4,13 @@
 
 use imucal_host::{
     blind::{
-        case::{Case, draw},
+        case::{Case, Drawn, draw},
         judgement::Judgement,
         score::{Goal, Share, score},
         seal::Nonce,
         trial::{Folder, mingled},
     },
-    diagnosis::{Options, diagnose},
+    diagnosis::{Diagnosis, Options, diagnose},
 };
 
 const HEALTHY: usize = 40;
@@ -48,19 +48,52 @@ fn a_small_set_of_sealed_trials_is_answered_no_worse_than_the_contract_allows() 
     assert!(judged.iter().all(|judged| judged.answer.verdict.is_some()), "a diagnosis came to no end");
 }
 
+/// An afflicted case and its diagnosis.
+fn drawn(nonce: &str, number: usize) -> (Drawn, Diagnosis) {
+    let drawn = draw(&Nonce::parse(nonce).expect("a nonce"), Case::Afflicted(number)).expect("a case");
+    let recording = drawn.simulation.record("drawn").expect("a recording");
+    let diagnosis = diagnose(&recording, &Options::default(), &|_| ());
+    (drawn, diagnosis)
+}
+
+fn named(diagnosis: &Diagnosis) -> Vec<&str> {
+    let mut named: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.effect.as_str()).collect();
+    named.sort_unstable();
+    named
+}
+
 /// Drawn once by chance, and missed by a search that adds one effect at a time: linear drift and the square of the
 /// temperature, each of which leaves the other in the noise's drift.
 const SLOW: (&str, usize) = ("cdab6a47e7b7db51f0c1509043cfcf9431e67f05e905309a3cc97e6c8aa06353", 16);
 
 #[test]
 fn two_slow_effects_of_one_sensor_are_found_together() {
-    let drawn = draw(&Nonce::parse(SLOW.0).expect("a nonce"), Case::Afflicted(SLOW.1)).expect("a case");
-    let recording = drawn.simulation.record("slow").expect("a recording");
-    let diagnosis = diagnose(&recording, &Options::default(), &|_| ());
-    let mut named: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.effect.as_str()).collect();
+    let (drawn, diagnosis) = drawn(SLOW.0, SLOW.1);
     let mut there: Vec<&str> = drawn.label.effects.iter().map(|effect| effect.effect.as_str()).collect();
-    named.sort_unstable();
     there.sort_unstable();
     assert_eq!(there.iter().filter(|id| id.starts_with("gyr.")).count(), 2, "{there:?}");
-    assert_eq!(named, there);
+    assert_eq!(named(&diagnosis), there);
+}
+
+/// Drawn once by chance as well.
+const OTHERS: &str = "7494c662eba6467320cfb2ae08c9e715ee7cde2a152f6e89b6d72aa03c575631";
+
+#[test]
+fn a_lone_episode_is_placed_where_it_began_and_ended_whatever_the_drift_made_of_it() {
+    let (drawn, diagnosis) = drawn(OTHERS, 77);
+    assert_eq!(named(&diagnosis), ["mag.bias_step"]);
+    for (name, true_value) in
+        drawn.label.effects[0].parameters.iter().filter(|(name, _)| name.starts_with("t_"))
+    {
+        let said = diagnosis.causes[0].parameters.iter().find(|parameter| parameter.name == *name);
+        let value = said.and_then(|said| said.value).expect("an instant");
+        assert!((value - true_value).abs() < 2.0, "{name}: {value} s, {true_value} s in truth");
+    }
+}
+
+#[test]
+fn what_a_fit_does_not_keep_is_not_asserted() {
+    // An episode that a quiet noise promises beside the true cause, and that its own fit would rather be without.
+    let (_, diagnosis) = drawn(OTHERS, 526);
+    assert_eq!(named(&diagnosis), ["mag.temp_scale"]);
 }

@@ -18,7 +18,7 @@ use crate::{effect::Effect, recording::SensorKind, simulator::Dose};
 /// Most effects in a set; where no rig guides the sensor, the latter: a hand and a reference add gaps of their own.
 const MOST: (usize, usize) = (3, 5);
 /// The first effect must raise the evidence by this, beyond its share of the prior, and each further one by the latter:
-/// where one thing is wrong, another is less of a surprise. False alarms are fewer by far than one in seven
+/// where one thing is wrong, another is less of a surprise. False alarms are fewer by far than these odds
 /// (`imucal blind`), since the noise is estimated for each set.
 const GAIN: (f64, f64) = (1.0, 0.5);
 /// A set of no more effects must raise it by this.
@@ -71,20 +71,18 @@ pub fn search<'s>(
     trace("shapes");
     let mut at = Explained { best: none.clone(), none, fit, linear };
     let mut likeliest: Option<Explained<'s>> = None;
-    let mut seen = Vec::new();
+    let mut seen = vec![Vec::new()];
     loop {
         at = at.settled()?;
-        let (next, elsewhere) = improved(&at, most)?;
+        let Some(Step { to, found_in }) = improved(&at, most)? else { break };
         // Two sets may each be better than the other with the noise that the other leaves; a set may be better once in
         // shapes of another place.
-        let visits = if elsewhere.is_some() { 2 } else { 1 };
-        let is_new = |judged: &Judged| seen.iter().filter(|set| **set == key(&judged.set)).count() < visits;
-        let Some(next) = next else { break };
-        let comes_round = !is_new(&next);
-        seen.push(key(&next.set));
-        let names: Vec<&str> = next.set.iter().map(|effect| effect.id.as_str()).collect();
-        trace(&format!("{:.1} → {:.1} {names:?}", at.best.log_evidence, next.log_evidence));
-        let next = at.advanced(elsewhere.as_ref().unwrap_or(&at.linear), next)?;
+        let visits = if found_in.is_some() { 2 } else { 1 };
+        let comes_round = seen.iter().filter(|set| **set == key(&to.set)).count() >= visits;
+        seen.push(key(&to.set));
+        let names: Vec<&str> = to.set.iter().map(|effect| effect.id.as_str()).collect();
+        trace(&format!("{:.1} → {:.1} {names:?}", at.best.log_evidence, to.log_evidence));
+        let next = at.advanced(found_in.as_ref().unwrap_or(&at.linear), to)?;
         trace("refitted");
         if comes_round {
             // The fit of the other set has not kept what its linear problem promised.
@@ -154,8 +152,20 @@ fn refined(
     Some(shape::refine(effect, &values, &reference, &backdrop).map_or(values, |(refined, _)| refined))
 }
 
-/// A likelier set, and the problem in which it was found where that is not `linear`: the cheapest move that gains.
-fn improved<'s>(at: &Explained<'s>, most: usize) -> Option<(Option<Judged>, Option<Linear<'s>>)> {
+/// A likelier set, and the problem in which it was found where that is not the one it was sought from.
+struct Step<'s> {
+    to: Judged,
+    found_in: Option<Linear<'s>>,
+}
+
+impl Step<'_> {
+    fn to(to: Judged) -> Self {
+        Self { to, found_in: None }
+    }
+}
+
+/// The cheapest step that gains.
+fn improved<'s>(at: &Explained<'s>, most: usize) -> Option<Option<Step<'s>>> {
     let Explained { linear, fit, best, .. } = at;
     let gains = |judged: &Judged, least: f64| judged.log_evidence > best.log_evidence + least;
     let gain = if best.set.is_empty() { GAIN.0 } else { GAIN.1 };
@@ -163,12 +173,12 @@ fn improved<'s>(at: &Explained<'s>, most: usize) -> Option<(Option<Judged>, Opti
     if room > 0
         && let Some(next) = linear.added(best, &|_| true)?.filter(|next| gains(next, gain))
     {
-        return Some((Some(next), None));
+        return Some(Some(Step::to(next)));
     }
-    if best.set.len() > 1
+    if !best.set.is_empty()
         && let Some(next) = linear.changed(best)?.filter(|next| gains(next, CHANGE))
     {
-        return Some((Some(next), None));
+        return Some(Some(Step::to(next)));
     }
     // A step or a sway that stands in the drift is not where that drift would have it.
     let quiet = if room > 0 { linear.reshaped(fit, &best.noise.quieter(), &[]) } else { None };
@@ -179,19 +189,17 @@ fn improved<'s>(at: &Explained<'s>, most: usize) -> Option<(Option<Judged>, Opti
         Some(quiet) => quiet.added(best, &moved)?.filter(|next| gains(next, gain)),
         None => None,
     };
-    if from_quiet.is_some() {
-        return Some((from_quiet, quiet));
+    if let Some(to) = from_quiet {
+        return Some(Some(Step { to, found_in: quiet }));
     }
-    if room > 1 {
-        let next = quiet.as_ref().unwrap_or(linear).paired(best)?.filter(|next| gains(next, gain + GAIN.1));
-        if next.is_some() {
-            return Some((next, quiet));
-        }
+    if room > 1
+        && let paired = quiet.as_ref().unwrap_or(linear).paired(best)?
+        && let Some(to) = paired.filter(|next| gains(next, gain + GAIN.1))
+    {
+        return Some(Some(Step { to, found_in: quiet }));
     }
-    match linear.changed_anew(fit, best)?.filter(|(_, next)| gains(next, CHANGE)) {
-        Some((anew, next)) => Some((Some(next), Some(anew))),
-        None => Some((None, None)),
-    }
+    let anew = linear.changed_anew(fit, best)?.filter(|(_, next)| gains(next, CHANGE));
+    Some(anew.map(|(anew, to)| Step { to, found_in: Some(anew) }))
 }
 
 /// A set, whatever the order of its effects.
