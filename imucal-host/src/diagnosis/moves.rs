@@ -90,7 +90,10 @@ impl Linear<'_> {
         for at in 0..from.set.len() {
             let (fewer, taken) = without(&from.set, at);
             let other = |effect: &'static Effect| !std::ptr::eq(effect, taken);
-            sets.extend(self.replaced(&fewer, taken.sensors, &other, &from.noise)?);
+            // Alone, it was chosen among all others.
+            if !fewer.is_empty() {
+                sets.extend(self.replaced(&fewer, taken.sensors, &other, &from.noise)?);
+            }
             sets.push((fewer, taken.sensors.to_vec()));
         }
         Some(self.best_of(sets, &from.noise))

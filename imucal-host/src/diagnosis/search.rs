@@ -20,7 +20,7 @@ const MOST: (usize, usize) = (3, 5);
 /// The first effect must raise the evidence by this, beyond its share of the prior, and each further one by the latter:
 /// where one thing is wrong, another is less of a surprise. False alarms are fewer by far than these odds
 /// (`imucal blind`), since the noise is estimated for each set.
-const GAIN: (f64, f64) = (1.0, 0.5);
+const GAIN: (f64, f64) = (2.0, 1.0);
 /// A set of no more effects must raise it by this.
 const CHANGE: f64 = 0.5;
 /// Fits of the baseline, each with the noise that the last one left, where no rig guides the sensor.
@@ -79,13 +79,16 @@ pub fn search<'s>(
         // shapes of another place.
         let visits = if found_in.is_some() { 2 } else { 1 };
         let comes_round = seen.iter().filter(|set| **set == key(&to.set)).count() >= visits;
+        if comes_round && to.set.len() >= at.best.set.len() {
+            break;
+        }
         seen.push(key(&to.set));
         let names: Vec<&str> = to.set.iter().map(|effect| effect.id.as_str()).collect();
         trace(&format!("{:.1} → {:.1} {names:?}", at.best.log_evidence, to.log_evidence));
         let next = at.advanced(found_in.as_ref().unwrap_or(&at.linear), to)?;
         trace("refitted");
         if comes_round {
-            // The fit of the other set has not kept what its linear problem promised.
+            // The fit with one effect more would rather be without it: it has not kept what linear algebra promised.
             return next.settled();
         }
         let left = std::mem::replace(&mut at, next);
@@ -93,7 +96,7 @@ pub fn search<'s>(
             likeliest = Some(left);
         }
     }
-    // What a move promises by linear algebra the fit through the simulator need not keep.
+    // Nor need another set keep it.
     Some(likeliest.filter(|most| most.is_likelier(&at)).unwrap_or(at))
 }
 
