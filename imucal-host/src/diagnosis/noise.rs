@@ -29,7 +29,7 @@ const SLOW: [f64; 3] = [30.0, 120.0, WALK];
 const WALK: f64 = 1200.0;
 /// The one that a search begins with.
 pub const USUAL: f64 = SLOW[1];
-/// −ln of the odds of a walk: what goes on from beginning to end is a cause as often as it is noise that walks so far.
+/// −ln of the odds of a walk against a drift that forgets: a walk would take up any cause that goes slowly.
 const WALKS: f64 = 2.0;
 /// Factors of a search that begins anywhere.
 pub const FAR: [f64; 2] = [4.0, 1.7];

@@ -28,7 +28,8 @@ use crate::{effect::find, recording::SensorKind};
 /// In motion what the table stands off changes; it is as good as another after this, s.
 const LONGEST: f64 = 20.0;
 
-/// What turns the outputs of each block when the gimbals stand off their encoders.
+/// What turns the outputs of each block when the gimbals stand off their encoders, with the triads that the simulator
+/// starts from: what is fitted later changes it in the second order only.
 #[derive(Debug, Default)]
 pub struct Turned(OnceLock<Vec<Means>>);
 

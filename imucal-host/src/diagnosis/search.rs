@@ -96,7 +96,7 @@ pub fn search<'s>(
             likeliest = Some(left);
         }
     }
-    // Nor need another set keep it.
+    // What a move promises by linear algebra the fit through the simulator need not keep.
     Some(likeliest.filter(|most| most.is_likelier(&at)).unwrap_or(at))
 }
 

@@ -11,8 +11,8 @@
 //! | K | drift: first-order Gauss–Markov processes, at knots |
 //! | Z | straight lines between knots |
 //!
-//! By Woodbury's identity, twice: what stretches have in common first, column by column, the knots after it. Not modelled: drift within the
-//! distance of two knots, what the axes of a triad have in common.
+//! By Woodbury's identity, twice: what stretches have in common first, column by column, the knots after it. Not
+//! modelled: drift within the distance of two knots, what the axes of a triad have in common.
 
 use std::ops::Range;
 
