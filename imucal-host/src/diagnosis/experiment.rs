@@ -127,11 +127,7 @@ fn information<'m>(
     let scene = Scene::new(&recording, usable, &replay, linear.scene.triads);
     let reference = scene.reference(explained.fit.doses.clone(), &scene.fine)?;
     let columns = linear.design.columns.clone();
-    let shape = |effect: &'static Effect| {
-        let at = linear.candidates.effects.iter().position(|other| std::ptr::eq(*other, effect));
-        at.and_then(|at| linear.shapes.get(at)).map(|shape| shape.values.clone()).unwrap_or_default()
-    };
-    let means = signatures(&reference, &columns, &shape)?;
+    let means = signatures(&reference, &columns, &|effect| linear.shape_of(effect))?;
     let design = Design::new(&scene, columns, &means, &Default::default());
     let weighing = Weighing::new(&scene, SensorKind::ALL.map(|kind| reference.output(kind)));
     let every: Vec<usize> = (0..design.size).collect();

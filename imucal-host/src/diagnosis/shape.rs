@@ -60,14 +60,15 @@ pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backd
     for shapes in menu.chunks(BATCH) {
         judged.extend(judge(effect, shapes, reference, backdrop)?);
     }
-    let best = (0..menu.len()).max_by(|a, b| judged[*a].total_cmp(&judged[*b]))?;
-    Some(Shaped { values: menu[best].clone(), spread: spread(&judged) })
+    let (best, spread) = likeliest(&judged);
+    Some(Shaped { values: menu.get(best)?.clone(), spread })
 }
 
-/// ln Σ e^(v − v_max).
-fn spread(values: &[f64]) -> f64 {
-    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    values.iter().map(|value| (value - most).exp()).sum::<f64>().ln()
+/// The place of the largest ln BF and ln Σ e^(v − v_max); those that could not be computed are left out.
+fn likeliest(values: &[f64]) -> (usize, f64) {
+    let finite = || values.iter().enumerate().filter(|(_, value)| value.is_finite());
+    let Some((at, most)) = finite().max_by(|(_, a), (_, b)| a.total_cmp(b)) else { return (0, 0.0) };
+    (at, finite().map(|(_, value)| (value - most).exp()).sum::<f64>().ln())
 }
 
 /// It begins and ends.
@@ -225,8 +226,8 @@ fn pair(
             pairs.push((*start, j.map_or(f64::INFINITY, |j| times[j])));
         }
     }
-    let best = (0..pairs.len()).max_by(|a, b| values[*a].total_cmp(&values[*b]))?;
-    Some((pairs[best], spread(&values)))
+    let (best, spread) = likeliest(&values);
+    Some((*pairs.get(best)?, spread))
 }
 
 /// Improves a shape by steps that are halved, and tells how far each parameter may move before the evidence falls by a
@@ -276,4 +277,19 @@ pub fn refine(
         }
     }
     Some((best, errors))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shapes_as_likely_as_the_likeliest_are_counted_and_others_are_not() {
+        assert_eq!(likeliest(&[-1.0, 700.0, f64::NAN, f64::NEG_INFINITY]), (1, 0.0));
+        let (_, spread) = likeliest(&[5.0; 7]);
+        assert!((spread - 7f64.ln()).abs() < 1e-12, "{spread}");
+        let (at, spread) = likeliest(&[2.0, 2.0 + 2f64.ln()]);
+        assert!(at == 1 && (spread - 1.5f64.ln()).abs() < 1e-12, "{at} {spread}");
+        assert_eq!(likeliest(&[f64::NAN]), (0, 0.0));
+    }
 }

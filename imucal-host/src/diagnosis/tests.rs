@@ -54,9 +54,9 @@ fn with_fit<T>(recording: &Recording, check: impl FnOnce(Linear<'_>, &Fit) -> T)
     check(Linear::new(&scene, &candidates, &fit, &noise, None).unwrap(), &fit)
 }
 
-/// Energy of a recording's residual, whitened by its own noise, for each degree of freedom.
-fn energy(recording: &Recording) -> f64 {
-    with_fit(recording, |linear, _| {
+#[test]
+fn a_healthy_residual_whitened_by_its_own_noise_has_the_energy_of_noise() {
+    with_linear(|linear| {
         let white = linear.weighing.white(&linear.scene.residual(&[]).unwrap());
         let judged = linear.judge(&[], &white, &SensorKind::ALL, &FAR).unwrap();
         let normal = linear.design.normal(&linear.whitenings(&judged.noise), &linear.baseline);
@@ -64,15 +64,10 @@ fn energy(recording: &Recording) -> f64 {
         let information = normal.information.clone() + DMatrix::identity(n, n) * 1e-8;
         let left = normal.energy - normal.score.dot(&information.cholesky().unwrap().solve(&normal.score));
         let counts = linear.scene.counts.iter().flatten().filter(|count| **count > 0).count();
-        left / (3 * counts - n) as f64
-    })
-}
-
-#[test]
-fn a_healthy_residual_whitened_by_its_own_noise_has_the_energy_of_noise() {
-    // Noise in motion is the larger of two estimates: too much of it costs power, too little would cost honesty.
-    let energy = energy(&HEALTHY);
-    assert!((0.87..1.03).contains(&energy), "{energy}");
+        let freedom = (3 * counts - n) as f64;
+        // Noise in motion is the larger of two estimates: too much of it costs power, too little would cost honesty.
+        assert!((0.87..1.03).contains(&(left / freedom)), "{left} of {freedom}");
+    });
 }
 
 #[test]
