@@ -2,12 +2,13 @@
 //!
 //! A channel is one axis of one sensor. Columns are in usual sizes of their parameters, so that one means usual.
 
-use std::borrow::Borrow;
+use std::{borrow::Borrow, sync::Arc};
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use rayon::prelude::*;
 
 use super::{
+    latent::{Condensed, Latents},
     scene::{Means, Scene},
     whitening::Whitening,
 };
@@ -58,6 +59,22 @@ pub struct Design {
     pub channels: Vec<Channel>,
 }
 
+/// All channels, as white noise weighs them: what is the same whatever the drift and the scatter.
+#[derive(Clone, Debug)]
+pub struct CondensedDesign {
+    channels: Vec<CondensedChannel>,
+}
+
+/// One axis of one sensor.
+#[derive(Clone, Debug)]
+pub struct CondensedChannel {
+    /// Sensor.
+    pub kind: SensorKind,
+    ids: Vec<usize>,
+    /// Its columns and, last, its residual.
+    pub columns: Condensed,
+}
+
 /// Normal equations: Jᵀ Σ⁻¹ J, Jᵀ Σ⁻¹ r, rᵀ Σ⁻¹ r and ln |Σ|, summed over channels.
 #[derive(Clone, Debug)]
 pub struct Normal {
@@ -85,6 +102,18 @@ impl Normal {
     /// The likeliest amounts of all columns, usual sizes; `None` where the information is not that of real columns.
     pub fn amounts(&self) -> Option<DVector<f64>> {
         Some(loosened(self.information.clone())?.solve(&self.score))
+    }
+
+    /// Of condensed columns, the last being the residual.
+    fn of(columns: &Condensed, whitening: &Whitening) -> Self {
+        let all = whitening.products(columns);
+        let n = all.ncols() - 1;
+        Self {
+            information: all.view((0, 0), (n, n)).into_owned(),
+            score: all.view((0, n), (n, 1)).column(0).into_owned(),
+            energy: all[(n, n)],
+            log_determinant: whitening.log_determinant,
+        }
     }
 
     /// Adds a channel's; `ids` tells where its columns stand.
@@ -118,34 +147,14 @@ impl Channel {
         residual
     }
 
-    /// Some of its columns, by their place in `ids`, and its residual.
-    pub fn gathered(&self, places: &[usize]) -> Gathered {
+    /// Some of its columns, by their place in `ids`, and behind them its residual.
+    fn condensed(&self, places: &[usize], latents: &Arc<Latents>) -> Condensed {
         let mut x = DMatrix::zeros(self.y.len(), places.len() + 1);
         for (to, from) in places.iter().enumerate() {
             x.set_column(to, &self.x.column(*from));
         }
         x.set_column(places.len(), &self.y);
-        Gathered { transposed: x.transpose(), x }
-    }
-}
-
-/// Columns of a channel side by side, the last being its residual.
-pub struct Gathered {
-    x: DMatrix<f64>,
-    transposed: DMatrix<f64>,
-}
-
-impl Gathered {
-    /// Their normal equations.
-    pub fn normal(&self, whitening: &Whitening) -> Normal {
-        let all = &self.transposed * whitening.apply_all(&self.x);
-        let n = self.x.ncols() - 1;
-        Normal {
-            information: all.view((0, 0), (n, n)).into_owned(),
-            score: all.view((0, n), (n, 1)).column(0).into_owned(),
-            energy: all[(n, n)],
-            log_determinant: whitening.log_determinant,
-        }
+        latents.condensed(&x)
     }
 }
 
@@ -216,22 +225,60 @@ impl Design {
 
     /// Normal equations of some columns, given each channel's whitening.
     pub fn normal(&self, whitenings: &[Whitening], wanted: &[usize]) -> Normal {
-        let mut place = vec![None; self.size];
-        wanted.iter().enumerate().for_each(|(to, index)| place[*index] = Some(to));
         let parts: Vec<(Normal, Vec<usize>)> = self
             .channels
             .par_iter()
             .zip(whitenings)
             .map(|(channel, whitening)| {
-                let (from, to): (Vec<usize>, Vec<usize>) =
-                    (0..channel.ids.len()).filter_map(|at| place[channel.ids[at]].map(|to| (at, to))).unzip();
-                (channel.gathered(&from).normal(whitening), to)
+                let (from, to) = places(&channel.ids, wanted);
+                (Normal::of(&channel.condensed(&from, whitening.latents()), whitening), to)
             })
             .collect();
         let mut normal = Normal::zeros(wanted.len());
-        parts.iter().for_each(|(part, ids)| normal.add(part, ids));
+        parts.iter().for_each(|(part, to)| normal.add(part, to));
         normal
     }
+
+    /// All columns, given what the blocks of a channel have in common.
+    pub fn condensed(&self, latents: &(dyn Fn(&Channel) -> Latents + Sync)) -> CondensedDesign {
+        let channels = self.channels.par_iter().map(|channel| {
+            let every: Vec<usize> = (0..channel.ids.len()).collect();
+            let columns = channel.condensed(&every, &Arc::new(latents(channel)));
+            CondensedChannel { kind: channel.kind, ids: channel.ids.clone(), columns }
+        });
+        CondensedDesign { channels: channels.collect() }
+    }
+}
+
+impl CondensedDesign {
+    /// Some columns, and the residual; those that are not named are out of reach. Of one sensor, or all of them.
+    pub fn picked(&self, kind: Option<SensorKind>, wanted: &[usize]) -> Self {
+        let channels = self.channels.iter().filter(|channel| kind.is_none_or(|kind| channel.kind == kind));
+        let picked = channels.map(|channel| {
+            let (mut from, ids) = places(&channel.ids, wanted);
+            from.push(channel.ids.len());
+            CondensedChannel { kind: channel.kind, ids, columns: channel.columns.picked(&from) }
+        });
+        Self { channels: picked.collect() }
+    }
+
+    /// Normal equations of its columns, of which there are `size`.
+    pub fn normal(&self, size: usize, whitening: &(dyn Fn(&CondensedChannel) -> Whitening + Sync)) -> Normal {
+        let parts: Vec<Normal> = self
+            .channels
+            .par_iter()
+            .map(|channel| Normal::of(&channel.columns, &whitening(channel)))
+            .collect();
+        let mut normal = Normal::zeros(size);
+        parts.iter().zip(&self.channels).for_each(|(part, channel)| normal.add(part, &channel.ids));
+        normal
+    }
+}
+
+/// Which of a channel's columns are wanted, by their place among `ids`, and the places of these among the wanted.
+fn places(ids: &[usize], wanted: &[usize]) -> (Vec<usize>, Vec<usize>) {
+    let to = |id: &usize| wanted.iter().position(|wanted| wanted == id);
+    ids.iter().enumerate().filter_map(|(from, id)| Some((from, to(id)?))).unzip()
 }
 
 fn channel(kind: SensorKind, axis: usize, blocks: usize, signatures: &[Means], residual: &Means) -> Channel {

@@ -170,11 +170,12 @@ fn judged(
     let (design, fitted) = with_drivers(linear, set, kind, std::slice::from_ref(driver), noise);
     let every: Vec<usize> = (0..design.size).collect();
     let mut groups = linear.groups(set, &linear.fitted(set));
-    let alone = design.normal(&linear.whitenings(noise), &every[..fitted]);
+    let condensed = linear.weighing.condensed(&design, noise);
+    let alone = noise.normal(&condensed.picked(None, &every[..fitted]), fitted);
     let before = log_evidence(&alone, noise, linear.baseline.len(), &groups)?;
     let mut anew = noise.clone();
-    anew.sensors[kind as usize] = linear.weighing.fit(&design, kind, &every, noise, &NEAR);
-    let normal = design.normal(&linear.whitenings(&anew), &every);
+    anew.sensors[kind as usize] = linear.weighing.fit(&condensed, kind, &every, noise, &NEAR);
+    let normal = anew.normal(&condensed, design.size);
     groups.push(every[fitted..].to_vec());
     let gain = log_evidence(&normal, &anew, linear.baseline.len(), &groups)? - before - (choices as f64).ln();
     let gain = if driver.name == TIME { gain - DRIFTING } else { gain };

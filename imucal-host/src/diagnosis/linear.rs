@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{
     candidates::Candidates,
-    design::{Design, Normal},
+    design::{CondensedDesign, Design, Normal},
     evidence::Projected,
     noise::{Noise, SensorNoise, Weighing},
     refit::{Fit, columns, signatures},
@@ -21,7 +21,7 @@ use crate::{
     simulator::Dose,
 };
 
-/// Normal equations that are kept.
+/// Answers that are kept.
 const KEPT: usize = 2;
 
 /// A set of effects and how it was judged.
@@ -52,11 +52,32 @@ pub struct Linear<'s> {
     scan: Scan<'s>,
     /// Effects of the fit beside the baseline.
     held: Vec<Dose>,
-    normals: Normals,
+    normals: Latest<Noise, Normal>,
+    condensed: Latest<[Spread; 3], CondensedDesign>,
 }
 
-/// Normal equations of all columns under the noises asked for last.
-type Normals = Mutex<Vec<(Noise, Arc<Normal>)>>;
+/// White noise of a sensor at rest and in motion, by axis.
+type Spread = [[f64; 3]; 2];
+
+/// What was asked for last.
+struct Latest<K, V>(Mutex<Vec<(K, Arc<V>)>>);
+
+impl<K: PartialEq, V> Latest<K, V> {
+    fn get(&self, key: K, make: impl FnOnce() -> V) -> Arc<V> {
+        let locked = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = |kept: &Vec<(K, Arc<V>)>| {
+            kept.iter().find(|(other, _)| *other == key).map(|(_, value)| Arc::clone(value))
+        };
+        if let Some(value) = known(&locked()) {
+            return value;
+        }
+        let value = Arc::new(make());
+        let mut kept = locked();
+        kept.truncate(KEPT - 1);
+        kept.insert(0, (key, Arc::clone(&value)));
+        value
+    }
+}
 
 impl<'s> Linear<'s> {
     /// About a fit, with its columns alone: nothing can be added.
@@ -121,8 +142,8 @@ impl<'s> Linear<'s> {
     ) -> Self {
         let baseline = candidates.baseline.iter().flat_map(|term| design.of(term)).collect();
         let held = fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect)).cloned().collect();
-        let normals = Normals::default();
-        Self { scene, candidates, design, weighing, baseline, shapes, scan, held, normals }
+        let (normals, condensed) = (Latest(Mutex::default()), Latest(Mutex::default()));
+        Self { scene, candidates, design, weighing, baseline, shapes, scan, held, normals, condensed }
     }
 
     /// An effect's signature is the same about another fit but for the second order: no sensor it reaches has an effect in
@@ -199,13 +220,14 @@ impl<'s> Linear<'s> {
     ) -> Option<Judged> {
         let fitted = self.fitted(set);
         let mut noise = start.clone();
-        let fit = |kind: &SensorKind| self.weighing.fit(&self.design, *kind, &fitted, start, steps);
+        let condensed = self.condensed(start).picked(None, &fitted);
+        let every: Vec<usize> = (0..fitted.len()).collect();
+        let fit = |kind: &SensorKind| self.weighing.fit(&condensed, *kind, &every, start, steps);
         let asked: Vec<SensorKind> =
             self.scene.kinds.iter().copied().filter(|kind| anew.contains(kind)).collect();
         let found: Vec<SensorNoise> = asked.par_iter().map(fit).collect();
         asked.into_iter().zip(found).for_each(|(kind, found)| noise.sensors[kind as usize] = found);
-        let whitenings = self.weighing.whitenings(&self.design, &noise);
-        let normal = self.design.normal(&whitenings, &fitted);
+        let normal = noise.normal(&condensed, fitted.len());
         let log_evidence = log_evidence(&normal, &noise, self.baseline.len(), &self.groups(set, &fitted))?
             - set.iter().map(|effect| self.surprise(effect)).sum::<f64>();
         Some(Judged { set: set.to_vec(), noise, log_evidence })
@@ -234,19 +256,13 @@ impl<'s> Linear<'s> {
 
     /// Normal equations of all columns.
     pub fn normal(&self, noise: &Noise) -> Arc<Normal> {
-        let known = |normals: &Vec<(Noise, Arc<Normal>)>| {
-            normals.iter().find(|(other, _)| other == noise).map(|(_, normal)| Arc::clone(normal))
-        };
-        let locked = || self.normals.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(normal) = known(&locked()) {
-            return normal;
-        }
-        let every: Vec<usize> = (0..self.design.columns.len()).collect();
-        let normal = Arc::new(self.design.normal(&self.whitenings(noise), &every));
-        let mut normals = locked();
-        normals.truncate(KEPT - 1);
-        normals.insert(0, (noise.clone(), Arc::clone(&normal)));
-        normal
+        self.normals.get(noise.clone(), || noise.normal(&self.condensed(noise), self.design.size))
+    }
+
+    /// All columns, as white noise weighs them.
+    fn condensed(&self, noise: &Noise) -> Arc<CondensedDesign> {
+        let key = std::array::from_fn(|at| [noise.sensors[at].white, noise.sensors[at].moving]);
+        self.condensed.get(key, || self.weighing.condensed(&self.design, noise))
     }
 
     /// Scores of all columns but the baseline's, with the baseline projected out.

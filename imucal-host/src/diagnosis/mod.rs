@@ -16,6 +16,7 @@ pub mod footing;
 pub mod frequency;
 pub mod gap;
 pub mod hand;
+pub mod latent;
 pub mod linear;
 pub mod model;
 mod moves;

@@ -10,12 +10,15 @@
 //! Each sensor has its own; the axes of a sensor share drift and scatter. Not modelled: noise that axes have in common,
 //! white noise that changes in the course of the recording.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, Vector3};
 use rayon::prelude::*;
 
 use super::{
     block::Block,
-    design::{Channel, Design, Gathered, Normal},
+    design::{Channel, CondensedChannel, CondensedDesign, Design, Normal},
+    latent::Latents,
     scatter::Scattered,
     scene::Scene,
     whitening::{Process, Whitening},
@@ -63,6 +66,12 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// Normal equations of all columns of a condensed design, of which there are `size`.
+    pub fn normal(&self, design: &CondensedDesign, size: usize) -> Normal {
+        let sensor = |kind: SensorKind| &self.sensors[kind as usize];
+        design.normal(size, &|channel| sensor(channel.kind).whitening(&channel.columns.latents))
+    }
+
     /// −ln of its prior, but for a constant.
     pub fn surprise(&self) -> f64 {
         self.sensors.iter().map(SensorNoise::surprise).sum()
@@ -126,7 +135,7 @@ impl<'s> Weighing<'s> {
 
     /// Σ⁻¹ of each channel of a design.
     pub fn whitenings(&self, design: &Design, noise: &Noise) -> Vec<Whitening> {
-        design.channels.par_iter().map(|channel| self.whitening(channel, noise)).collect()
+        self.whitenings_within(design, noise, &|_| true)
     }
 
     /// Σ⁻¹ of each channel over some of the blocks, as if the others had not been measured.
@@ -136,11 +145,16 @@ impl<'s> Weighing<'s> {
         noise: &Noise,
         inside: &(dyn Fn(usize) -> bool + Sync),
     ) -> Vec<Whitening> {
-        design.channels.par_iter().map(|channel| self.whitening_within(channel, noise, inside)).collect()
+        let whitening = |channel: &Channel| {
+            let latents = self.latents(channel, noise, inside);
+            noise.sensors[channel.kind as usize].whitening(&Arc::new(latents))
+        };
+        design.channels.par_iter().map(whitening).collect()
     }
 
-    fn whitening(&self, channel: &Channel, noise: &Noise) -> Whitening {
-        self.whitening_within(channel, noise, &|_| true)
+    /// A design's columns, as white noise weighs them.
+    pub fn condensed(&self, design: &Design, noise: &Noise) -> CondensedDesign {
+        design.condensed(&|channel| self.latents(channel, noise, &|_| true))
     }
 
     /// Variance of a block's mean by noise alone.
@@ -149,22 +163,18 @@ impl<'s> Weighing<'s> {
         let count = self.scene.counts[channel.kind as usize][block].max(1) as f64;
         let rest = self.scene.blocks[block].rest.is_some();
         let white = if rest { sensor.white } else { sensor.moving }[channel.axis];
-        let scatter = self.scattered(channel, noise).variance(block);
+        let scatter = sensor.scatter * sensor.scatter * self.scattered(channel).variance(block);
         white * white / count + sensor.drift.iter().map(|sigma| sigma * sigma).sum::<f64>() + scatter
     }
 
-    fn scattered(&self, channel: &Channel, noise: &Noise) -> Scattered<'_> {
+    fn scattered(&self, channel: &Channel) -> Scattered<'_> {
         let given = &self.given[channel.kind as usize];
-        let sigma = noise.sensors[channel.kind as usize].scatter;
-        Scattered { scene: self.scene, kind: channel.kind, axis: channel.axis, given, sigma }
+        Scattered { scene: self.scene, kind: channel.kind, axis: channel.axis, given }
     }
 
-    fn whitening_within(
-        &self,
-        channel: &Channel,
-        noise: &Noise,
-        inside: &(dyn Fn(usize) -> bool + Sync),
-    ) -> Whitening {
+    /// What the blocks of a channel have in common, by its white noise; of some of them, as if the others had not been
+    /// measured.
+    fn latents(&self, channel: &Channel, noise: &Noise, inside: &(dyn Fn(usize) -> bool + Sync)) -> Latents {
         let sensor = &noise.sensors[channel.kind as usize];
         let blocks = &self.scene.blocks;
         let counts = &self.scene.counts[channel.kind as usize];
@@ -174,47 +184,23 @@ impl<'s> Weighing<'s> {
             if told { *count as f64 / (sigma * sigma) } else { 0.0 }
         };
         let weights: Vec<f64> = blocks.iter().zip(counts).enumerate().map(weight).collect();
-        let shared = self.scattered(channel, noise).shared();
-        let drifts: Vec<Process> = [FAST, sensor.slow]
-            .into_iter()
-            .zip(sensor.drift)
-            .map(|(time, sigma)| Process { time, sigma })
-            .collect();
-        Whitening::new(&self.times, weights, &shared, &drifts)
+        Latents::new(&self.times, weights, &self.scattered(channel).shared())
     }
 
-    /// The noise of a sensor under which its residual, less `columns`, is likeliest; the search begins at `start`
-    /// and goes by these factors.
+    /// The noise of a sensor under which its residual, less `columns`, is likeliest; the search begins at `start`, by
+    /// whose white noise the design was condensed, and goes by these factors.
     pub fn fit(
         &self,
-        design: &Design,
+        design: &CondensedDesign,
         kind: SensorKind,
         columns: &[usize],
         start: &Noise,
         steps: &[f64],
     ) -> SensorNoise {
-        let channels: Vec<&Channel> = design.channels.iter().filter(|channel| channel.kind == kind).collect();
-        let gathered: Vec<(Gathered, Vec<usize>)> = channels
-            .iter()
-            .map(|channel| {
-                let place = |id: &usize| columns.iter().position(|column| column == id);
-                let (from, to): (Vec<usize>, Vec<usize>) = (0..channel.ids.len())
-                    .filter_map(|at| place(&channel.ids[at]).map(|to| (at, to)))
-                    .unzip();
-                (channel.gathered(&from), to)
-            })
-            .collect();
+        let picked = design.picked(Some(kind), columns);
         let likelihood = |sensor: &SensorNoise| {
-            let mut noise = start.clone();
-            noise.sensors[kind as usize] = *sensor;
-            let parts: Vec<Normal> = channels
-                .par_iter()
-                .zip(&gathered)
-                .map(|(channel, (columns, _))| columns.normal(&self.whitening(channel, &noise)))
-                .collect();
-            let mut normal = Normal::zeros(columns.len());
-            parts.iter().zip(&gathered).for_each(|(part, (_, to))| normal.add(part, to));
-            restricted(&normal) + 2.0 * sensor.surprise()
+            let whitening = |channel: &CondensedChannel| sensor.whitening(&channel.columns.latents);
+            restricted(&picked.normal(columns.len(), &whitening)) + 2.0 * sensor.surprise()
         };
         let mut best = start.sensors[kind as usize];
         let mut least = likelihood(&best);
@@ -257,6 +243,13 @@ impl<'s> Weighing<'s> {
 }
 
 impl SensorNoise {
+    /// Σ⁻¹ of one of the sensor's axes.
+    fn whitening(&self, latents: &Arc<Latents>) -> Whitening {
+        let drifts = [(FAST, self.drift[0]), (self.slow, self.drift[1])];
+        let drifts = drifts.map(|(time, sigma)| Process { time, sigma });
+        Whitening::new(Arc::clone(latents), self.scatter, &drifts)
+    }
+
     /// −ln of its prior, but for a constant.
     fn surprise(&self) -> f64 {
         if self.slow < WALK { 0.0 } else { WALKS }

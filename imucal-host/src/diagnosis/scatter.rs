@@ -20,8 +20,8 @@ use nalgebra::Vector3;
 
 use super::{
     block::Block,
+    latent::Shared,
     scene::{Means, Scene},
-    whitening::Shared,
 };
 use crate::{effect::find, recording::SensorKind};
 
@@ -65,12 +65,10 @@ pub struct Scattered<'a> {
     pub axis: usize,
     /// Mean output of each block.
     pub given: &'a [Vector3<f64>],
-    /// Angle by which the table stands off its encoders, rad.
-    pub sigma: f64,
 }
 
 impl Scattered<'_> {
-    /// What each rest shares, and each stretch of a movement.
+    /// What each rest shares, and each stretch of a movement, for a scatter of 1 rad.
     pub fn shared(&self) -> Vec<Shared> {
         if self.kind == SensorKind::Gyr {
             return Vec::new();
@@ -84,24 +82,21 @@ impl Scattered<'_> {
     fn courses(&self, blocks: Range<usize>) -> Vec<Vec<f64>> {
         if self.scene.blocks[blocks.start].rest.is_some() {
             let middle = (blocks.start + blocks.end) / 2;
-            return vec![vec![self.at_rest(middle).sqrt(); blocks.len()]];
+            let given = self.given[middle];
+            let across = (given.norm_squared() - given[self.axis].powi(2)).sqrt();
+            return vec![vec![across; blocks.len()]];
         }
         let turned = self.scene.turned.of(self.scene).iter();
         let along = turned.filter_map(|means| means[self.kind as usize].as_ref());
-        along.map(|means| means[blocks.clone()].iter().map(|u| self.sigma * u[self.axis]).collect()).collect()
+        along.map(|means| means[blocks.clone()].iter().map(|u| u[self.axis]).collect()).collect()
     }
 
-    /// Variance that the scatter gives a block.
+    /// Variance that a scatter of 1 rad gives a block.
     pub fn variance(&self, block: usize) -> f64 {
         if self.kind == SensorKind::Gyr {
             return 0.0;
         }
         self.courses(block..block + 1).iter().map(|course| course[0] * course[0]).sum()
-    }
-
-    fn at_rest(&self, block: usize) -> f64 {
-        let given = self.given[block];
-        self.sigma * self.sigma * (given.norm_squared() - given[self.axis].powi(2))
     }
 }
 

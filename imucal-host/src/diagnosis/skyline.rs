@@ -7,9 +7,6 @@
 //! A. George, J. Liu, Computer Solution of Large Sparse Positive Definite Systems (1981), ch. 4. nalgebra's sparse
 //! factor lacks the envelope, and a dense one costs a hundred times more here.
 
-/// Columns of right-hand sides side by side: one row of each.
-pub type Lanes<const L: usize> = [f64; L];
-
 /// A symmetric matrix of which each row is kept from its first entry to the diagonal.
 #[derive(Clone, Debug)]
 pub struct Skyline {
@@ -77,24 +74,27 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Puts A⁻¹ x in the place of x, column by column.
-    pub fn solve<const L: usize>(&self, x: &mut [Lanes<L>]) {
-        let skyline = &self.skyline;
-        for (i, from) in skyline.first.iter().enumerate() {
-            let (left, diagonal) = skyline.row(i);
-            let mut sum = [0.0; L];
-            for (a, b) in left.iter().zip(&x[*from..i]) {
-                sum.iter_mut().zip(b).for_each(|(sum, b)| *sum += a * b);
-            }
-            x[i].iter_mut().zip(sum).for_each(|(x, sum)| *x = (*x - sum) / diagonal);
-        }
-        for (i, from) in skyline.first.iter().enumerate().rev() {
-            let (left, diagonal) = skyline.row(i);
-            let value = x[i].map(|x| x / diagonal);
+    /// Puts A⁻¹ x in the place of x.
+    pub fn solve(&self, x: &mut [f64]) {
+        self.forward(x, 1);
+        for (i, from) in self.skyline.first.iter().enumerate().rev() {
+            let (left, diagonal) = self.skyline.row(i);
+            let value = x[i] / diagonal;
             x[i] = value;
-            for (x, a) in x[*from..i].iter_mut().zip(left) {
-                x.iter_mut().zip(value).for_each(|(x, value)| *x -= a * value);
+            x[*from..i].iter_mut().zip(left).for_each(|(x, a)| *x -= a * value);
+        }
+    }
+
+    /// Puts L⁻¹ X in the place of X, of which each row has `width` entries.
+    pub fn forward(&self, x: &mut [f64], width: usize) {
+        for (i, from) in self.skyline.first.iter().enumerate() {
+            let (left, diagonal) = self.skyline.row(i);
+            let (above, below) = x.split_at_mut(i * width);
+            let own = &mut below[..width];
+            for (a, other) in left.iter().zip(above[from * width..].chunks_exact(width.max(1))) {
+                own.iter_mut().zip(other).for_each(|(own, other)| *own -= a * other);
             }
+            own.iter_mut().for_each(|own| *own /= diagonal);
         }
     }
 }
@@ -126,11 +126,14 @@ mod tests {
             }
             let factor = skyline.factorised().unwrap();
             let expected = dense.clone().lu().solve(&DVector::from_vec(x.clone())).unwrap();
-            let mut found: Vec<Lanes<3>> = x.iter().map(|x| [*x, 0.0, -2.0 * x]).collect();
+            let mut found = x.clone();
             factor.solve(&mut found);
-            for (lane, times) in [1.0, 0.0, -2.0].into_iter().enumerate() {
-                let found = DVector::from_iterator(20, found.iter().map(|found| found[lane]));
-                prop_assert!((found - &expected * times).amax() < 1e-10);
+            prop_assert!((DVector::from_vec(found) - &expected).amax() < 1e-10);
+            let mut halves: Vec<f64> = x.iter().flat_map(|x| [*x, -2.0 * x]).collect();
+            factor.forward(&mut halves, 2);
+            for (one, twice) in [(0, 1.0), (1, 4.0)] {
+                let square: f64 = halves.iter().skip(one).step_by(2).map(|y| y * y).sum();
+                prop_assert!((square - twice * DVector::from_vec(x.clone()).dot(&expected)).abs() < 1e-9);
             }
             prop_assert!((factor.log_determinant - dense.determinant().ln()).abs() < 1e-9);
         }

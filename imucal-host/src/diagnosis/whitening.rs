@@ -1,29 +1,27 @@
 //! The covariance of a channel's block means, and its inverse.
 //!
 //! ```text
-//! Σ = D + Σ_r U_r U_rᵀ + Z K Zᵀ
+//! Σ = D + σ² U Uᵀ + Z K Zᵀ
+//! Xᵀ Σ⁻¹ X = Xᵀ D⁻¹ X − Bᵀ B − Yᵀ Y      B = σ L⁻¹ Uᵀ D⁻¹ X      L Lᵀ = I + σ² Uᵀ D⁻¹ U
+//!                                          Y = R⁻¹ Zᵀ (D + σ² U Uᵀ)⁻¹ X      R Rᵀ = K⁻¹ + Zᵀ (D + σ² U Uᵀ)⁻¹ Z
 //! ```
 //!
 //! | symbol | meaning |
 //! | --- | --- |
-//! | D | white noise of each block mean |
-//! | U_r | what a stretch r has in common, a column for each way the table may stand off its encoders |
+//! | D, U, Z | white noise, courses of stretches, lines between knots: [`super::latent`] |
+//! | σ | scatter |
 //! | K | drift: first-order Gauss–Markov processes, at knots |
-//! | Z | straight lines between knots |
 //!
-//! By Woodbury's identity, twice: what stretches have in common first, column by column, the knots after it. Not
-//! modelled: drift within the distance of two knots, what the axes of a triad have in common.
+//! Woodbury's identity, twice: what stretches have in common first, the knots after it.
 
-use std::ops::Range;
+use std::sync::Arc;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use super::skyline::{Factor, Lanes, Skyline};
-
-/// Distance between knots, s.
-const SPACING: f64 = 2.5;
-/// Columns that are worked on side by side.
-const LANES: usize = 4;
+use super::{
+    latent::{COURSES, Condensed, Latents, SPACING, Stretch},
+    skyline::{Factor, Skyline},
+};
 
 /// A first-order Gauss–Markov process.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,100 +32,68 @@ pub struct Process {
     pub sigma: f64,
 }
 
-/// Blocks of one stretch and what they share: random numbers of variance one times these courses.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Shared {
-    /// Blocks, consecutive.
-    pub blocks: Range<usize>,
-    /// A value for each of the blocks, channel's unit.
-    pub courses: Vec<Vec<f64>>,
-}
-
-/// Most courses of a stretch: one for each gimbal.
-const COURSES: usize = 3;
-
-/// Blocks of one stretch and B, such that (D + U Uᵀ)⁻¹ = D⁻¹ − D⁻¹ B Bᵀ D⁻¹.
+/// What a stretch has in common, given σ.
 #[derive(Clone, Debug)]
 struct Common {
-    blocks: Range<usize>,
-    /// Columns of B.
-    courses: usize,
-    /// B, row by row.
-    b: Vec<f64>,
-    /// First knot that its blocks lie beside.
-    base: usize,
-    /// Zᵀ D⁻¹ B over the knots from there on, row by row.
-    beside: Vec<f64>,
+    /// σ L⁻¹.
+    scaled: Matrix3<f64>,
+    /// B of the knots, from the stretch's first on.
+    beside: Vec<[f64; COURSES]>,
 }
 
 /// Σ⁻¹ of one channel.
 #[derive(Clone, Debug)]
 pub struct Whitening {
-    weights: Vec<f64>,
-    knots: Vec<(usize, f64)>,
-    shared: Vec<Common>,
+    latents: Arc<Latents>,
+    commons: Vec<Common>,
     processes: usize,
-    states: usize,
     factor: Option<Factor>,
     /// Natural logarithm of Σ's determinant, over blocks with a weight.
     pub log_determinant: f64,
 }
 
 impl Whitening {
-    /// From the blocks' times, s, increasing; their inverse white variances, zero where a block holds nothing; what
-    /// stretches share; and drifts. Drifts that make the matrix indefinite by rounding are left out.
-    pub fn new(times: &[f64], weights: Vec<f64>, stretches: &[Shared], drifts: &[Process]) -> Self {
-        let start = times.first().copied().unwrap_or(0.0);
-        let length = times.last().copied().unwrap_or(0.0) - start;
-        let count = (length / SPACING).ceil() as usize + 1;
-        let knots: Vec<(usize, f64)> = times
-            .iter()
-            .map(|time| {
-                let at = (time - start) / SPACING;
-                let knot = (at.floor() as usize).min(count.saturating_sub(2));
-                (knot, at - knot as f64)
-            })
-            .collect();
-        let mut log_determinant: f64 = weights.iter().filter(|w| **w > 0.0).map(|w| -w.ln()).sum();
-        let shared: Vec<Common> = stretches
-            .iter()
-            .filter(|stretch| !stretch.courses.is_empty())
-            .map(|stretch| {
-                let (common, share) = Common::new(stretch, &weights, &knots);
-                log_determinant += share;
-                common
-            })
-            .collect();
-        let mut whitening = Self {
-            weights,
-            knots,
-            shared,
-            processes: drifts.len(),
-            states: count.max(2) * drifts.len(),
-            factor: None,
-            log_determinant,
+    /// From what blocks have in common, the scatter of that, and drifts. Drifts that make the matrix indefinite by
+    /// rounding are left out.
+    pub fn new(latents: Arc<Latents>, scatter: f64, drifts: &[Process]) -> Self {
+        let weights = latents.weights.iter().filter(|w| **w > 0.0);
+        let mut log_determinant: f64 = weights.map(|w| -w.ln()).sum();
+        let mut common = |stretch| {
+            let (common, share) = Common::new(stretch, scatter);
+            log_determinant += share;
+            common
         };
-        whitening.factor = whitening.factorise(count.max(2), drifts);
+        let commons = latents.stretches.iter().map(&mut common).collect();
+        let mut whitening = Self { latents, commons, processes: drifts.len(), factor: None, log_determinant };
+        whitening.factor = whitening.factorise(drifts);
         if let Some(factor) = &whitening.factor {
             whitening.log_determinant += factor.log_determinant;
             for drift in drifts {
-                let q = innovation(drift);
-                whitening.log_determinant += (count.max(2) - 1) as f64 * q.ln() + 2.0 * drift.sigma.ln();
+                let steps = (whitening.latents.knots - 1) as f64;
+                whitening.log_determinant += steps * innovation(drift).ln() + 2.0 * drift.sigma.ln();
             }
         }
         whitening
     }
 
-    fn factorise(&self, count: usize, drifts: &[Process]) -> Option<Factor> {
-        let p = self.processes;
+    /// What the blocks have in common.
+    pub fn latents(&self) -> &Arc<Latents> {
+        &self.latents
+    }
+
+    fn common(&self) -> impl Iterator<Item = (&Stretch, &Common)> {
+        self.latents.stretches.iter().zip(&self.commons)
+    }
+
+    fn factorise(&self, drifts: &[Process]) -> Option<Factor> {
+        let (p, count) = (self.processes, self.latents.knots);
         if p == 0 {
             return None;
         }
         let mut first: Vec<usize> = (0..count * p).map(|state| (state / p).saturating_sub(1) * p).collect();
-        for common in &self.shared {
-            let (from, to) = (common.base, common.base + common.beside.len() / common.courses);
-            for reach in &mut first[from * p..to * p] {
-                *reach = (*reach).min(from * p);
+        for (Stretch { base, beside, .. }, _) in self.common() {
+            for reach in &mut first[base * p..(base + beside.len()) * p] {
+                *reach = (*reach).min(base * p);
             }
         }
         let mut matrix = Skyline::new(first);
@@ -150,14 +116,15 @@ impl Whitening {
                 }
             }
         };
-        for ((knot, share), w) in self.knots.iter().zip(&self.weights) {
-            spread(*knot, *knot, w * (1.0 - share) * (1.0 - share));
-            spread(knot + 1, *knot, w * share * (1.0 - share));
-            spread(knot + 1, knot + 1, w * share * share);
+        for (knot, (own, next)) in self.latents.between.iter().enumerate() {
+            spread(knot, knot, *own);
+            if knot + 1 < count {
+                spread(knot + 1, knot, *next);
+            }
         }
-        for Common { courses, base, beside, .. } in &self.shared {
-            for (i, one) in beside.chunks_exact(*courses).enumerate() {
-                for (j, other) in beside.chunks_exact(*courses).enumerate().take(i + 1) {
+        for (Stretch { base, .. }, Common { beside, .. }) in self.common() {
+            for (i, one) in beside.iter().enumerate() {
+                for (j, other) in beside.iter().enumerate().take(i + 1) {
                     let both: f64 = one.iter().zip(other).map(|(a, b)| a * b).sum();
                     spread(base + i, base + j, -both);
                 }
@@ -166,140 +133,82 @@ impl Whitening {
         matrix.factorised()
     }
 
-    /// Σ⁻¹ x of one column over the blocks.
+    /// Xᵀ Σ⁻¹ X of columns that were condensed from the same blocks.
+    pub fn products(&self, x: &Condensed) -> DMatrix<f64> {
+        let (n, courses) = (x.plain.ncols(), self.latents.courses);
+        let (along, knots) = self.shared(x);
+        let states = self.factor.as_ref().map_or(0, |_| self.latents.knots * self.processes);
+        let mut latent = DMatrix::zeros(n, courses + states);
+        latent.columns_mut(0, courses).copy_from(&along);
+        if let Some(factor) = &self.factor {
+            for state in 0..states {
+                latent.set_column(courses + state, &knots.column(state / self.processes));
+            }
+            factor.forward(&mut latent.as_mut_slice()[courses * n..], n);
+        }
+        let mut products = x.plain.clone();
+        products.gemm(-1.0, &latent, &latent.transpose(), 1.0);
+        products
+    }
+
+    /// B, and Zᵀ (D + σ² U Uᵀ)⁻¹ X; columns as in those condensed.
+    fn shared(&self, x: &Condensed) -> (DMatrix<f64>, DMatrix<f64>) {
+        let mut along = DMatrix::zeros(x.along.nrows(), self.latents.courses);
+        let mut knots = x.beside.clone();
+        for (stretch, common) in self.common() {
+            for course in 0..stretch.count {
+                let mut own = along.column_mut(stretch.first + course);
+                for other in 0..=course {
+                    own.axpy(common.scaled[(course, other)], &x.along.column(stretch.first + other), 1.0);
+                }
+                for (at, beside) in common.beside.iter().enumerate() {
+                    knots.column_mut(stretch.base + at).axpy(-beside[course], &own, 1.0);
+                }
+            }
+        }
+        (along, knots)
+    }
+
+    /// Σ⁻¹ x of one column over the blocks: what white noise alone leaves of it, less what it shows of all else.
     pub fn apply(&self, x: &[f64], out: &mut [f64]) {
-        let weighted = self.weighted(x.iter().map(|x| [*x]));
-        out.iter_mut().zip(weighted).for_each(|(out, [value])| *out = value);
-    }
-
-    /// Σ⁻¹ X, a column for each of X.
-    pub fn apply_all(&self, x: &DMatrix<f64>) -> DMatrix<f64> {
-        let (blocks, mut at) = (x.nrows(), 0);
-        let mut out = DMatrix::zeros(blocks, x.ncols());
-        while at < x.ncols() {
-            if at + LANES <= x.ncols() {
-                self.columns::<LANES>(x, at, &mut out);
-                at += LANES;
-            } else {
-                self.columns::<1>(x, at, &mut out);
-                at += 1;
+        let Latents { weights, places, knots, .. } = &*self.latents;
+        let (along, beside) =
+            self.shared(&self.latents.condensed(&DMatrix::from_column_slice(x.len(), 1, x)));
+        let mut drift = vec![0.0; *knots];
+        if let Some(factor) = &self.factor {
+            let p = self.processes;
+            let mut states: Vec<f64> = beside.iter().flat_map(|knot| std::iter::repeat_n(*knot, p)).collect();
+            factor.solve(&mut states);
+            drift.iter_mut().zip(states.chunks_exact(p)).for_each(|(knot, state)| *knot = state.iter().sum());
+        }
+        for (out, (x, (knot, share))) in out.iter_mut().zip(x.iter().zip(places)) {
+            *out = x - drift[*knot] * (1.0 - share) - drift[knot + 1] * share;
+        }
+        for (stretch, common) in self.common() {
+            let shown = |course: usize| {
+                let drifts = common.beside.iter().zip(&drift[stretch.base..]);
+                let drift: f64 = drifts.map(|(beside, drift)| beside[course] * drift).sum();
+                if course < stretch.count { along[stretch.first + course] - drift } else { 0.0 }
+            };
+            let amounts = common.scaled.tr_mul(&Vector3::from_fn(|course, _| shown(course)));
+            for (out, u) in out[stretch.blocks.clone()].iter_mut().zip(&stretch.u) {
+                *out -= amounts.iter().zip(u).map(|(amount, u)| amount * u).sum::<f64>();
             }
         }
-        out
-    }
-
-    /// Columns of X from `at` on.
-    fn columns<const L: usize>(&self, x: &DMatrix<f64>, at: usize, out: &mut DMatrix<f64>) {
-        let (blocks, from) = (x.nrows(), at * x.nrows());
-        let columns: [&[f64]; L] =
-            std::array::from_fn(|lane| &x.as_slice()[from + lane * blocks..from + (lane + 1) * blocks]);
-        let weighted = self.weighted((0..blocks).map(|row| columns.map(|column| column[row])));
-        for (lane, out) in out.as_mut_slice()[from..].chunks_exact_mut(blocks.max(1)).take(L).enumerate() {
-            out.iter_mut().zip(&weighted).for_each(|(out, row)| *out = row[lane]);
-        }
-    }
-
-    /// Σ⁻¹ x of columns side by side.
-    fn weighted<const L: usize>(&self, x: impl Iterator<Item = Lanes<L>>) -> Vec<Lanes<L>> {
-        let mut out: Vec<Lanes<L>> = x.zip(&self.weights).map(|(x, w)| x.map(|x| x * w)).collect();
-        self.share(&mut out);
-        let Some(factor) = &self.factor else { return out };
-        let p = self.processes;
-        let mut knots = vec![[0.0; L]; self.states / p];
-        for ((knot, share), out) in self.knots.iter().zip(&out) {
-            for lane in 0..L {
-                knots[*knot][lane] += out[lane] * (1.0 - share);
-                knots[knot + 1][lane] += out[lane] * share;
-            }
-        }
-        let mut state: Vec<Lanes<L>> = knots.iter().flat_map(|knot| std::iter::repeat_n(*knot, p)).collect();
-        factor.solve(&mut state);
-        for (knot, state) in knots.iter_mut().zip(state.chunks_exact(p)) {
-            *knot = std::array::from_fn(|lane| state.iter().map(|state| state[lane]).sum());
-        }
-        let drift: Vec<Lanes<L>> = self
-            .knots
-            .iter()
-            .zip(&self.weights)
-            .map(|((knot, share), w)| {
-                let (before, after) = (&knots[*knot], &knots[knot + 1]);
-                std::array::from_fn(|lane| w * (before[lane] * (1.0 - share) + after[lane] * share))
-            })
-            .collect();
-        for (out, drift) in out.iter_mut().zip(&drift) {
-            out.iter_mut().zip(drift).for_each(|(out, drift)| *out -= drift);
-        }
-        for common in &self.shared {
-            let along = common.along(&common.beside, &knots[common.base..]);
-            common.take(&along.map(|sum| sum.map(|sum| -sum)), &self.weights, &mut out);
-        }
-        out
-    }
-
-    /// From D⁻¹ x to (D + shared)⁻¹ x.
-    fn share<const L: usize>(&self, weighted: &mut [Lanes<L>]) {
-        for common in &self.shared {
-            let along = common.along(&common.b, &weighted[common.blocks.clone()]);
-            common.take(&along, &self.weights, weighted);
-        }
+        out.iter_mut().zip(weights).for_each(|(out, w)| *out *= w);
     }
 }
 
 impl Common {
-    /// B of a stretch, one course after the other, and ln |I + Uᵀ D⁻¹ U|.
-    fn new(stretch: &Shared, weights: &[f64], knots: &[(usize, f64)]) -> (Self, f64) {
-        let Shared { blocks, courses } = stretch;
-        let (weights, knots) = (&weights[blocks.clone()], &knots[blocks.clone()]);
-        let inner =
-            |a: &[f64], b: &[f64]| -> f64 { (0..weights.len()).map(|k| a[k] * b[k] * weights[k]).sum() };
-        let mut columns: Vec<Vec<f64>> = Vec::with_capacity(courses.len());
-        let mut log_determinant = 0.0;
-        for course in courses.iter().take(COURSES) {
-            let mut own = course.clone();
-            for before in &columns {
-                let along = inner(before, course);
-                own.iter_mut().zip(before).for_each(|(own, before)| *own -= along * before);
-            }
-            let square = 1.0 + inner(course, &own);
-            log_determinant += square.ln();
-            let factor = 1.0 / square.sqrt();
-            own.iter_mut().for_each(|own| *own *= factor);
-            columns.push(own);
-        }
-        let n = columns.len();
-        let (base, last) = (knots[0].0, knots[knots.len() - 1].0);
-        let mut b = vec![0.0; n * weights.len()];
-        let mut beside = vec![0.0; n * (last + 2 - base)];
-        for (course, column) in columns.iter().enumerate() {
-            for (row, value) in column.iter().enumerate() {
-                b[row * n + course] = *value;
-                let ((knot, share), weighted) = (knots[row], weights[row] * value);
-                beside[(knot - base) * n + course] += weighted * (1.0 - share);
-                beside[(knot + 1 - base) * n + course] += weighted * share;
-            }
-        }
-        (Self { blocks: blocks.clone(), courses: n, b, base, beside }, log_determinant)
-    }
-
-    /// Sums of rows times each column of `factors`, row by row.
-    fn along<const L: usize>(&self, factors: &[f64], rows: &[Lanes<L>]) -> [Lanes<L>; COURSES] {
-        let mut sums = [[0.0; L]; COURSES];
-        for (row, factors) in rows.iter().zip(factors.chunks_exact(self.courses)) {
-            for (sum, factor) in sums.iter_mut().zip(factors) {
-                sum.iter_mut().zip(row).for_each(|(sum, row)| *sum += factor * row);
-            }
-        }
-        sums
-    }
-
-    /// Takes D⁻¹ B times these amounts from the rows of its blocks.
-    fn take<const L: usize>(&self, amounts: &[Lanes<L>; COURSES], weights: &[f64], rows: &mut [Lanes<L>]) {
-        let (rows, weights) = (&mut rows[self.blocks.clone()], &weights[self.blocks.clone()]);
-        for ((row, w), b) in rows.iter_mut().zip(weights).zip(self.b.chunks_exact(self.courses)) {
-            for (amount, b) in amounts.iter().zip(b) {
-                row.iter_mut().zip(amount).for_each(|(row, amount)| *row -= w * b * amount);
-            }
-        }
+    /// Of a stretch, and ln |I + σ² Uᵀ D⁻¹ U|.
+    fn new(stretch: &Stretch, scatter: f64) -> (Self, f64) {
+        let square = Matrix3::identity() + stretch.gram * (scatter * scatter);
+        // Positive definite but for numbers that are none: then nothing is shared.
+        let lower = square.cholesky().map_or_else(Matrix3::identity, |factor| factor.l());
+        let inverse = lower.solve_lower_triangular(&Matrix3::identity()).unwrap_or_else(Matrix3::zeros);
+        let scaled = inverse * scatter;
+        let beside = stretch.beside.iter().map(|beside| (scaled * Vector3::from(*beside)).into()).collect();
+        (Self { scaled, beside }, 2.0 * lower.diagonal().iter().map(|a| a.ln()).sum::<f64>())
     }
 }
 
@@ -311,8 +220,11 @@ fn innovation(drift: &Process) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::latent::Shared, *};
     use nalgebra::DVector;
+
+    /// Anything but one.
+    const SCATTER: f64 = 0.8;
 
     /// Σ by its definition.
     fn dense(times: &[f64], weights: &[f64], shared: &[Shared], drifts: &[Process]) -> DMatrix<f64> {
@@ -331,7 +243,7 @@ mod tests {
         for Shared { blocks, courses } in shared {
             for (a, b) in blocks.clone().flat_map(|a| blocks.clone().map(move |b| (a, b))) {
                 let both = |u: &Vec<f64>| u[a - blocks.start] * u[b - blocks.start];
-                sigma[(a, b)] += courses.iter().map(both).sum::<f64>();
+                sigma[(a, b)] += SCATTER * SCATTER * courses.iter().map(both).sum::<f64>();
             }
         }
         sigma
@@ -357,15 +269,21 @@ mod tests {
         let drifts = [Process { time: 8.0, sigma: 0.9 }, Process { time: 150.0, sigma: 2.0 }];
         for drifts in [&drifts[..], &drifts[..1], &[]] {
             let sigma = dense(&times, &weights, &shared, drifts);
-            let whitening = Whitening::new(&times, weights.clone(), &shared, drifts);
+            let latents = Arc::new(Latents::new(&times, weights.clone(), &shared));
+            let whitening = Whitening::new(Arc::clone(&latents), SCATTER, drifts);
             let log_determinant = sigma.clone().cholesky().unwrap().ln_determinant();
             assert!((whitening.log_determinant - log_determinant).abs() < 1e-8);
             let x = DVector::from_fn(60, |k, _| ((k * k) as f64).sin());
             let mut found = vec![0.0; 60];
             whitening.apply(x.as_slice(), &mut found);
             assert!((&sigma * DVector::from_vec(found) - &x).amax() < 1e-9);
-            let several = DMatrix::from_fn(60, 6, |row, column| x[row] * (column as f64 - 1.5));
-            assert!((sigma * whitening.apply_all(&several) - several).amax() < 1e-9);
+            let several = DMatrix::from_fn(60, 6, |row, column| (x[row] * (column as f64 - 1.5)).cos());
+            let expected = several.tr_mul(&sigma.lu().solve(&several).unwrap());
+            let condensed = latents.condensed(&several);
+            assert!((whitening.products(&condensed) - &expected).amax() < 1e-9);
+            let some = [4, 1];
+            let picked = whitening.products(&condensed.picked(&some));
+            assert!((picked - expected.select_rows(&some).select_columns(&some)).amax() < 1e-9);
         }
     }
 }
