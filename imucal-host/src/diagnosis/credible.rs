@@ -10,6 +10,8 @@ use crate::effect::Effect;
 const JUDGED: usize = 5;
 /// Alternatives further below in ln of probability are not judged.
 const FAR: f64 = 25.0;
+/// Likewise, where each has a noise of its own.
+const BEHIND: f64 = 10.0;
 /// Probability that a credible set holds.
 const CREDIBLE: f64 = 0.95;
 
@@ -39,6 +41,7 @@ pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> O
         best.set.iter().copied().filter(|effect| !std::ptr::eq(*effect, cause)).collect();
     let (_, ranked) = linear.ranked(&rest, &best.noise)?;
     let own = ranked.iter().find(|(_, effect)| std::ptr::eq(*effect, cause))?.0;
+    let standard = linear.sift(&best.set, &best.noise, &[], &NEAR)?;
     let none = linear.judge(&rest, &best.noise, linear.scene.reach(cause), &NEAR)?;
     let mut judged: Vec<(f64, Option<&'static Effect>)> =
         vec![(best.log_evidence, Some(cause)), (none.log_evidence, None)];
@@ -48,7 +51,10 @@ pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> O
         set.push(effect);
         let anew: Vec<_> =
             linear.scene.reach(cause).iter().chain(linear.scene.reach(effect)).copied().collect();
-        if let Some(found) = linear.judge(&set, &best.noise, &anew, &NEAR) {
+        let sifted = linear.sift(&set, &best.noise, &anew, &NEAR);
+        // What falls behind axis by axis is not judged any further.
+        let sifted = sifted.filter(|sifted| sifted.value > standard.value - BEHIND);
+        if let Some(found) = sifted.and_then(|sifted| linear.together(sifted)) {
             judged.push((found.log_evidence, Some(effect)));
         }
     }

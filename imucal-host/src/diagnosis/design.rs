@@ -8,7 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use rayon::prelude::*;
 
 use super::{
-    latent::{Condensed, Latents},
+    latent::{Condensed, Latents, Sparse},
     scene::{Means, Scene},
     whitening::Whitening,
 };
@@ -148,13 +148,13 @@ impl Channel {
     }
 
     /// Some of its columns, by their place in `ids`, and behind them its residual.
-    fn condensed(&self, places: &[usize], latents: &Arc<Latents>) -> Condensed {
+    fn gathered(&self, places: &[usize]) -> DMatrix<f64> {
         let mut x = DMatrix::zeros(self.y.len(), places.len() + 1);
         for (to, from) in places.iter().enumerate() {
             x.set_column(to, &self.x.column(*from));
         }
         x.set_column(places.len(), &self.y);
-        latents.condensed(&x)
+        x
     }
 }
 
@@ -231,7 +231,8 @@ impl Design {
             .zip(whitenings)
             .map(|(channel, whitening)| {
                 let (from, to) = places(&channel.ids, wanted);
-                (Normal::of(&channel.condensed(&from, whitening.latents()), whitening), to)
+                let columns = whitening.latents().condensed(&channel.gathered(&from));
+                (Normal::of(&columns, whitening), to)
             })
             .collect();
         let mut normal = Normal::zeros(wanted.len());
@@ -239,11 +240,38 @@ impl Design {
         normal
     }
 
+    /// Normal equations of some columns and of sparse ones before them, which a channel may have.
+    pub fn normal_beside(
+        &self,
+        whitenings: &[Whitening],
+        sparse: &(dyn Fn(&Channel) -> Sparse + Sync),
+        wanted: &[usize],
+    ) -> Normal {
+        let parts: Vec<(Normal, Vec<usize>, usize)> = self
+            .channels
+            .par_iter()
+            .zip(whitenings)
+            .map(|(channel, whitening)| {
+                let (from, to) = places(&channel.ids, wanted);
+                let sparse = sparse(channel);
+                let columns = whitening.latents().condensed_beside(&sparse, &channel.gathered(&from));
+                (Normal::of(&columns, whitening), to, sparse.count)
+            })
+            .collect();
+        let count = parts.iter().map(|(_, _, count)| *count).max().unwrap_or_default();
+        let mut normal = Normal::zeros(count + wanted.len());
+        for (part, to, own) in &parts {
+            let ids: Vec<usize> = (0..*own).chain(to.iter().map(|to| count + to)).collect();
+            normal.add(part, &ids);
+        }
+        normal
+    }
+
     /// All columns, given what the blocks of a channel have in common.
     pub fn condensed(&self, latents: &(dyn Fn(&Channel) -> Latents + Sync)) -> CondensedDesign {
         let channels = self.channels.par_iter().map(|channel| {
             let every: Vec<usize> = (0..channel.ids.len()).collect();
-            let columns = channel.condensed(&every, &Arc::new(latents(channel)));
+            let columns = Arc::new(latents(channel)).condensed(&channel.gathered(&every));
             CondensedChannel { kind: channel.kind, ids: channel.ids.clone(), columns }
         });
         CondensedDesign { channels: channels.collect() }

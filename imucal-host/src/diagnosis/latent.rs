@@ -34,6 +34,22 @@ pub struct Shared {
     pub courses: Vec<Vec<f64>>,
 }
 
+/// Columns that are zero but for a few blocks: for each block their places and values there.
+#[derive(Clone, Debug)]
+pub struct Sparse {
+    /// Number of columns.
+    pub count: usize,
+    /// Places and values, block by block.
+    pub rows: Vec<Vec<(usize, f64)>>,
+}
+
+impl Sparse {
+    /// None at all.
+    pub fn none(blocks: usize) -> Self {
+        Self { count: 0, rows: vec![Vec::new(); blocks] }
+    }
+}
+
 /// A stretch as white noise weighs it. Courses that it does not have are zero.
 #[derive(Clone, Debug)]
 pub struct Stretch {
@@ -68,6 +84,8 @@ pub struct Latents {
     pub stretches: Vec<Stretch>,
     /// Number of courses of all stretches.
     pub courses: usize,
+    /// ln |D|, over blocks that hold something.
+    pub log_determinant: f64,
 }
 
 /// Columns of a channel, as white noise weighs them.
@@ -111,7 +129,8 @@ impl Latents {
                 stretch
             })
             .collect();
-        Self { weights, places, knots, between, stretches, courses }
+        let log_determinant = weights.iter().filter(|w| **w > 0.0).map(|w| -w.ln()).sum();
+        Self { weights, places, knots, between, stretches, courses, log_determinant }
     }
 
     /// Some columns over the blocks.
@@ -135,6 +154,31 @@ impl Latents {
             }
         }
         Condensed { latents: Arc::clone(self), plain: weighted * x, along, beside }
+    }
+
+    /// Sparse columns, and behind them some others.
+    pub fn condensed_beside(self: &Arc<Self>, sparse: &Sparse, x: &DMatrix<f64>) -> Condensed {
+        let dense = self.condensed(x);
+        let (n, own) = (sparse.count, x.ncols());
+        let mut plain = DMatrix::zeros(n + own, n + own);
+        plain.view_mut((n, n), (own, own)).copy_from(&dense.plain);
+        let mut beside = DMatrix::zeros(n + own, self.knots);
+        beside.rows_mut(n, own).copy_from(&dense.beside);
+        let mut across = DMatrix::zeros(own, n);
+        let transposed = x.transpose();
+        for (block, (row, (w, (knot, share)))) in
+            sparse.rows.iter().zip(self.weights.iter().zip(&self.places)).enumerate()
+        {
+            for (place, value) in row {
+                beside[(*place, *knot)] += w * value * (1.0 - share);
+                beside[(*place, knot + 1)] += w * value * share;
+                across.column_mut(*place).axpy(w * value, &transposed.column(block), 1.0);
+                row.iter().for_each(|(other, also)| plain[(*place, *other)] += w * value * also);
+            }
+        }
+        plain.view_mut((n, 0), (own, n)).copy_from(&across);
+        plain.view_mut((0, n), (n, own)).copy_from(&across.transpose());
+        Condensed { latents: Arc::clone(self), plain, along: DMatrix::zeros(n + own, self.courses), beside }
     }
 }
 

@@ -24,6 +24,17 @@ use crate::{
 /// Answers that are kept.
 const KEPT: usize = 2;
 
+/// A set of effects and how it does axis by axis: its noise, and its evidence so far.
+#[derive(Clone, Debug)]
+pub struct Sifted {
+    /// The effects.
+    pub set: Vec<&'static Effect>,
+    /// The noise that suits it.
+    pub noise: Noise,
+    /// ln of its probability, but for a constant; to be compared with others of this kind alone.
+    pub value: f64,
+}
+
 /// A set of effects and how it was judged.
 #[derive(Clone, Debug)]
 pub struct Judged {
@@ -218,6 +229,17 @@ impl<'s> Linear<'s> {
         anew: &[SensorKind],
         steps: &[f64],
     ) -> Option<Judged> {
+        self.together(self.sift(set, start, anew, steps)?)
+    }
+
+    /// The same axis by axis.
+    pub fn sift(
+        &self,
+        set: &[&'static Effect],
+        start: &Noise,
+        anew: &[SensorKind],
+        steps: &[f64],
+    ) -> Option<Sifted> {
         let fitted = self.fitted(set);
         let mut noise = start.clone();
         let condensed = self.condensed(start).picked(None, &fitted);
@@ -228,9 +250,9 @@ impl<'s> Linear<'s> {
         let found: Vec<SensorNoise> = asked.par_iter().map(fit).collect();
         asked.into_iter().zip(found).for_each(|(kind, found)| noise.sensors[kind as usize] = found);
         let normal = noise.normal(&condensed, fitted.len());
-        let log_evidence = log_evidence(&normal, &noise, self.baseline.len(), &self.groups(set, &fitted))?
+        let value = log_evidence(&normal, &noise, self.baseline.len(), &self.groups(set, &fitted))?
             - set.iter().map(|effect| self.surprise(effect)).sum::<f64>();
-        Some(Judged { set: set.to_vec(), noise, log_evidence })
+        Some(Sifted { set: set.to_vec(), noise, value })
     }
 
     /// Places of each effect's columns among the fitted.
@@ -242,7 +264,7 @@ impl<'s> Linear<'s> {
     }
 
     /// −ln of an effect's prior: one of the candidates, in one of its shapes or such as are as likely.
-    fn surprise(&self, effect: &Effect) -> f64 {
+    pub fn surprise(&self, effect: &Effect) -> f64 {
         let at = self.candidates.effects.iter().position(|other| std::ptr::eq(*other, effect));
         let spread = at.map_or(0.0, |at| self.shapes[at].spread);
         let shapes = (shape::choices(effect, self.scene.duration()) as f64).ln();

@@ -32,6 +32,7 @@ pub mod shape;
 mod skyline;
 pub mod start;
 pub mod testable;
+mod together;
 mod unsteady;
 mod white;
 pub mod whitening;

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{
     candidates::is_shaped,
-    linear::{Judged, Linear},
+    linear::{Judged, Linear, Sifted},
     noise::{NEAR, Noise},
     refit::Fit,
 };
@@ -15,9 +15,11 @@ use crate::{
 
 /// Sets judged with a noise of their own at each move: the likeliest, and for each sensor those that a quieter noise
 /// would have.
-const JUDGED: (usize, usize) = (6, 3);
+const JUDGED: (usize, usize) = (8, 4);
+/// Of those, the likeliest, which are judged with all sensors together.
+const TOGETHER: usize = 3;
 /// Effects replaced by the likeliest others.
-const REPLACED: usize = 3;
+const REPLACED: usize = 5;
 /// Of the effects that a quieter noise would have on a sensor, those that are tried in pairs.
 const PAIRED: usize = 8;
 
@@ -156,8 +158,13 @@ impl Linear<'_> {
 
     /// The best of some sets, the noise of the sensors beside each estimated anew.
     fn best_of(&self, sets: Vec<Reaching>, noise: &Noise) -> Option<Judged> {
+        let sifted: Vec<Option<Sifted>> =
+            sets.par_iter().map(|(set, anew)| self.sift(set, noise, anew, &NEAR)).collect();
+        let mut sifted: Vec<Sifted> = sifted.into_iter().flatten().collect();
+        sifted.sort_by(|a, b| b.value.total_cmp(&a.value));
+        sifted.truncate(TOGETHER);
         let judged: Vec<Option<Judged>> =
-            sets.par_iter().map(|(set, anew)| self.judge(set, noise, anew, &NEAR)).collect();
+            sifted.into_par_iter().map(|sifted| self.together(sifted)).collect();
         judged.into_iter().flatten().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
     }
 

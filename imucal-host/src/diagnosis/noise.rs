@@ -40,6 +40,10 @@ pub const FAR: [f64; 2] = [4.0, 1.7];
 pub const NEAR: [f64; 1] = [2.0];
 /// Rounds over all standard deviations for each factor.
 const ROUNDS: usize = 4;
+/// −2 ln of the likelihood must fall by this for a step to be gone.
+const WORTH: f64 = 0.05;
+/// A beginning that is so much worse than what has been found leads nowhere better.
+const HOPELESS: f64 = 15.0;
 /// Share of drift and scatter that [`Noise::quieter`] leaves.
 const QUIET: f64 = 0.2;
 
@@ -152,6 +156,15 @@ impl<'s> Weighing<'s> {
         design.channels.par_iter().map(whitening).collect()
     }
 
+    /// Σ⁻¹ of each channel of a design, but for the scatter.
+    pub fn drifting(&self, design: &Design, noise: &Noise) -> Vec<Whitening> {
+        let whitening = |channel: &Channel| {
+            let latents = Latents::new(&self.times, self.weights(channel, noise, &|_| true), &[]);
+            noise.sensors[channel.kind as usize].whitening(&Arc::new(latents))
+        };
+        design.channels.par_iter().map(whitening).collect()
+    }
+
     /// A design's columns, as white noise weighs them.
     pub fn condensed(&self, design: &Design, noise: &Noise) -> CondensedDesign {
         design.condensed(&|channel| self.latents(channel, noise, &|_| true))
@@ -175,16 +188,19 @@ impl<'s> Weighing<'s> {
     /// What the blocks of a channel have in common, by its white noise; of some of them, as if the others had not been
     /// measured.
     fn latents(&self, channel: &Channel, noise: &Noise, inside: &(dyn Fn(usize) -> bool + Sync)) -> Latents {
+        let weights = self.weights(channel, noise, inside);
+        Latents::new(&self.times, weights, &self.scattered(channel).shared())
+    }
+
+    fn weights(&self, channel: &Channel, noise: &Noise, inside: &(dyn Fn(usize) -> bool + Sync)) -> Vec<f64> {
         let sensor = &noise.sensors[channel.kind as usize];
-        let blocks = &self.scene.blocks;
         let counts = &self.scene.counts[channel.kind as usize];
         let weight = |(at, (block, count)): (usize, (&Block, &usize))| {
             let sigma = if block.rest.is_some() { sensor.white } else { sensor.moving }[channel.axis];
             let told = inside(at) && self.scene.tells(channel.kind, at, channel.axis);
             if told { *count as f64 / (sigma * sigma) } else { 0.0 }
         };
-        let weights: Vec<f64> = blocks.iter().zip(counts).enumerate().map(weight).collect();
-        Latents::new(&self.times, weights, &self.scattered(channel).shared())
+        self.scene.blocks.iter().zip(counts).enumerate().map(weight).collect()
     }
 
     /// The noise of a sensor under which its residual, less `columns`, is likeliest; the search begins at `start`, by
@@ -202,43 +218,59 @@ impl<'s> Weighing<'s> {
             let whitening = |channel: &CondensedChannel| sensor.whitening(&channel.columns.latents);
             restricted(&picked.normal(columns.len(), &whitening)) + 2.0 * sensor.surprise()
         };
-        let mut best = start.sensors[kind as usize];
-        let mut least = likelihood(&best);
+        let start = start.sensors[kind as usize];
+        // Between two correlation times lies a hill: each is searched by itself.
+        let mut starts = SLOW.map(|slow| start.with_slow(slow)).map(|start| (start, likelihood(&start)));
+        starts.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+        let mut best = starts[0];
+        for tried in starts {
+            if tried.1 < best.1 + HOPELESS {
+                let end = self.descended(kind, tried, steps, &likelihood);
+                best = if end.1 < best.1 { end } else { best };
+            }
+        }
+        best.0
+    }
+
+    /// Standard deviations changed one by one while `surprise` falls, and its end.
+    fn descended(
+        &self,
+        kind: SensorKind,
+        (mut best, mut least): (SensorNoise, f64),
+        steps: &[f64],
+        surprise: &dyn Fn(&SensorNoise) -> f64,
+    ) -> (SensorNoise, f64) {
         for factor in steps {
-            let mut improved = true;
-            let mut rounds = 0;
-            while improved && rounds < ROUNDS {
-                improved = false;
-                rounds += 1;
-                for tried in best.otherwise_slow() {
-                    let found = likelihood(&tried);
-                    if found < least - 0.05 {
-                        (best, least, improved) = (tried, found, true);
-                    }
-                }
+            for _ in 0..ROUNDS {
+                let before = least;
                 for coordinate in 0..if kind == SensorKind::Gyr { 2 } else { 3 } {
                     for step in [*factor, 1.0 / factor] {
-                        loop {
-                            let mut tried = best;
-                            let value = tried.coordinate(coordinate);
-                            *value *= step;
-                            let value = *value;
-                            let floor = 1e-3 * best.white[0].min(best.white[1]).min(best.white[2]);
-                            let smallest = if coordinate == 2 { self.least_scatter() } else { floor };
-                            if value < smallest || value > 1e4 * smallest {
+                        while let Some(tried) = self.scaled(best, coordinate, step) {
+                            let found = surprise(&tried);
+                            if found >= least - WORTH {
                                 break;
                             }
-                            let found = likelihood(&tried);
-                            if found >= least - 0.05 {
-                                break;
-                            }
-                            (best, least, improved) = (tried, found, true);
+                            (best, least) = (tried, found);
                         }
                     }
                 }
+                if least == before {
+                    break;
+                }
             }
         }
-        best
+        (best, least)
+    }
+
+    /// With one standard deviation scaled; `None` beyond what is looked for.
+    fn scaled(&self, mut sensor: SensorNoise, coordinate: usize, factor: f64) -> Option<SensorNoise> {
+        let floor = 1e-3 * sensor.white.into_iter().fold(f64::INFINITY, f64::min);
+        let (value, smallest) = match coordinate {
+            0 | 1 => (&mut sensor.drift[coordinate], floor),
+            _ => (&mut sensor.scatter, self.least_scatter()),
+        };
+        *value *= factor;
+        (smallest..=1e4 * smallest).contains(value).then_some(sensor)
     }
 }
 
@@ -255,20 +287,10 @@ impl SensorNoise {
         if self.slow < WALK { 0.0 } else { WALKS }
     }
 
-    /// With other correlation times of the slow drift, which goes as far from one moment to the next.
-    fn otherwise_slow(self) -> impl Iterator<Item = Self> {
-        let with = move |slow: f64| {
-            let drift = [self.drift[0], self.drift[1] * libm::sqrt(slow / self.slow)];
-            Self { slow, drift, ..self }
-        };
-        SLOW.into_iter().filter(move |slow| *slow != self.slow).map(with)
-    }
-
-    fn coordinate(&mut self, index: usize) -> &mut f64 {
-        match index {
-            0 | 1 => &mut self.drift[index],
-            _ => &mut self.scatter,
-        }
+    /// With another correlation time of the slow drift, which goes as far from one moment to the next.
+    fn with_slow(self, slow: f64) -> Self {
+        let drift = [self.drift[0], self.drift[1] * libm::sqrt(slow / self.slow)];
+        Self { slow, drift, ..self }
     }
 }
 

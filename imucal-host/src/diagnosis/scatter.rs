@@ -10,9 +10,9 @@
 //! | e_g | three directions at right angles: at rest nothing tells one turn from another on a single axis |
 //! | σ | scatter, rad |
 //!
-//! A gimbal does not come to rest where its encoder says, and takes some of that along until it rests again. Not modelled:
-//! that all sensors stand off together, that a stretch begins where the last one ended, and that the gyroscope sees it
-//! change.
+//! A gimbal does not come to rest where its encoder says, and takes some of that along until it rests again. Axis by axis:
+//! that all sensors stand off together, and that a stretch begins where the last one ended, is told by
+//! [`super::together`]. Not modelled: that the gyroscope sees it change.
 
 use std::{ops::Range, sync::OnceLock};
 
@@ -34,8 +34,8 @@ const LONGEST: f64 = 20.0;
 pub struct Turned(OnceLock<Vec<Means>>);
 
 impl Turned {
-    /// What a usual size of each gimbal's offset changes, block by block; none where no rig guides the sensor.
-    fn of<'t>(&'t self, scene: &Scene<'_>) -> &'t [Means] {
+    /// What a radian of each gimbal's offset changes, block by block; none where no rig guides the sensor.
+    pub fn of<'t>(&'t self, scene: &Scene<'_>) -> &'t [Means] {
         self.0.get_or_init(|| {
             let offset = find("rig.encoder_offset").filter(|_| scene.swings.is_some());
             let signatures = offset.and_then(|offset| {
@@ -101,7 +101,7 @@ impl Scattered<'_> {
 }
 
 /// Blocks that stand off their encoders alike: a rest, or a part of a movement.
-fn stretches(blocks: &[Block]) -> Vec<Range<usize>> {
+pub fn stretches(blocks: &[Block]) -> Vec<Range<usize>> {
     let goes_on = |first: &Block, block: &Block| {
         block.rest == first.rest && (block.rest.is_some() || block.time - first.time < LONGEST)
     };

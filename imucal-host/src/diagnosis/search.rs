@@ -18,9 +18,8 @@ use crate::{effect::Effect, recording::SensorKind, simulator::Dose};
 /// Most effects in a set; where no rig guides the sensor, the latter: a hand and a reference add gaps of their own.
 const MOST: (usize, usize) = (3, 5);
 /// The first effect must raise the evidence by this, beyond its share of the prior, and each further one by the latter:
-/// where one thing is wrong, another is less of a surprise. False alarms are fewer by far than these odds
-/// (`imucal blind`), since the noise is estimated for each set.
-const GAIN: (f64, f64) = (2.0, 1.0);
+/// where one thing is wrong, another is less of a surprise. How many false alarms that makes is told by `imucal blind`.
+const GAIN: (f64, f64) = (0.5, 0.0);
 /// A set of no more effects must raise it by this.
 const CHANGE: f64 = 0.5;
 /// Fits of the baseline, each with the noise that the last one left, where no rig guides the sensor.

@@ -16,8 +16,13 @@ use crate::effect::{Effect, Role};
 
 /// Distance of instants in a menu, s, and as a share of the recording where that is more.
 const GRID: (f64, f64) = (5.0, 1.0 / 60.0);
-/// About the best pair of instants, a menu this many times as dense.
+/// About the best instants, a menu this many times as dense.
 const CLOSER: i32 = 8;
+/// Factors of a usual duration that are scanned beside an instant; about the best of those, further ones, two of which
+/// are as far apart.
+const BROAD: [f64; 2] = [0.7, 2.0];
+const DURATIONS: [f64; 3] = [0.6, 1.0, 1.7];
+const DENSER: f64 = 2.0;
 /// Signatures judged at once.
 const BATCH: usize = 12;
 
@@ -38,7 +43,8 @@ pub struct Backdrop<'a> {
 pub struct Shaped {
     /// All its parameters, amplitudes zero.
     pub values: Vec<f64>,
-    /// ln of the number of shapes that are as likely: the sum over the menu, as shares of the likeliest.
+    /// ln of how many shapes of the menu are as likely: the likelihood's sum over the menu as a share of its maximum, which
+    /// is less than one where that is sharper than the menu.
     pub spread: f64,
 }
 
@@ -55,20 +61,82 @@ pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backd
     if is_episode(effect) {
         return episode(effect, reference, backdrop, duration);
     }
-    let menu = menu(effect, duration);
-    let mut judged = Vec::with_capacity(menu.len());
-    for shapes in menu.chunks(BATCH) {
-        judged.extend(judge(effect, shapes, reference, backdrop)?);
-    }
-    let (best, spread) = likeliest(&judged);
-    Some(Shaped { values: menu.get(best)?.clone(), spread })
+    let judged = |menu: Vec<Vec<f64>>| {
+        let mut values = Vec::with_capacity(menu.len());
+        for shapes in menu.chunks(BATCH) {
+            values.extend(judge(effect, shapes, reference, backdrop)?);
+        }
+        Some(Scanned { shapes: menu, values })
+    };
+    let whole = judged(menu(effect, duration))?;
+    let (near, dense) = closer(effect, &whole.shapes[whole.best()?], duration);
+    let (values, spread) = whole.refined(&judged(near)?, dense)?;
+    Some(Shaped { values, spread })
 }
 
-/// The place of the largest ln BF and ln Σ e^(v − v_max); those that could not be computed are left out.
-fn likeliest(values: &[f64]) -> (usize, f64) {
-    let finite = || values.iter().enumerate().filter(|(_, value)| value.is_finite());
-    let Some((at, most)) = finite().max_by(|(_, a), (_, b)| a.total_cmp(b)) else { return (0, 0.0) };
-    (at, finite().map(|(_, value)| (value - most).exp()).sum::<f64>().ln())
+/// Shapes and their ln BF.
+struct Scanned<T> {
+    shapes: Vec<T>,
+    values: Vec<f64>,
+}
+
+impl<T: Clone> Scanned<T> {
+    fn finite(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.values.iter().copied().enumerate().filter(|(_, value)| value.is_finite())
+    }
+
+    /// The place of the likeliest; shapes that could not be computed are left out. `None` where none could.
+    fn best(&self) -> Option<usize> {
+        self.finite().max_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(at, _)| at)
+    }
+
+    /// The likeliest of the shapes `near` the best of these, of which `dense` lie within a cell of this menu, and ln of how
+    /// many of this menu are as likely.
+    fn refined(&self, near: &Self, dense: f64) -> Option<(T, f64)> {
+        let (best, refined) = (self.best()?, near.best()?);
+        let most = near.values[refined];
+        let share = |value: f64| (value - most).exp();
+        let elsewhere: f64 = self.finite().filter(|(at, _)| *at != best).map(|(_, v)| share(v)).sum();
+        let here: f64 = near.finite().map(|(_, value)| share(value)).sum();
+        Some((near.shapes[refined].clone(), (elsewhere + here / dense).ln()))
+    }
+}
+
+/// Shapes about one of a menu, itself among them, and how many of them lie within a cell of the menu.
+fn closer(effect: &Effect, about: &[f64], duration: f64) -> (Vec<Vec<f64>>, f64) {
+    let mut menu = vec![about.to_vec()];
+    let mut dense = 1.0;
+    if !is_timed(effect) {
+        return (menu, dense);
+    }
+    for (at, parameter) in effect.parameters.iter().enumerate() {
+        let (values, more): (Vec<f64>, f64) = match parameter.role {
+            Role::Instant { .. } => (instants(about[at], duration), f64::from(CLOSER)),
+            Role::Shape { .. } if parameter.range.0 >= 0.0 => {
+                (DURATIONS.iter().map(|factor| about[at] * factor).collect(), DENSER)
+            }
+            _ => continue,
+        };
+        menu = vary(&menu, at, &values);
+        dense *= more;
+    }
+    (menu, dense)
+}
+
+/// Instants about one of a menu, s.
+fn instants(about: f64, duration: f64) -> Vec<f64> {
+    let step = grid(duration) / f64::from(CLOSER);
+    let closer = (1 - CLOSER..CLOSER).map(|k| about + step * f64::from(k));
+    closer.filter(|time| (0.0..duration).contains(time)).collect()
+}
+
+/// Distance of instants in a menu, s.
+fn grid(duration: f64) -> f64 {
+    GRID.0.max(GRID.1 * duration)
+}
+
+fn is_timed(effect: &Effect) -> bool {
+    effect.parameters.iter().any(|p| matches!(p.role, Role::Instant { .. }))
 }
 
 /// It begins and ends.
@@ -124,7 +192,6 @@ fn project(
 /// Shapes to try: positive ones by factors, others along their axes, instants along the recording.
 fn menu(effect: &Effect, duration: f64) -> Vec<Vec<f64>> {
     let mut menu = vec![effect.neutral(duration)];
-    let timed = effect.parameters.iter().any(|p| matches!(p.role, Role::Instant { .. }));
     let either: Vec<usize> = (0..effect.parameters.len())
         .filter(|at| {
             matches!(effect.parameters[*at].role, Role::Shape { .. }) && effect.parameters[*at].range.0 < 0.0
@@ -145,12 +212,12 @@ fn menu(effect: &Effect, duration: f64) -> Vec<Vec<f64>> {
         menu = match parameter.role {
             Role::Shape { usual } if parameter.range.0 >= 0.0 => {
                 // What is placed in time as well is scanned broadly and refined afterwards.
-                let factors: &[f64] = if timed { &[0.7, 2.0] } else { &[0.2, 0.5, 1.0, 2.0, 5.0] };
+                let factors: &[f64] = if is_timed(effect) { &BROAD } else { &[0.2, 0.5, 1.0, 2.0, 5.0] };
                 let values: Vec<f64> = factors.iter().map(|factor| usual * factor).collect();
                 vary(&menu, at, &values)
             }
             Role::Instant { .. } => {
-                let step = GRID.0.max(GRID.1 * duration);
+                let step = grid(duration);
                 let instants: Vec<f64> = (1..(duration / step) as usize).map(|k| step * k as f64).collect();
                 vary(&menu, at, &instants)
             }
@@ -180,16 +247,25 @@ fn episode(
     backdrop: &Backdrop<'_>,
     duration: f64,
 ) -> Option<Shaped> {
-    let step = GRID.0.max(GRID.1 * duration);
+    let step = grid(duration);
     let all: Vec<f64> = (1..(duration / step) as usize).map(|k| step * k as f64).collect();
-    let ((start, end), spread) = pair(effect, reference, backdrop, &all, &all)?;
-    let about = |instant: f64| -> Vec<f64> {
-        let closer = (1 - CLOSER..CLOSER).map(|k| instant + step * f64::from(k) / f64::from(CLOSER));
-        closer.filter(|time| (0.0..duration).contains(time)).collect()
-    };
-    let ends = if end.is_finite() { about(end) } else { Vec::new() };
-    let ((start, end), _) = pair(effect, reference, backdrop, &about(start), &ends)?;
+    let whole = pairs(effect, reference, backdrop, &all, &all)?;
+    let (start, end) = whole.shapes[whole.best()?];
+    let lasts = end.is_finite();
+    let ends = if lasts { instants(end, duration) } else { Vec::new() };
+    let near = pairs(effect, reference, backdrop, &instants(start, duration), &ends)?;
+    let dense = f64::from(CLOSER).powi(if lasts { 2 } else { 1 });
+    let ((start, end), spread) = whole.refined(&near.lasting(lasts), dense)?;
     Some(Shaped { values: placed(effect, duration, start, end), spread })
+}
+
+impl Scanned<(f64, f64)> {
+    /// Those that end, or those that never do.
+    fn lasting(self, ends: bool) -> Self {
+        let is_asked = |((_, end), _): &((f64, f64), f64)| end.is_finite() == ends;
+        let (shapes, values) = self.shapes.into_iter().zip(self.values).filter(is_asked).unzip();
+        Self { shapes, values }
+    }
 }
 
 /// Its parameters with these instants, s.
@@ -201,15 +277,14 @@ fn placed(effect: &Effect, duration: f64, start: f64, end: f64) -> Vec<f64> {
     shape
 }
 
-/// The most evident beginning and end of those given, an end that never comes among them, and ln of how many are as
-/// likely.
-fn pair(
+/// Each beginning with each end of those given that comes after it, and with none.
+fn pairs(
     effect: &'static Effect,
     reference: &Reference<'_>,
     backdrop: &Backdrop<'_>,
     starts: &[f64],
     ends: &[f64],
-) -> Option<((f64, f64), f64)> {
+) -> Option<Scanned<(f64, f64)>> {
     let mut times: Vec<f64> = starts.iter().chain(ends).copied().collect();
     times.sort_by(f64::total_cmp);
     times.dedup();
@@ -217,17 +292,16 @@ fn pair(
         times.iter().map(|time| placed(effect, backdrop.scene.duration(), *time, f64::INFINITY)).collect();
     let (projected, each) = project(effect, &shapes, reference, backdrop)?;
     let own: Vec<usize> = (0..each).collect();
-    let (mut values, mut pairs) = (Vec::new(), Vec::new());
+    let mut scanned = Scanned { shapes: Vec::new(), values: Vec::new() };
     for (i, start) in times.iter().enumerate().filter(|(_, time)| starts.contains(time)) {
         let later = (i + 1..times.len()).filter(|j| ends.contains(&times[*j]));
         for j in later.map(Some).chain([None]) {
             let pair = projected.combined(&places(i, each), j.map(|j| places(j, each)).as_deref());
-            values.push(pair.log_bayes_factor(&[&own]));
-            pairs.push((*start, j.map_or(f64::INFINITY, |j| times[j])));
+            scanned.values.push(pair.log_bayes_factor(&[&own]));
+            scanned.shapes.push((*start, j.map_or(f64::INFINITY, |j| times[j])));
         }
     }
-    let (best, spread) = likeliest(&values);
-    Some((*pairs.get(best)?, spread))
+    Some(scanned)
 }
 
 /// Improves a shape by steps that are halved, and tells how far each parameter may move before the evidence falls by a
@@ -244,7 +318,7 @@ pub fn refine(
         .iter()
         .zip(start)
         .map(|(parameter, value)| match parameter.role {
-            Role::Instant { .. } if value.is_finite() => 0.5 * GRID.0.max(GRID.1 * duration),
+            Role::Instant { .. } if value.is_finite() => 0.5 * grid(duration),
             Role::Shape { usual } => 0.5 * if parameter.range.0 < 0.0 { usual.abs() } else { value.abs() },
             _ => 0.0,
         })
@@ -283,13 +357,33 @@ pub fn refine(
 mod tests {
     use super::*;
 
+    fn scanned(values: &[f64]) -> Scanned<usize> {
+        Scanned { shapes: (0..values.len()).collect(), values: values.to_vec() }
+    }
+
     #[test]
     fn shapes_as_likely_as_the_likeliest_are_counted_and_others_are_not() {
-        assert_eq!(likeliest(&[-1.0, 700.0, f64::NAN, f64::NEG_INFINITY]), (1, 0.0));
-        let (_, spread) = likeliest(&[5.0; 7]);
+        let alone = |values: &[f64]| {
+            let whole = scanned(values);
+            let best = whole.best()?;
+            whole.refined(&scanned(&values[best..=best]), 1.0).map(|(_, spread)| (best, spread))
+        };
+        assert_eq!(alone(&[-1.0, 700.0, f64::NAN, f64::NEG_INFINITY]), Some((1, 0.0)));
+        let (_, spread) = alone(&[5.0; 7]).unwrap();
         assert!((spread - 7f64.ln()).abs() < 1e-12, "{spread}");
-        let (at, spread) = likeliest(&[2.0, 2.0 + 2f64.ln()]);
+        let (at, spread) = alone(&[2.0, 2.0 + 2f64.ln()]).unwrap();
         assert!(at == 1 && (spread - 1.5f64.ln()).abs() < 1e-12, "{at} {spread}");
-        assert_eq!(likeliest(&[f64::NAN]), (0, 0.0));
+        assert_eq!(alone(&[f64::NAN]), None);
+    }
+
+    #[test]
+    fn a_likelihood_sharper_than_the_menu_counts_as_the_share_of_a_cell_that_it_fills() {
+        // N(0.3, 0.02²) in cells of one, and from 32 shapes to a cell.
+        let bell = |x: f64| -0.5 * ((x - 0.3) / 0.02).powi(2);
+        let whole = scanned(&(0..9).map(|k| bell(f64::from(k - 4))).collect::<Vec<_>>());
+        let near = scanned(&(-31..32).map(|k| bell(f64::from(k) / 32.0)).collect::<Vec<_>>());
+        let (at, spread) = whole.refined(&near, 32.0).unwrap();
+        let expected = (0.02 * std::f64::consts::TAU.sqrt()).ln() - bell((at as f64 - 31.0) / 32.0);
+        assert!((spread - expected).abs() < 0.1, "{spread} {expected}");
     }
 }

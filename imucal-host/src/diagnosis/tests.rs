@@ -108,6 +108,23 @@ fn a_drift_that_forgets_nothing_is_told_from_one_that_does() {
 }
 
 #[test]
+fn gimbals_that_turn_all_sensors_at_once_are_one_chance_and_no_harmonic_of_the_encoders() {
+    let mut simulation = simulation(3);
+    simulation.conditions.scatter = 0.02f64.to_radians();
+    let recording = simulation.record("scattered").unwrap();
+    with_fit(&recording, |linear, fit| {
+        let white = linear.weighing.white(&fit.residual);
+        let none = linear.sift(&[], &white, &SensorKind::ALL, &FAR).unwrap();
+        let harmonic = find("rig.encoder_harmonic").unwrap();
+        let with = linear.sift(&[harmonic], &none.noise, &SensorKind::ALL, &FAR).unwrap();
+        let axis_by_axis = with.value - none.value;
+        let none = linear.together(none).unwrap();
+        let together = linear.together(with).unwrap().log_evidence - none.log_evidence;
+        assert!(axis_by_axis > 0.0 && together < 0.0, "{axis_by_axis} {together}");
+    });
+}
+
+#[test]
 fn samples_beside_clipped_ones_are_left_out_whatever_their_own_noise() {
     let mut simulation = simulation(7);
     let full_scale = HEALTHY.acc.as_ref().unwrap().full_scale_si().unwrap();

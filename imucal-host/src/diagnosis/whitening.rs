@@ -56,8 +56,7 @@ impl Whitening {
     /// From what blocks have in common, the scatter of that, and drifts. Drifts that make the matrix indefinite by
     /// rounding are left out.
     pub fn new(latents: Arc<Latents>, scatter: f64, drifts: &[Process]) -> Self {
-        let weights = latents.weights.iter().filter(|w| **w > 0.0);
-        let mut log_determinant: f64 = weights.map(|w| -w.ln()).sum();
+        let mut log_determinant = latents.log_determinant;
         let mut common = |stretch| {
             let (common, share) = Common::new(stretch, scatter);
             log_determinant += share;

@@ -1,0 +1,184 @@
+//! The probability of a set of effects where all sensors stand off the encoders together.
+//!
+//! ```text
+//! Σ = Σ₀ + σ² V Vᵀ      V = Σ_j h_j(t) u_g      h_j: one at a rest, a straight line in time from each rest to the next
+//! ```
+//!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | Σ₀ | white noise and drift of each axis, as [`super::noise`] has found them |
+//! | u_g | the simulator's derivative along gimbal g, of accelerometer and magnetometer |
+//! | σ | scatter, rad: the likeliest |
+//!
+//! A gimbal's offset turns six axes at once. Taken axis by axis ([`super::scatter`]), which is a hundred times cheaper, one
+//! such chance looks like six, and an effect that turns them all seems sure: it sifts the sets of which the best are
+//! judged here. Not modelled: that the gyroscope sees offsets change.
+
+use nalgebra::{Cholesky, DMatrix, Dyn};
+
+use super::{
+    block::Block,
+    design::{Channel, Normal},
+    latent::Sparse,
+    linear::{Judged, Linear, Sifted, log_evidence},
+    noise::Noise,
+    scatter::stretches,
+};
+use crate::recording::SensorKind;
+
+/// Ratio of scatters that are tried, and how often they are changed.
+const RATIO: f64 = 1.5;
+const STEPS: usize = 8;
+
+impl Linear<'_> {
+    /// Evidence of a sifted set; as it was sifted where no rig guides the sensor.
+    pub fn together(&self, sifted: Sifted) -> Option<Judged> {
+        let Sifted { set, noise, value } = sifted;
+        let fitted = self.fitted(&set);
+        let Some((normal, offsets)) = self.offset(&noise, &fitted) else {
+            return Some(Judged { set, noise, log_evidence: value });
+        };
+        let (baseline, groups) = (self.baseline.len(), self.groups(&set, &fitted));
+        let value = |sigma: f64| log_evidence(&without(&normal, offsets, sigma)?, &noise, baseline, &groups);
+        let mut sigma = self.usual_scatter(&noise);
+        let mut most = value(sigma)?;
+        for factor in [RATIO, 1.0 / RATIO] {
+            for _ in 0..STEPS {
+                let Some(found) = value(sigma * factor).filter(|found| *found > most) else { break };
+                (most, sigma) = (found, sigma * factor);
+            }
+        }
+        let surprise: f64 = set.iter().map(|effect| self.surprise(effect)).sum();
+        Some(Judged { set, noise, log_evidence: most - surprise })
+    }
+
+    /// Scatter of the sensors that show it, rad.
+    fn usual_scatter(&self, noise: &Noise) -> f64 {
+        let shown = self.scene.kinds.iter().filter(|kind| **kind != SensorKind::Gyr);
+        let logs: Vec<f64> = shown.map(|kind| noise.sensors[*kind as usize].scatter.ln()).collect();
+        (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp()
+    }
+
+    /// Normal equations of some columns with the gimbals' offsets at nodes before them, and how many those are; `None`
+    /// where no rig guides the sensor.
+    fn offset(&self, noise: &Noise, wanted: &[usize]) -> Option<(Normal, usize)> {
+        let turned = self.scene.turned.of(self.scene);
+        if turned.is_empty() {
+            return None;
+        }
+        let (places, nodes) = nodes(&self.scene.blocks);
+        let count = turned.len() * nodes;
+        let sparse = |channel: &Channel| {
+            let row = |(block, place): (usize, &[(usize, f64); 2])| {
+                let of = |gimbal: usize| turned[gimbal][channel.kind as usize].as_ref();
+                let u = |gimbal: usize| of(gimbal).map_or(0.0, |means| means[block][channel.axis]);
+                let along = place
+                    .iter()
+                    .flat_map(|(node, share)| (0..turned.len()).map(move |gimbal| (*node, *share, gimbal)));
+                along.map(|(node, share, gimbal)| (turned.len() * node + gimbal, share * u(gimbal))).collect()
+            };
+            match channel.kind {
+                SensorKind::Gyr => Sparse::none(places.len()),
+                _ => Sparse { count, rows: places.iter().enumerate().map(row).collect() },
+            }
+        };
+        let whitenings = self.weighing.drifting(&self.design, noise);
+        Some((self.design.normal_beside(&whitenings, &sparse, wanted), count))
+    }
+}
+
+/// By how much the offsets of nodes count in each block, and the number of nodes: one for each rest, which keeps its own,
+/// and others where a movement begins, ends or goes on for long.
+fn nodes(blocks: &[Block]) -> (Vec<[(usize, f64); 2]>, usize) {
+    let mut places = Vec::with_capacity(blocks.len());
+    let mut node = 0;
+    for stretch in stretches(blocks) {
+        let (first, last) = (&blocks[stretch.start], &blocks[stretch.end - 1]);
+        if first.rest.is_some() {
+            places.extend(stretch.map(|_| [(node, 1.0), (node, 0.0)]));
+            continue;
+        }
+        let length = last.time - first.time;
+        for block in &blocks[stretch] {
+            let share = if length > 0.0 { (block.time - first.time) / length } else { 0.5 };
+            places.push([(node, 1.0 - share), (node + 1, share)]);
+        }
+        node += 1;
+    }
+    (places, node + 1)
+}
+
+/// Normal equations with the first `count` columns integrated out, whose amounts are normal with this standard deviation.
+fn without(normal: &Normal, count: usize, sigma: f64) -> Option<Normal> {
+    let n = normal.score.len() - count;
+    let own = normal.information.view((0, 0), (count, count)) * (sigma * sigma);
+    let factor: Cholesky<f64, Dyn> = (own + DMatrix::identity(count, count)).cholesky()?;
+    let mut all = DMatrix::zeros(count, n + 1);
+    all.columns_mut(0, n).copy_from(&normal.information.view((0, count), (count, n)));
+    all.set_column(n, &normal.score.rows(0, count));
+    all *= sigma;
+    factor.l_dirty().solve_lower_triangular_mut(&mut all);
+    let less = all.tr_mul(&all);
+    Some(Normal {
+        information: normal.information.view((count, count), (n, n)) - less.view((0, 0), (n, n)),
+        score: normal.score.rows(count, n) - less.view((0, n), (n, 1)).column(0),
+        energy: normal.energy - less[(n, n)],
+        log_determinant: normal.log_determinant + factor.ln_determinant(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DVector;
+
+    fn blocks(count: usize, rest: Option<usize>, after: f64) -> impl Iterator<Item = Block> {
+        (0..count).map(move |k| Block { rows: k..k + 1, time: after + 0.5 * k as f64, rest })
+    }
+
+    #[test]
+    fn a_rest_keeps_its_offset_and_a_movement_goes_over_from_one_to_the_next() {
+        let blocks: Vec<Block> = blocks(2, Some(0), 0.0)
+            .chain(blocks(3, None, 1.0))
+            .chain(blocks(1, Some(1), 2.5))
+            .chain(blocks(1, Some(2), 3.0))
+            .chain(blocks(1, None, 3.5))
+            .collect();
+        let (places, count) = nodes(&blocks);
+        let mut h = DMatrix::zeros(blocks.len(), count);
+        for (block, place) in places.iter().enumerate() {
+            place.iter().for_each(|(node, share)| h[(block, *node)] += share);
+        }
+        let expected = DMatrix::from_row_slice(
+            8,
+            3,
+            &[
+                1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0,
+                0.0, 1.0, 0.0, 0.0, 0.5, 0.5,
+            ],
+        );
+        assert_eq!(h, expected);
+    }
+
+    #[test]
+    fn columns_that_are_integrated_out_leave_what_their_covariance_leaves() {
+        let (rows, sigma) = (9, 0.7);
+        let v = DMatrix::from_fn(rows, 2, |i, j| (1.3 * i as f64 + j as f64).sin());
+        let x = DMatrix::from_fn(rows, 3, |i, j| (0.4 * (i * j) as f64 + i as f64).cos());
+        let y = DVector::from_fn(rows, |i, _| (i as f64 - 3.0) * 0.3);
+        let all = DMatrix::from_fn(rows, 5, |i, j| if j < 2 { v[(i, j)] } else { x[(i, j - 2)] });
+        let normal = Normal {
+            information: all.tr_mul(&all),
+            score: all.tr_mul(&y),
+            energy: y.dot(&y),
+            log_determinant: 0.0,
+        };
+        let found = without(&normal, 2, sigma).unwrap();
+        let covariance = DMatrix::identity(rows, rows) + &v * v.transpose() * (sigma * sigma);
+        let inverse = covariance.clone().try_inverse().unwrap();
+        assert!((found.information - x.tr_mul(&(&inverse * &x))).amax() < 1e-12);
+        assert!((found.score - x.tr_mul(&(&inverse * &y))).amax() < 1e-12);
+        assert!((found.energy - y.dot(&(&inverse * &y))).abs() < 1e-12);
+        assert!((found.log_determinant - covariance.determinant().ln()).abs() < 1e-12);
+    }
+}
