@@ -42,7 +42,7 @@ pub const NEAR: [f64; 1] = [2.0];
 const ROUNDS: usize = 4;
 /// −2 ln of the likelihood must fall by this for a step to be gone.
 const WORTH: f64 = 0.05;
-/// A beginning that is so much worse than what has been found leads nowhere better.
+/// A beginning near an end that is so much worse than what has been found leads nowhere better.
 const HOPELESS: f64 = 15.0;
 /// Share of drift and scatter that [`Noise::quieter`] leaves.
 const QUIET: f64 = 0.2;
@@ -224,7 +224,7 @@ impl<'s> Weighing<'s> {
         starts.sort_by(|(_, a), (_, b)| a.total_cmp(b));
         let mut best = starts[0];
         for tried in starts {
-            if tried.1 < best.1 + HOPELESS {
+            if steps.len() > NEAR.len() || tried.1 < best.1 + HOPELESS {
                 let end = self.descended(kind, tried, steps, &likelihood);
                 best = if end.1 < best.1 { end } else { best };
             }

@@ -92,8 +92,8 @@ fn what_gimbals_stand_off_their_encoders_is_noise_in_motion_too() {
 #[test]
 fn a_drift_that_forgets_nothing_is_told_from_one_that_does() {
     for (kind, forgets) in [(DriftKind::Walk, false), (DriftKind::Quick, true)] {
-        let mut simulation = simulation(5);
-        simulation.conditions.noise.fill(NoiseLevel { drift: 3.0, kind, ..NoiseLevel::default() });
+        let mut simulation = Simulation { duration: Some(1100.0), ..simulation(5) };
+        simulation.conditions.noise.fill(NoiseLevel { drift: 10.0, kind, ..NoiseLevel::default() });
         let recording = simulation.record("drifting").unwrap();
         with_fit(&recording, |linear, fit| {
             let white = linear.weighing.white(&fit.residual);
