@@ -88,6 +88,13 @@ pub struct Normal {
     pub log_determinant: f64,
 }
 
+/// Normal equations of a channel, and the places of its columns among all.
+#[derive(Clone, Debug)]
+pub struct Part {
+    normal: Normal,
+    ids: Vec<usize>,
+}
+
 impl Normal {
     /// Of `size` columns, before any channel.
     pub fn zeros(size: usize) -> Self {
@@ -171,12 +178,7 @@ impl Design {
     }
 
     /// Some of its columns, by index, and further ones behind them; `columns` names the first of these.
-    pub fn extended<M: Borrow<Means> + Sync>(
-        &self,
-        kept: &[usize],
-        columns: Vec<Column>,
-        further: &[M],
-    ) -> Self {
+    pub fn extended(&self, kept: &[usize], columns: Vec<Column>, further: &[Means]) -> Self {
         let channels = self
             .channels
             .par_iter()
@@ -225,19 +227,7 @@ impl Design {
 
     /// Normal equations of some columns, given each channel's whitening.
     pub fn normal(&self, whitenings: &[Whitening], wanted: &[usize]) -> Normal {
-        let parts: Vec<(Normal, Vec<usize>)> = self
-            .channels
-            .par_iter()
-            .zip(whitenings)
-            .map(|(channel, whitening)| {
-                let (from, to) = places(&channel.ids, wanted);
-                let columns = whitening.latents().condensed(&channel.gathered(&from));
-                (Normal::of(&columns, whitening), to)
-            })
-            .collect();
-        let mut normal = Normal::zeros(wanted.len());
-        parts.iter().for_each(|(part, to)| normal.add(part, to));
-        normal
+        self.normal_beside(whitenings, &|channel| Sparse::none(channel.y.len()), wanted)
     }
 
     /// Normal equations of some columns and of sparse ones before them, which a channel may have.
@@ -263,6 +253,48 @@ impl Design {
         for (part, to, own) in &parts {
             let ids: Vec<usize> = (0..*own).chain(to.iter().map(|to| count + to)).collect();
             normal.add(part, &ids);
+        }
+        normal
+    }
+
+    /// Normal equations of some columns, channel by channel.
+    pub fn by_channel(&self, whitenings: &[Whitening], wanted: &[usize]) -> Vec<Part> {
+        let part = |(channel, whitening): (&Channel, &Whitening)| {
+            let (from, ids) = places(&channel.ids, wanted);
+            let columns = whitening.latents().condensed(&channel.gathered(&from));
+            Part { normal: Normal::of(&columns, whitening), ids }
+        };
+        self.channels.par_iter().zip(whitenings).map(part).collect()
+    }
+
+    /// Normal equations of some columns and, behind them, of further ones: `alone` has those of the first, which stand
+    /// where none of the further reaches a channel.
+    pub fn normal_with<M: Borrow<Means> + Sync>(
+        &self,
+        whitenings: &[Whitening],
+        wanted: &[usize],
+        alone: &[Part],
+        further: &[M],
+    ) -> Normal {
+        let part = |(channel, whitening): (&Channel, &Whitening)| {
+            let (mut more, mut data) = (Vec::new(), Vec::new());
+            append(channel.kind, channel.axis, wanted.len(), further, &mut more, &mut data);
+            if more.is_empty() {
+                return None;
+            }
+            let (from, mut ids) = places(&channel.ids, wanted);
+            let own = channel.gathered(&from);
+            let own = own.columns(0, from.len());
+            let all = own.iter().copied().chain(data).chain(channel.y.iter().copied());
+            ids.extend(more);
+            let x = DMatrix::from_iterator(channel.y.len(), ids.len() + 1, all);
+            Some(Part { normal: Normal::of(&whitening.latents().condensed(&x), whitening), ids })
+        };
+        let parts: Vec<Option<Part>> = self.channels.par_iter().zip(whitenings).map(part).collect();
+        let mut normal = Normal::zeros(wanted.len() + further.len());
+        for (part, alone) in parts.iter().zip(alone) {
+            let Part { normal: part, ids } = part.as_ref().unwrap_or(alone);
+            normal.add(part, ids);
         }
         normal
     }

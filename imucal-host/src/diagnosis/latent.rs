@@ -160,25 +160,38 @@ impl Latents {
     pub fn condensed_beside(self: &Arc<Self>, sparse: &Sparse, x: &DMatrix<f64>) -> Condensed {
         let dense = self.condensed(x);
         let (n, own) = (sparse.count, x.ncols());
+        if n == 0 {
+            return dense;
+        }
         let mut plain = DMatrix::zeros(n + own, n + own);
         plain.view_mut((n, n), (own, own)).copy_from(&dense.plain);
         let mut beside = DMatrix::zeros(n + own, self.knots);
         beside.rows_mut(n, own).copy_from(&dense.beside);
+        let mut along = DMatrix::zeros(n + own, self.courses);
+        along.rows_mut(n, own).copy_from(&dense.along);
         let mut across = DMatrix::zeros(own, n);
-        let transposed = x.transpose();
-        for (block, (row, (w, (knot, share)))) in
-            sparse.rows.iter().zip(self.weights.iter().zip(&self.places)).enumerate()
-        {
+        let rows = x.transpose();
+        let blocks = sparse.rows.iter().zip(self.weights.iter().zip(&self.places));
+        for (block, (row, (w, (knot, share)))) in blocks.enumerate() {
             for (place, value) in row {
                 beside[(*place, *knot)] += w * value * (1.0 - share);
                 beside[(*place, knot + 1)] += w * value * share;
-                across.column_mut(*place).axpy(w * value, &transposed.column(block), 1.0);
+                across.column_mut(*place).axpy(w * value, &rows.column(block), 1.0);
                 row.iter().for_each(|(other, also)| plain[(*place, *other)] += w * value * also);
+            }
+        }
+        for stretch in &self.stretches {
+            for (block, u) in stretch.blocks.clone().zip(&stretch.u) {
+                for (place, value) in &sparse.rows[block] {
+                    for (course, u) in u.iter().enumerate().take(stretch.count) {
+                        along[(*place, stretch.first + course)] += self.weights[block] * value * u;
+                    }
+                }
             }
         }
         plain.view_mut((n, 0), (own, n)).copy_from(&across);
         plain.view_mut((0, n), (n, own)).copy_from(&across.transpose());
-        Condensed { latents: Arc::clone(self), plain, along: DMatrix::zeros(n + own, self.courses), beside }
+        Condensed { latents: Arc::clone(self), plain, along, beside }
     }
 }
 
@@ -215,5 +228,38 @@ impl Condensed {
             along: rows(&self.along),
             beside: rows(&self.beside),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sparse_columns_are_condensed_as_the_same_columns_with_their_zeros() {
+        let blocks = 40;
+        let times: Vec<f64> = (0..blocks).map(|k| 0.7 * k as f64).collect();
+        let weights = (0..blocks).map(|k| 1.0 + (k % 3) as f64).collect();
+        let courses = vec![(0..9).map(|k| f64::from(k) - 3.5).collect(), vec![0.4; 9]];
+        let latents = Arc::new(Latents::new(&times, weights, &[Shared { blocks: 5..14, courses }]));
+        let value = |block: usize, column: usize| (block as f64 + 2.0 * column as f64).sin();
+        let held = |block: usize, column: usize| column == block / 10 || column == 3 - block / 10;
+        let rows = (0..blocks).map(|block| {
+            (0..4)
+                .filter(|column| held(block, *column))
+                .map(|column| (column, value(block, column)))
+                .collect()
+        });
+        let sparse = Sparse { count: 4, rows: rows.collect() };
+        let x = DMatrix::from_fn(blocks, 3, |block, column| value(block, column + 7));
+        let whole = DMatrix::from_fn(blocks, 7, |block, column| match column {
+            0..4 if held(block, column) => value(block, column),
+            0..4 => 0.0,
+            _ => x[(block, column - 4)],
+        });
+        let (found, expected) = (latents.condensed_beside(&sparse, &x), latents.condensed(&whole));
+        assert!((found.plain - expected.plain).amax() < 1e-12);
+        assert!((found.along - expected.along).amax() < 1e-12);
+        assert!((found.beside - expected.beside).amax() < 1e-12);
     }
 }

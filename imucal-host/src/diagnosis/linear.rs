@@ -1,6 +1,6 @@
 //! The linear problem about a fit: signatures as columns, sets of effects judged by least squares and evidence.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -8,10 +8,11 @@ use super::{
     candidates::Candidates,
     design::{CondensedDesign, Design, Normal},
     evidence::Projected,
+    latest::Latest,
     noise::{Noise, SensorNoise, Weighing},
     refit::{Fit, columns, signatures},
     scan::{Beside, Scan},
-    scene::Scene,
+    scene::{Reference, Scene},
     shape::{self, Shaped},
     whitening::Whitening,
 };
@@ -20,9 +21,6 @@ use crate::{
     recording::SensorKind,
     simulator::Dose,
 };
-
-/// Answers that are kept.
-const KEPT: usize = 2;
 
 /// A set of effects and how it does axis by axis: its noise, and its evidence so far.
 #[derive(Clone, Debug)]
@@ -70,36 +68,25 @@ pub struct Linear<'s> {
 /// White noise of a sensor at rest and in motion, by axis.
 type Spread = [[f64; 3]; 2];
 
-/// What was asked for last.
-struct Latest<K, V>(Mutex<Vec<(K, Arc<V>)>>);
-
-impl<K: PartialEq, V> Latest<K, V> {
-    fn get(&self, key: K, make: impl FnOnce() -> V) -> Arc<V> {
-        let locked = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = |kept: &Vec<(K, Arc<V>)>| {
-            kept.iter().find(|(other, _)| *other == key).map(|(_, value)| Arc::clone(value))
-        };
-        if let Some(value) = known(&locked()) {
-            return value;
-        }
-        let value = Arc::new(make());
-        let mut kept = locked();
-        kept.truncate(KEPT - 1);
-        kept.insert(0, (key, Arc::clone(&value)));
-        value
-    }
-}
-
 impl<'s> Linear<'s> {
     /// About a fit, with its columns alone: nothing can be added.
     pub fn fitted_alone(scene: &'s Scene<'s>, candidates: &'s Candidates, fit: &Fit) -> Option<Self> {
-        let reference = scene.reference(fit.doses.clone(), &scene.fine)?;
+        let scan = Scan::new(scene, candidates, fit.doses.clone())?;
+        Self::alone(&scene.reference(fit.doses.clone(), &scene.fine)?, scan, scene, candidates, fit)
+    }
+
+    fn alone(
+        reference: &Reference<'_>,
+        scan: Scan<'s>,
+        scene: &'s Scene<'s>,
+        candidates: &'s Candidates,
+        fit: &Fit,
+    ) -> Option<Self> {
         let neutral = |effect: &&'static Effect| Shaped::alone(effect.neutral(scene.duration()));
         let shapes = candidates.effects.iter().map(neutral).collect();
         let columns = columns(&fit.doses.iter().map(|dose| dose.effect).collect::<Vec<_>>());
-        let means = signatures(&reference, &columns, &|_| Vec::new())?;
+        let means = signatures(reference, &columns, &|_| Vec::new())?;
         let design = Design::new(scene, columns, &means, &fit.residual);
-        let scan = Scan::new(scene, candidates, fit.doses.clone())?;
         let weighing = Weighing::new(scene, SensorKind::ALL.map(|kind| reference.output(kind)));
         Some(Self::of(scene, candidates, scan, fit, design, weighing, shapes))
     }
@@ -113,9 +100,12 @@ impl<'s> Linear<'s> {
         noise: &Noise,
         before: Option<&Self>,
     ) -> Option<Self> {
-        let alone = Self::fitted_alone(scene, candidates, fit)?;
-        let scan = before.map_or(alone.scan, |before| before.scan.clone());
         let reference = scene.reference(fit.doses.clone(), &scene.fine)?;
+        let scan = match before {
+            Some(before) => before.scan.clone(),
+            None => Scan::new(scene, candidates, fit.doses.clone())?,
+        };
+        let alone = Self::alone(&reference, scan.clone(), scene, candidates, fit)?;
         let every: Vec<usize> = (0..alone.design.columns.len()).collect();
         let beside =
             Beside { doses: &fit.doses, weighing: &alone.weighing, design: &alone.design, fitted: &every };
@@ -153,7 +143,7 @@ impl<'s> Linear<'s> {
     ) -> Self {
         let baseline = candidates.baseline.iter().flat_map(|term| design.of(term)).collect();
         let held = fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect)).cloned().collect();
-        let (normals, condensed) = (Latest(Mutex::default()), Latest(Mutex::default()));
+        let (normals, condensed) = (Latest::default(), Latest::default());
         Self { scene, candidates, design, weighing, baseline, shapes, scan, held, normals, condensed }
     }
 

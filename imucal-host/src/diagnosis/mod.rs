@@ -17,6 +17,7 @@ pub mod frequency;
 pub mod gap;
 pub mod hand;
 pub mod latent;
+mod latest;
 pub mod linear;
 pub mod model;
 mod moves;
@@ -54,8 +55,6 @@ const FOLLOWED: f64 = 0.01;
 const REMAINDER: f64 = 0.05;
 /// Causes that close less than this share of it explain nothing.
 const EXPLAINS: f64 = 0.2;
-/// A cause as probable as this has no rival.
-const CERTAIN: f64 = 0.95;
 
 /// What a diagnosis may be told beforehand.
 #[derive(Clone, Debug, Default)]
@@ -265,7 +264,7 @@ fn verdict(causes: &[Cause], left: Option<&Following>, closed: &gap::Closed) -> 
         ([], Some(_)) => Verdict::Unknown,
         (_, Some(_)) if closed.total.value < EXPLAINS => Verdict::Unknown,
         (_, Some(_)) if remainder > REMAINDER => Verdict::Partly,
-        _ if causes.iter().any(|cause| cause.probability < CERTAIN) => Verdict::Ambiguous,
+        _ if causes.iter().any(|cause| !cause.equivalents.is_empty()) => Verdict::Ambiguous,
         _ => Verdict::Explained,
     }
 }

@@ -54,18 +54,15 @@ impl<'s> Scan<'s> {
             Some(_) => None,
             None => Some(beside.weighing.whitenings(design, &noise.quieter().even())),
         };
-        let best = |effect: &'static Effect| {
-            let quiet = quiet.as_ref().filter(|_| shape::is_episode(effect));
-            let whitenings = quiet.unwrap_or(&whitenings);
-            let backdrop = Backdrop { scene, design, fitted: beside.fitted, whitenings };
-            let best = shape::best(effect, &self.coarse, &backdrop)?;
-            match quiet {
-                Some(_) => {
-                    let (values, _) = shape::refine(effect, &best.values, &self.coarse, &backdrop)?;
-                    Some(Shaped { values, ..best })
-                }
-                None => Some(best),
+        let backdrop = Backdrop::new(scene, design, beside.fitted, &whitenings);
+        let quiet = quiet.as_ref().map(|quiet| Backdrop::new(scene, design, beside.fitted, quiet));
+        let best = |effect: &'static Effect| match quiet.as_ref().filter(|_| shape::is_episode(effect)) {
+            Some(quiet) => {
+                let best = shape::best(effect, &self.coarse, quiet)?;
+                let (values, _) = shape::refine(effect, &best.values, &self.coarse, quiet)?;
+                Some(Shaped { values, ..best })
             }
+            None => shape::best(effect, &self.coarse, &backdrop),
         };
         let shape = |(at, effect): (usize, &&'static Effect)| {
             let held = beside.doses.iter().find(|dose| std::ptr::eq(dose.effect, *effect));

@@ -149,7 +149,7 @@ fn refined(
     }
     let fitted = linear.fitted(rest);
     let whitenings = linear.whitenings(noise);
-    let backdrop = Backdrop { scene, design: &linear.design, fitted: &fitted, whitenings: &whitenings };
+    let backdrop = Backdrop::new(scene, &linear.design, &fitted, &whitenings);
     let reference = scene.reference(doses.to_vec(), &scene.fine)?;
     Some(shape::refine(effect, &values, &reference, &backdrop).map_or(values, |(refined, _)| refined))
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::{
-    design::{Column, Design},
+    design::{Design, Part},
     evidence::Projected,
     scene::{Means, Reference, Scene, amplitudes},
     whitening::Whitening,
@@ -36,6 +36,19 @@ pub struct Backdrop<'a> {
     pub fitted: &'a [usize],
     /// Σ⁻¹ of each channel.
     pub whitenings: &'a [Whitening],
+    alone: Vec<Part>,
+}
+
+impl<'a> Backdrop<'a> {
+    /// Of columns of a design, and the whitening of its channels.
+    pub fn new(
+        scene: &'a Scene<'a>,
+        design: &'a Design,
+        fitted: &'a [usize],
+        whitenings: &'a [Whitening],
+    ) -> Self {
+        Self { scene, design, fitted, whitenings, alone: design.by_channel(whitenings, fitted) }
+    }
 }
 
 /// A shape of an effect.
@@ -173,20 +186,17 @@ fn project(
     backdrop: &Backdrop<'_>,
 ) -> Option<(Projected, usize)> {
     let own: Vec<usize> = amplitudes(effect).collect();
-    let mut columns: Vec<Column> = backdrop.fitted.iter().map(|at| backdrop.design.columns[*at]).collect();
-    let fitted: Vec<usize> = (0..columns.len()).collect();
     let asked: Vec<(&Vec<f64>, usize)> =
         shapes.iter().flat_map(|shape| own.iter().map(move |parameter| (shape, *parameter))).collect();
     let means: Option<Vec<Arc<Means>>> = asked
         .par_iter()
         .map(|(shape, parameter)| reference.known_signature(effect, *parameter, shape))
         .collect();
-    columns.extend(asked.iter().map(|(_, parameter)| Column { effect, parameter: *parameter }));
-    let design = backdrop.design.extended(backdrop.fitted, columns, &means?);
-    let every: Vec<usize> = (0..design.columns.len()).collect();
-    let normal = design.normal(backdrop.whitenings, &every);
-    let others: Vec<usize> = every[fitted.len()..].to_vec();
-    Some((Projected::new(&normal, &fitted, &others)?, own.len()))
+    let Backdrop { design, fitted, whitenings, alone, .. } = backdrop;
+    let normal = design.normal_with(whitenings, fitted, alone, &means?);
+    let first: Vec<usize> = (0..fitted.len()).collect();
+    let others: Vec<usize> = (fitted.len()..normal.score.len()).collect();
+    Some((Projected::new(&normal, &first, &others)?, own.len()))
 }
 
 /// Shapes to try: positive ones by factors, others along their axes, instants along the recording.
