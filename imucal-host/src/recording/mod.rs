@@ -29,7 +29,7 @@ mod parquet;
 mod place;
 mod read_error;
 mod rig;
-mod saturation;
+pub(crate) mod saturation;
 mod sensor_kind;
 mod site;
 pub(crate) mod spelling;

@@ -17,6 +17,8 @@ const STEEP: f64 = 8.0;
 const SHORT: usize = 3;
 /// Least number of rows at the extreme.
 const PILE: usize = 5;
+/// A pile at the extreme is a clip if noise would make it less often than this.
+const UNLIKELY: f64 = 1e-9;
 /// Least number of stretches at other values; an axis with fewer says nothing about itself.
 const WITNESSES: usize = 10;
 
@@ -47,8 +49,10 @@ impl<'a> AxisSamples<'a> {
         if low >= high {
             return Vec::new();
         }
-        let clipped_low = self.is_limit(low) || self.is_clipped(low, [low, high]);
-        let clipped_high = self.is_limit(high) || self.is_clipped(high, [low, high]);
+        let clipped = |extreme| {
+            self.is_limit(extreme) || self.is_clipped(extreme, [low, high]) || self.is_piled(extreme)
+        };
+        let (clipped_low, clipped_high) = (clipped(low), clipped(high));
         let full_scale = self.triple.full_scale_si().map(|scale| scale * (1.0 - NEAR));
         let declared = |value: f64| full_scale.is_some_and(|scale| value.abs() >= scale);
         let at_limit =
@@ -92,6 +96,19 @@ impl<'a> AxisSamples<'a> {
         })
     }
 
+    /// Whether more rows are at an extreme than its neighbours would let fall there, while other axes move.
+    fn is_piled(&self, extreme: f64) -> bool {
+        let others_move = |row: usize| {
+            let beside = [row.checked_sub(1), Some(row + 1)].into_iter().flatten();
+            let mut beside = beside.filter_map(|row| self.triple.values.get(row));
+            let here = &self.triple.values[row];
+            (0..3).filter(|axis| *axis != self.axis).any(|axis| beside.any(|near| near[axis] != here[axis]))
+        };
+        let at = || (0..self.values.len()).filter(|row| self.values[*row] == extreme);
+        let moving = at().filter(|row| others_move(*row)).count();
+        2 * moving > at().count() && pile_chance(&self.values, extreme) < UNLIKELY
+    }
+
     /// Median size of the steps this axis makes.
     fn usual_step(&self) -> f64 {
         let steps = self.values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
@@ -114,6 +131,22 @@ impl<'a> AxisSamples<'a> {
             rows.windows(2).filter(|pair| pair[0][axis] != pair[1][axis]).count() >= run.len() / 4
         })
     }
+}
+
+/// Probability that as many values are equal to an extreme as are, by how near as many others come to it and the smallest
+/// step between any two.
+pub(crate) fn pile_chance(values: &[f64], extreme: f64) -> f64 {
+    let mut off: Vec<f64> =
+        values.iter().map(|value| (value - extreme).abs()).filter(|o| o.is_finite()).collect();
+    off.sort_unstable_by(f64::total_cmp);
+    let piled = off.partition_point(|off| *off == 0.0);
+    if piled < PILE || off.len() < 2 * piled {
+        return 1.0;
+    }
+    let steps = off.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0);
+    let expected = piled as f64 * steps.fold(f64::INFINITY, f64::min) / off[2 * piled - 1];
+    // Of a Poisson distribution's upper tail the first term, which is more than the tail where less than one is expected.
+    (1..=piled).fold(1.0, |chance, k| chance * expected / k as f64).min(1.0)
 }
 
 /// Maximal stretches of one value.
@@ -179,6 +212,23 @@ mod tests {
         values[200..206].fill(Vector3::new(500.0, 3.0, 1.0));
         let found = find(&triple(values));
         assert_eq!((found[0].axis, found[0].rows.clone()), (0, 200..206));
+    }
+
+    #[test]
+    fn peaks_that_are_cut_at_single_samples_pile_up() {
+        let x = |row: usize| ((row as f64).sin() * 1000.0 + noise(row)).round();
+        let cut = |limit: f64| -> Triple {
+            let row = |row: usize| Vector3::new(x(row).clamp(-limit, limit), noise(row + 7), noise(row + 13));
+            triple((0..500).map(row).collect())
+        };
+        let found = find(&cut(970.0));
+        assert!(found.iter().all(|each| each.axis == 0 && each.rows.len() < 3), "{found:?}");
+        assert!(found.len() > 20, "{found:?}");
+        assert!(find(&cut(2000.0)).is_empty());
+        // Nothing else moves: the same attitude, held again and again.
+        let still =
+            |row: usize| Vector3::new(if row % 9 == 0 { 1000.0 } else { x(row).min(900.0) }, 1.0, 2.0);
+        assert!(find(&triple((0..500).map(still).collect())).is_empty());
     }
 
     #[test]

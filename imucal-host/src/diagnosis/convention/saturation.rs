@@ -1,17 +1,34 @@
 //! Samples clipped below full scale: `P.saturation`.
 //!
 //! The stretches are those that the recording's own check found at a value that is not the declared full scale; here it
-//! is asked whether an axis could have stayed there by chance, given how often it repeats itself elsewhere.
+//! is asked whether an axis could have stayed there by chance, given how often it repeats itself elsewhere, or have come
+//! there so often, given how often it came near.
 
 use super::{Conventions, Finding, SURE};
-use crate::recording::{Triple, integrity::SensorIntegrity, median};
+use crate::recording::{
+    Triple,
+    integrity::{Saturation, SensorIntegrity},
+    median,
+    saturation::pile_chance,
+};
 
 /// Looks at one sensor.
 pub(super) fn check(triple: &Triple, sensor: &SensorIntegrity, found: &mut Conventions) {
     let own: Vec<_> = sensor.saturated.iter().filter(|stretch| !stretch.declared).collect();
     let Some(limit) = median(own.iter().map(|stretch| stretch.value.abs()).collect()) else { return };
-    let p_value =
-        own.iter().map(|stretch| chance(triple, stretch.axis, stretch.rows.len())).fold(1.0, f64::min);
+    let stays = |stretch: &Saturation| chance(triple, stretch.axis, stretch.rows.len());
+    let piles = |stretch: &Saturation| {
+        let values: Vec<f64> = triple.values.iter().map(|value| value[stretch.axis]).collect();
+        pile_chance(&values, stretch.value)
+    };
+    let staying = own.iter().map(|stretch| stays(stretch)).fold(1.0, f64::min);
+    let mut limits: Vec<&Saturation> = Vec::new();
+    for stretch in &own {
+        if !limits.iter().any(|known| known.axis == stretch.axis && known.value == stretch.value) {
+            limits.push(stretch);
+        }
+    }
+    let p_value = limits.into_iter().map(piles).fold(staying, f64::min);
     if p_value > SURE || limit == 0.0 {
         return;
     }
