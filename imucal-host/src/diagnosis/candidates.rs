@@ -1,6 +1,6 @@
 //! Terms of the baseline and effects that may explain what it leaves.
 
-use super::shape::Shaped;
+use super::scanned::Shaped;
 use crate::{
     effect::{Act, CATALOGUE, Effect, NUISANCES, Role},
     recording::SensorKind,

@@ -12,8 +12,9 @@ use super::{
     noise::{Noise, SensorNoise, Weighing},
     refit::{Fit, columns, signatures},
     scan::{Beside, Scan},
+    scanned::Shaped,
     scene::{Reference, Scene},
-    shape::{self, Shaped},
+    shape,
     whitening::Whitening,
 };
 use crate::{

@@ -26,6 +26,7 @@ pub mod orientation;
 pub mod refit;
 pub mod revisits;
 mod scan;
+pub mod scanned;
 pub mod scatter;
 pub mod scene;
 pub mod search;

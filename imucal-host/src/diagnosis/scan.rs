@@ -6,8 +6,9 @@ use super::{
     candidates::{Candidates, is_shaped},
     design::Design,
     noise::{Noise, Weighing},
+    scanned::Shaped,
     scene::{Reference, Scene},
-    shape::{self, Backdrop, Shaped},
+    shape::{self, Backdrop},
 };
 use crate::{effect::Effect, simulator::Dose};
 

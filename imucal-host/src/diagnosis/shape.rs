@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::{
     design::{Design, Part},
     evidence::Projected,
+    scanned::{Scanned, Shaped},
     scene::{Means, Reference, Scene, amplitudes},
     whitening::Whitening,
 };
@@ -23,6 +24,8 @@ const CLOSER: i32 = 8;
 const BROAD: [f64; 2] = [0.7, 2.0];
 const DURATIONS: [f64; 3] = [0.6, 1.0, 1.7];
 const DENSER: f64 = 2.0;
+/// A duration is between a usual one divided by this and times it two times of three.
+const WITHIN: f64 = 2.0;
 /// Signatures judged at once.
 const BATCH: usize = 12;
 
@@ -51,23 +54,6 @@ impl<'a> Backdrop<'a> {
     }
 }
 
-/// A shape of an effect.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Shaped {
-    /// All its parameters, amplitudes zero.
-    pub values: Vec<f64>,
-    /// ln of how many shapes of the menu are as likely: the likelihood's sum over the menu as a share of its maximum, which
-    /// is less than one where that is sharper than the menu.
-    pub spread: f64,
-}
-
-impl Shaped {
-    /// The only one.
-    pub fn alone(values: Vec<f64>) -> Self {
-        Self { values, spread: 0.0 }
-    }
-}
-
 /// The most evident shape of an effect. `None` where no shape can be judged.
 pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backdrop<'_>) -> Option<Shaped> {
     let duration = backdrop.scene.duration();
@@ -79,7 +65,8 @@ pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backd
         for shapes in menu.chunks(BATCH) {
             values.extend(judge(effect, shapes, reference, backdrop)?);
         }
-        Some(Scanned { shapes: menu, values })
+        let priors = menu.iter().map(|shape| prior(effect, shape)).collect();
+        Some(Scanned { shapes: menu, values, priors })
     };
     let whole = judged(menu(effect, duration))?;
     let (near, dense) = closer(effect, &whole.shapes[whole.best()?], duration);
@@ -87,32 +74,14 @@ pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backd
     Some(Shaped { values, spread })
 }
 
-/// Shapes and their ln BF.
-struct Scanned<T> {
-    shapes: Vec<T>,
-    values: Vec<f64>,
-}
-
-impl<T: Clone> Scanned<T> {
-    fn finite(&self) -> impl Iterator<Item = (usize, f64)> {
-        self.values.iter().copied().enumerate().filter(|(_, value)| value.is_finite())
-    }
-
-    /// The place of the likeliest; shapes that could not be computed are left out. `None` where none could.
-    fn best(&self) -> Option<usize> {
-        self.finite().max_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(at, _)| at)
-    }
-
-    /// The likeliest of the shapes `near` the best of these, of which `dense` lie within a cell of this menu, and ln of how
-    /// many of this menu are as likely.
-    fn refined(&self, near: &Self, dense: f64) -> Option<(T, f64)> {
-        let (best, refined) = (self.best()?, near.best()?);
-        let most = near.values[refined];
-        let share = |value: f64| (value - most).exp();
-        let elsewhere: f64 = self.finite().filter(|(at, _)| *at != best).map(|(_, v)| share(v)).sum();
-        let here: f64 = near.finite().map(|(_, value)| share(value)).sum();
-        Some((near.shapes[refined].clone(), (elsewhere + here / dense).ln()))
-    }
+/// ln of a shape's prior, but for a constant: durations are lognormal, all else is as likely here as there.
+fn prior(effect: &Effect, shape: &[f64]) -> f64 {
+    let durations = effect.parameters.iter().zip(shape).filter(|(parameter, _)| parameter.range.0 >= 0.0);
+    let squares = durations.filter_map(|(parameter, value)| match parameter.role {
+        Role::Shape { usual } => Some(((value / usual).ln() / WITHIN.ln()).powi(2)),
+        _ => None,
+    });
+    -0.5 * squares.sum::<f64>()
 }
 
 /// Shapes about one of a menu, itself among them, and how many of them lie within a cell of the menu.
@@ -273,8 +242,9 @@ impl Scanned<(f64, f64)> {
     /// Those that end, or those that never do.
     fn lasting(self, ends: bool) -> Self {
         let is_asked = |((_, end), _): &((f64, f64), f64)| end.is_finite() == ends;
-        let (shapes, values) = self.shapes.into_iter().zip(self.values).filter(is_asked).unzip();
-        Self { shapes, values }
+        let (shapes, values): (Vec<_>, Vec<_>) =
+            self.shapes.into_iter().zip(self.values).filter(is_asked).unzip();
+        Self { priors: vec![0.0; shapes.len()], shapes, values }
     }
 }
 
@@ -302,12 +272,13 @@ fn pairs(
         times.iter().map(|time| placed(effect, backdrop.scene.duration(), *time, f64::INFINITY)).collect();
     let (projected, each) = project(effect, &shapes, reference, backdrop)?;
     let own: Vec<usize> = (0..each).collect();
-    let mut scanned = Scanned { shapes: Vec::new(), values: Vec::new() };
+    let mut scanned = Scanned { shapes: Vec::new(), values: Vec::new(), priors: Vec::new() };
     for (i, start) in times.iter().enumerate().filter(|(_, time)| starts.contains(time)) {
         let later = (i + 1..times.len()).filter(|j| ends.contains(&times[*j]));
         for j in later.map(Some).chain([None]) {
             let pair = projected.combined(&places(i, each), j.map(|j| places(j, each)).as_deref());
             scanned.values.push(pair.log_bayes_factor(&[&own]));
+            scanned.priors.push(0.0);
             scanned.shapes.push((*start, j.map_or(f64::INFINITY, |j| times[j])));
         }
     }
@@ -361,39 +332,4 @@ pub fn refine(
         }
     }
     Some((best, errors))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn scanned(values: &[f64]) -> Scanned<usize> {
-        Scanned { shapes: (0..values.len()).collect(), values: values.to_vec() }
-    }
-
-    #[test]
-    fn shapes_as_likely_as_the_likeliest_are_counted_and_others_are_not() {
-        let alone = |values: &[f64]| {
-            let whole = scanned(values);
-            let best = whole.best()?;
-            whole.refined(&scanned(&values[best..=best]), 1.0).map(|(_, spread)| (best, spread))
-        };
-        assert_eq!(alone(&[-1.0, 700.0, f64::NAN, f64::NEG_INFINITY]), Some((1, 0.0)));
-        let (_, spread) = alone(&[5.0; 7]).unwrap();
-        assert!((spread - 7f64.ln()).abs() < 1e-12, "{spread}");
-        let (at, spread) = alone(&[2.0, 2.0 + 2f64.ln()]).unwrap();
-        assert!(at == 1 && (spread - 1.5f64.ln()).abs() < 1e-12, "{at} {spread}");
-        assert_eq!(alone(&[f64::NAN]), None);
-    }
-
-    #[test]
-    fn a_likelihood_sharper_than_the_menu_counts_as_the_share_of_a_cell_that_it_fills() {
-        // N(0.3, 0.02²) in cells of one, and from 32 shapes to a cell.
-        let bell = |x: f64| -0.5 * ((x - 0.3) / 0.02).powi(2);
-        let whole = scanned(&(0..9).map(|k| bell(f64::from(k - 4))).collect::<Vec<_>>());
-        let near = scanned(&(-31..32).map(|k| bell(f64::from(k) / 32.0)).collect::<Vec<_>>());
-        let (at, spread) = whole.refined(&near, 32.0).unwrap();
-        let expected = (0.02 * std::f64::consts::TAU.sqrt()).ln() - bell((at as f64 - 31.0) / 32.0);
-        assert!((spread - expected).abs() < 0.1, "{spread} {expected}");
-    }
 }

@@ -226,8 +226,9 @@ mod tests {
         assert!(found.len() > 20, "{found:?}");
         assert!(find(&cut(2000.0)).is_empty());
         // Nothing else moves: the same attitude, held again and again.
-        let still =
-            |row: usize| Vector3::new(if row % 9 == 0 { 1000.0 } else { x(row).min(900.0) }, 1.0, 2.0);
+        let still = |row: usize| {
+            Vector3::new(if row.is_multiple_of(9) { 1000.0 } else { x(row).min(900.0) }, 1.0, 2.0)
+        };
         assert!(find(&triple((0..500).map(still).collect())).is_empty());
     }
 
