@@ -34,7 +34,7 @@ pub mod shape;
 mod skyline;
 pub mod start;
 pub mod testable;
-mod together;
+pub mod together;
 mod unsteady;
 mod white;
 pub mod whitening;
