@@ -31,7 +31,7 @@ const RATIO: f64 = 1.5;
 const STEPS: usize = 8;
 
 impl Linear<'_> {
-    /// Evidence of a sifted set; as it was sifted where no rig guides the sensor.
+    /// Evidence of a sifted set; as it was sifted where no rig guides the sensor, or none that would show its offsets.
     pub fn together(&self, sifted: Sifted) -> Option<Judged> {
         let Sifted { set, noise, value } = sifted;
         let fitted = self.fitted(&set);
@@ -60,7 +60,7 @@ impl Linear<'_> {
     }
 
     /// Normal equations of some columns with the gimbals' offsets at nodes before them, and how many those are; `None`
-    /// where no rig guides the sensor.
+    /// where no rig guides the sensor, or nothing but a gyroscope was recorded.
     fn offset(&self, noise: &Noise, wanted: &[usize]) -> Option<(Normal, usize)> {
         let turned = self.scene.turned.of(self.scene);
         if turned.is_empty() {
@@ -83,7 +83,9 @@ impl Linear<'_> {
             }
         };
         let whitenings = self.weighing.drifting(&self.design, noise);
-        Some((self.design.normal_beside(&whitenings, &sparse, wanted), count))
+        let normal = self.design.normal_beside(&whitenings, &sparse, wanted);
+        let offsets = normal.score.len() - wanted.len();
+        (offsets > 0).then_some((normal, offsets))
     }
 }
 
