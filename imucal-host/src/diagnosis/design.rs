@@ -233,7 +233,7 @@ impl Design {
 
     /// Normal equations of some columns, given each channel's whitening.
     pub fn normal(&self, whitenings: &[Whitening], wanted: &[usize]) -> Normal {
-        self.normal_beside(whitenings, &|channel| Sparse::none(channel.y.len()), wanted)
+        sum(wanted.len(), &self.by_channel(whitenings, wanted))
     }
 
     /// Normal equations of some columns and of sparse ones before them, which a channel may have.
@@ -243,24 +243,16 @@ impl Design {
         sparse: &(dyn Fn(&Channel) -> Sparse + Sync),
         wanted: &[usize],
     ) -> Normal {
-        let parts: Vec<(Normal, Vec<usize>, usize)> = self
-            .channels
-            .par_iter()
-            .zip(whitenings)
-            .map(|(channel, whitening)| {
-                let (from, to) = places(&channel.ids, wanted);
-                let sparse = sparse(channel);
-                let columns = whitening.latents().condensed_beside(&sparse, &channel.gathered(&from));
-                (Normal::of(&columns, whitening), to, sparse.count)
-            })
-            .collect();
-        let count = parts.iter().map(|(_, _, count)| *count).max().unwrap_or_default();
-        let mut normal = Normal::zeros(count + wanted.len());
-        for (part, to, own) in &parts {
-            let ids: Vec<usize> = (0..*own).chain(to.iter().map(|to| count + to)).collect();
-            normal.add(part, &ids);
-        }
-        normal
+        let sparse: Vec<Sparse> = self.channels.par_iter().map(sparse).collect();
+        let count = sparse.iter().map(|sparse| sparse.count).max().unwrap_or_default();
+        let part = |((channel, whitening), sparse): ((&Channel, &Whitening), &Sparse)| {
+            let (from, to) = places(&channel.ids, wanted);
+            let columns = whitening.latents().condensed_beside(sparse, &channel.gathered(&from));
+            let ids = (0..sparse.count).chain(to.iter().map(|to| count + to)).collect();
+            Part { normal: Normal::of(&columns, whitening), ids }
+        };
+        let parts: Vec<Part> = self.channels.par_iter().zip(whitenings).zip(&sparse).map(part).collect();
+        sum(count + wanted.len(), &parts)
     }
 
     /// Normal equations of some columns, channel by channel.
@@ -297,12 +289,8 @@ impl Design {
             Some(Part { normal: Normal::of(&whitening.latents().condensed(&x), whitening), ids })
         };
         let parts: Vec<Option<Part>> = self.channels.par_iter().zip(whitenings).map(part).collect();
-        let mut normal = Normal::zeros(wanted.len() + further.len());
-        for (part, alone) in parts.iter().zip(alone) {
-            let Part { normal: part, ids } = part.as_ref().unwrap_or(alone);
-            normal.add(part, ids);
-        }
-        normal
+        let known = parts.iter().zip(alone).map(|(part, alone)| part.as_ref().unwrap_or(alone));
+        sum(wanted.len() + further.len(), known)
     }
 
     /// All columns, given what the blocks of a channel have in common.
@@ -339,6 +327,13 @@ impl CondensedDesign {
         parts.iter().zip(&self.channels).for_each(|(part, channel)| normal.add(part, &channel.ids));
         normal
     }
+}
+
+/// Normal equations of all channels, of so many columns.
+fn sum<'p>(size: usize, parts: impl IntoIterator<Item = &'p Part>) -> Normal {
+    let mut normal = Normal::zeros(size);
+    parts.into_iter().for_each(|part| normal.add(&part.normal, &part.ids));
+    normal
 }
 
 /// Which of a channel's columns are wanted, by their place among `ids`, and the places of these among the wanted.

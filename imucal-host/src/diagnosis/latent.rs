@@ -45,8 +45,8 @@ pub struct Sparse {
 
 impl Sparse {
     /// None at all.
-    pub fn none(blocks: usize) -> Self {
-        Self { count: 0, rows: vec![Vec::new(); blocks] }
+    pub fn none() -> Self {
+        Self { count: 0, rows: Vec::new() }
     }
 }
 

@@ -10,7 +10,7 @@
 //! | u_g | the simulator's derivative along gimbal g, of accelerometer and magnetometer |
 //! | σ | scatter, rad: the likeliest |
 //!
-//! A gimbal's offset turns six axes at once. Taken axis by axis ([`super::scatter`]), which is a hundred times cheaper, one
+//! A gimbal's offset turns six axes at once. Taken axis by axis ([`super::scatter`]), which wants far smaller matrices, one
 //! such chance looks like six, and an effect that turns them all seems sure: it sifts the sets of which the best are
 //! judged here. Not modelled: that the gyroscope sees offsets change.
 
@@ -78,7 +78,7 @@ impl Linear<'_> {
                 along.map(|(node, share, gimbal)| (turned.len() * node + gimbal, share * u(gimbal))).collect()
             };
             match channel.kind {
-                SensorKind::Gyr => Sparse::none(places.len()),
+                SensorKind::Gyr => Sparse::none(),
                 _ => Sparse { count, rows: places.iter().enumerate().map(row).collect() },
             }
         };
@@ -89,8 +89,8 @@ impl Linear<'_> {
     }
 }
 
-/// By how much the offsets of nodes count in each block, and the number of nodes: one for each rest, which keeps its own,
-/// and others where a movement begins, ends or goes on for long.
+/// By how much the offsets of nodes count in each block, and the number of nodes: one for each rest, which keeps its own
+/// and shares it with one that follows without a movement, and others where a movement begins, ends or goes on for long.
 fn nodes(blocks: &[Block]) -> (Vec<[(usize, f64); 2]>, usize) {
     let mut places = Vec::with_capacity(blocks.len());
     let mut node = 0;

@@ -202,8 +202,8 @@ impl Common {
     /// Of a stretch, and ln |I + σ² Uᵀ D⁻¹ U|.
     fn new(stretch: &Stretch, scatter: f64) -> (Self, f64) {
         let square = Matrix3::identity() + stretch.gram * (scatter * scatter);
-        // Positive definite but for numbers that are none: then nothing is shared.
-        let lower = square.cholesky().map_or_else(Matrix3::identity, |factor| factor.l());
+        // Positive definite but for numbers that are none, which show in its determinant.
+        let lower = square.cholesky().map_or_else(|| Matrix3::repeat(f64::NAN), |factor| factor.l());
         let inverse = lower.solve_lower_triangular(&Matrix3::identity()).unwrap_or_else(Matrix3::zeros);
         let scaled = inverse * scatter;
         let beside = stretch.beside.iter().map(|beside| (scaled * Vector3::from(*beside)).into()).collect();

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use nalgebra::Vector3;
+
 use super::integrity::Saturation;
 use super::triple::{Triple, median};
 use super::unit::Unit;
@@ -99,10 +101,11 @@ impl<'a> AxisSamples<'a> {
     /// Whether more rows are at an extreme than its neighbours would let fall there, while other axes move.
     fn is_piled(&self, extreme: f64) -> bool {
         let others_move = |row: usize| {
-            let beside = [row.checked_sub(1), Some(row + 1)].into_iter().flatten();
-            let mut beside = beside.filter_map(|row| self.triple.values.get(row));
             let here = &self.triple.values[row];
-            (0..3).filter(|axis| *axis != self.axis).any(|axis| beside.any(|near| near[axis] != here[axis]))
+            let differs =
+                |near: &Vector3<f64>| (0..3).any(|axis| axis != self.axis && near[axis] != here[axis]);
+            let beside = [row.checked_sub(1), Some(row + 1)].into_iter().flatten();
+            beside.filter_map(|row| self.triple.values.get(row)).any(differs)
         };
         let at = || (0..self.values.len()).filter(|row| self.values[*row] == extreme);
         let moving = at().filter(|row| others_move(*row)).count();
@@ -178,8 +181,6 @@ fn stretches(values: &[f64], holds: impl Fn(f64) -> bool) -> Vec<Range<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
-
     use super::super::triple::Nominal;
     use super::*;
 
@@ -225,6 +226,9 @@ mod tests {
         assert!(found.iter().all(|each| each.axis == 0 && each.rows.len() < 3), "{found:?}");
         assert!(found.len() > 20, "{found:?}");
         assert!(find(&cut(2000.0)).is_empty());
+        let mut last_moves = cut(970.0);
+        last_moves.values.iter_mut().for_each(|value| value.y = 0.0);
+        assert_eq!(find(&last_moves).iter().filter(|each| each.axis == 0).count(), found.len());
         // Nothing else moves: the same attitude, held again and again.
         let still = |row: usize| {
             Vector3::new(if row.is_multiple_of(9) { 1000.0 } else { x(row).min(900.0) }, 1.0, 2.0)
