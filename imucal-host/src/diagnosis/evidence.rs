@@ -11,8 +11,9 @@
 //! | B, E | columns of the baseline and of effects |
 //! | Λ | a prior so loose that it only keeps the inverse finite |
 //!
-//! An effect's size is not known beforehand: each has the most likely of a few scales, and pays for the choice. Source:
-//! Kass and Raftery, Bayes factors, J. Am. Stat. Assoc. 90 (1995); the projection is Neyman's efficient score.
+//! An effect's size is not known beforehand: its evidence is the mean over a few scales, those of the other effects being
+//! the likeliest. Source: Kass and Raftery, Bayes factors, J. Am. Stat. Assoc. 90 (1995); the projection is Neyman's
+//! efficient score.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -22,6 +23,8 @@ use super::design::{LOOSE, Normal, loosened};
 pub const SEEN: f64 = 25.0;
 /// Sizes an effect may have, in usual ones.
 const SCALES: [f64; 8] = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
+/// How often each effect of several is given its likeliest scale.
+const SWEEPS: usize = 2;
 
 /// Score and information of effects' columns after the baseline's projection.
 #[derive(Clone, Debug)]
@@ -67,22 +70,23 @@ impl Projected {
         let owner: Vec<usize> =
             effects.iter().enumerate().flat_map(|(k, own)| own.iter().map(move |_| k)).collect();
         let (score, information) = self.part(&places);
-        let mut scales = vec![3usize; effects.len()];
-        let value = |scales: &[usize]| log_bayes_factor(&score, &information, &owner, scales);
-        let mut best = value(&scales);
-        for _ in 0..2 {
+        let mut scales = vec![3; effects.len()];
+        let mut log_sum = 0.0;
+        for _ in 0..if effects.len() > 1 { SWEEPS } else { 1 } {
+            let mut breadth = 0.0;
             for effect in 0..effects.len() {
-                for scale in 0..SCALES.len() {
-                    let mut tried = scales.clone();
-                    tried[effect] = scale;
-                    let found = value(&tried);
-                    if found > best {
-                        (best, scales) = (found, tried);
-                    }
-                }
+                let along: [f64; SCALES.len()] = std::array::from_fn(|scale| {
+                    scales[effect] = scale;
+                    log_bayes_factor(&score, &information, &owner, &scales)
+                });
+                let best = (0..SCALES.len()).max_by(|a, b| along[*a].total_cmp(&along[*b])).unwrap_or(0);
+                scales[effect] = best;
+                breadth += along.iter().map(|value| (value - along[best]).exp()).sum::<f64>().ln();
+                log_sum = along[best] + breadth;
             }
         }
-        best - effects.len() as f64 * (SCALES.len() as f64).ln()
+        let choices = effects.len() as f64 * (SCALES.len() as f64).ln();
+        if log_sum.is_nan() { f64::NEG_INFINITY } else { log_sum - choices }
     }
 
     /// Of columns that are those at `with` less those at `without`.

@@ -60,6 +60,8 @@ pub struct SensorNoise {
     pub slow: f64,
     /// Angle by which the table stands off its encoders, anew at each rest, rad.
     pub scatter: f64,
+    /// ln of how many noises about this one are as likely.
+    pub breadth: f64,
 }
 
 /// Noise of a recording, by [`SensorKind::ALL`].
@@ -76,7 +78,7 @@ impl Noise {
         design.normal(size, &|channel| sensor(channel.kind).whitening(&channel.columns.latents))
     }
 
-    /// −ln of its prior, but for a constant.
+    /// −ln of the prior of all that are as likely, but for a constant.
     pub fn surprise(&self) -> f64 {
         self.sensors.iter().map(SensorNoise::surprise).sum()
     }
@@ -218,18 +220,31 @@ impl<'s> Weighing<'s> {
             let whitening = |channel: &CondensedChannel| sensor.whitening(&channel.columns.latents);
             restricted(&picked.normal(columns.len(), &whitening)) + 2.0 * sensor.surprise()
         };
-        let start = start.sensors[kind as usize];
+        let start = SensorNoise { breadth: 0.0, ..start.sensors[kind as usize] };
         // Between two correlation times lies a hill: each is searched by itself.
         let mut starts = SLOW.map(|slow| start.with_slow(slow)).map(|start| (start, likelihood(&start)));
         starts.sort_by(|(_, a), (_, b)| a.total_cmp(b));
-        let mut best = starts[0];
+        let mut ends: Vec<(SensorNoise, f64)> = Vec::with_capacity(starts.len());
         for tried in starts {
-            if steps.len() > NEAR.len() || tried.1 < best.1 + HOPELESS {
-                let end = self.descended(kind, tried, steps, &likelihood);
-                best = if end.1 < best.1 { end } else { best };
+            let hopeless = |end: &(SensorNoise, f64)| tried.1 >= end.1 + HOPELESS;
+            if steps.len() > NEAR.len() || !ends.iter().any(hopeless) {
+                ends.push(self.descended(kind, tried, steps, &likelihood));
             }
         }
-        best.0
+        ends.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+        let (best, least) = ends[0];
+        let mut breadth = log_sum(least, ends.iter().map(|(_, end)| *end));
+        for coordinate in self.coordinates(kind) {
+            let beside = [NEAR[0], 1.0 / NEAR[0]].into_iter();
+            let tried = beside.filter_map(|factor| self.scaled(best, coordinate, factor));
+            breadth += log_sum(least, tried.map(|tried| likelihood(&tried)).chain([least]));
+        }
+        SensorNoise { breadth, ..best }
+    }
+
+    /// Standard deviations of a sensor that are searched; a gyroscope does not see how the table stands.
+    fn coordinates(&self, kind: SensorKind) -> std::ops::Range<usize> {
+        0..if kind == SensorKind::Gyr { 2 } else { 3 }
     }
 
     /// Standard deviations changed one by one while `surprise` falls, and its end.
@@ -243,7 +258,7 @@ impl<'s> Weighing<'s> {
         for factor in steps {
             for _ in 0..ROUNDS {
                 let before = least;
-                for coordinate in 0..if kind == SensorKind::Gyr { 2 } else { 3 } {
+                for coordinate in self.coordinates(kind) {
                     for step in [*factor, 1.0 / factor] {
                         while let Some(tried) = self.scaled(best, coordinate, step) {
                             let found = surprise(&tried);
@@ -282,9 +297,9 @@ impl SensorNoise {
         Whitening::new(Arc::clone(latents), self.scatter, &drifts)
     }
 
-    /// −ln of its prior, but for a constant.
+    /// −ln of the prior of all that are as likely, but for a constant.
     fn surprise(&self) -> f64 {
-        if self.slow < WALK { 0.0 } else { WALKS }
+        if self.slow < WALK { -self.breadth } else { WALKS - self.breadth }
     }
 
     /// With another correlation time of the slow drift, which goes as far from one moment to the next.
@@ -297,6 +312,11 @@ impl SensorNoise {
 /// Prior information on a column: a usual size is one, and this many of them would be no surprise.
 const LOOSE: f64 = 30.0;
 
+/// ln of a sum of likelihoods, each −2 ln of it, over the greatest.
+fn log_sum(least: f64, each: impl Iterator<Item = f64>) -> f64 {
+    each.map(|value| (-0.5 * (value - least)).exp()).sum::<f64>().ln()
+}
+
 /// −2 ln of the restricted likelihood, but for a constant.
 pub fn restricted(normal: &Normal) -> f64 {
     let n = normal.score.len();
@@ -305,4 +325,15 @@ pub fn restricted(normal: &Normal) -> f64 {
     let Some(factor) = loosened.cholesky() else { return f64::INFINITY };
     let explained = normal.score.dot(&factor.solve(&normal.score));
     normal.log_determinant + factor.ln_determinant() - n as f64 * prior.ln() + normal.energy - explained
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noises_that_are_as_likely_count_and_others_do_not() {
+        assert!((log_sum(7.0, [7.0, 7.0, 900.0].into_iter()) - 2f64.ln()).abs() < 1e-12);
+        assert!((log_sum(7.0, [7.0, 9.0].into_iter()) - (1.0 + (-1f64).exp()).ln()).abs() < 1e-12);
+    }
 }

@@ -269,7 +269,7 @@ fn a_projection_is_what_is_left_of_a_column_after_least_squares() {
 }
 
 #[test]
-fn the_evidence_of_one_amplitude_is_the_closed_form_at_its_best_scale() {
+fn the_evidence_of_one_amplitude_is_the_mean_of_the_closed_form_over_its_scales() {
     let (score, information) = (30.0, 16.0);
     let projected = Projected {
         score: DVector::from_vec(vec![score]),
@@ -281,6 +281,17 @@ fn the_evidence_of_one_amplitude_is_the_closed_form_at_its_best_scale() {
         let grown = 1.0 + a * a * information;
         0.5 * (score * score * a * a / grown - f64::ln(grown))
     };
-    let expected = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0].map(of).into_iter().fold(f64::MIN, f64::max);
-    assert!((projected.log_bayes_factor(&[&[0]]) - (expected - 8f64.ln())).abs() < 1e-9);
+    let each = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0].map(of);
+    let expected = (each.iter().map(|value| value.exp()).sum::<f64>() / 8.0).ln();
+    assert!((projected.log_bayes_factor(&[&[0]]) - expected).abs() < 1e-9);
+}
+
+#[test]
+fn effects_that_share_nothing_are_as_likely_together_as_each_by_itself() {
+    let (score, information) = (DVector::from_vec(vec![30.0, -7.0]), DVector::from_vec(vec![16.0, 9.0]));
+    let projected =
+        Projected { score, information: DMatrix::from_diagonal(&information), before: information };
+    let both = projected.log_bayes_factor(&[&[0], &[1]]);
+    let each = projected.log_bayes_factor(&[&[0]]) + projected.log_bayes_factor(&[&[1]]);
+    assert!((both - each).abs() < 1e-9, "{both} {each}");
 }

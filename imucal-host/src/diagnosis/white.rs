@@ -22,7 +22,8 @@ impl Weighing<'_> {
             let white = self.still(kind, residual);
             let moving = self.moving(kind, residual, &white);
             let typical = white.iter().fold(0.0f64, |a, b| a.max(*b));
-            SensorNoise { white, moving, drift: [0.05 * typical, 0.1 * typical], slow: USUAL, scatter }
+            let drift = [0.05 * typical, 0.1 * typical];
+            SensorNoise { white, moving, drift, slow: USUAL, scatter, breadth: 0.0 }
         });
         Noise { sensors }
     }
