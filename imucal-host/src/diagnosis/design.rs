@@ -316,6 +316,15 @@ impl CondensedDesign {
         Self { channels: picked.collect() }
     }
 
+    /// With the channels of another that are of sensors it has none of.
+    pub fn beside(mut self, other: Self) -> Self {
+        let has = |channel: &CondensedChannel| self.channels.iter().any(|own| own.kind == channel.kind);
+        let others: Vec<CondensedChannel> =
+            other.channels.into_iter().filter(|channel| !has(channel)).collect();
+        self.channels.extend(others);
+        self
+    }
+
     /// Normal equations of its columns, of which there are `size`.
     pub fn normal(&self, size: usize, whitening: &(dyn Fn(&CondensedChannel) -> Whitening + Sync)) -> Normal {
         let parts: Vec<Normal> = self

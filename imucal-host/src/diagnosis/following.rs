@@ -139,9 +139,13 @@ pub fn following_anew(
     let suspects = |slow: bool, most: usize| {
         suspects.iter().filter(move |f| f.p_value < SUSPECT && f.is_slow() == slow).take(most)
     };
-    for suspect in suspects(true, SUSPECTS.0).chain(suspects(false, SUSPECTS.1)) {
-        let Some(driver) = drivers.iter().find(|driver| driver.name == suspect.driver) else { continue };
-        let again = judged(linear, set, noise, suspect.kind, driver, 1)?;
+    let again = |suspect: &Following| {
+        let driver = drivers.iter().find(|driver| driver.name == suspect.driver)?;
+        judged(linear, set, noise, suspect.kind, driver, 1)
+    };
+    let tested: Vec<&Following> = suspects(true, SUSPECTS.0).chain(suspects(false, SUSPECTS.1)).collect();
+    let again: Vec<Following> = tested.into_par_iter().map(again).collect::<Option<_>>()?;
+    for again in again {
         if let Some(own) = found.iter_mut().find(|f| f.kind == again.kind && f.driver == again.driver)
             && again.p_value < own.p_value
         {
@@ -167,10 +171,13 @@ fn judged(
     driver: &Driver,
     choices: usize,
 ) -> Option<Following> {
-    let (design, fitted) = with_drivers(linear, set, kind, std::slice::from_ref(driver), noise);
+    let (mut design, fitted) = with_drivers(linear, set, kind, std::slice::from_ref(driver), noise);
     let every: Vec<usize> = (0..design.size).collect();
     let mut groups = linear.groups(set, &linear.fitted(set));
-    let condensed = linear.weighing.condensed(&design, noise);
+    // The other sensors do not show it.
+    design.channels.retain(|channel| channel.kind == kind);
+    let others = linear.condensed(noise).picked(None, &linear.fitted(set));
+    let condensed = linear.weighing.condensed(&design, noise).beside(others);
     let alone = noise.normal(&condensed.picked(None, &every[..fitted]), fitted);
     let before = log_evidence(&alone, noise, linear.baseline.len(), &groups)?;
     let mut anew = noise.clone();

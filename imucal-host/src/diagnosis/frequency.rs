@@ -10,6 +10,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::{
     driver::{Driver, Function},
@@ -43,16 +44,15 @@ pub fn beat(
     let last = (2.0 * duration / SHORTEST) as usize;
     let power = |half_waves: usize| -> f64 {
         let turn = 0.5 * TAU * half_waves as f64 / duration;
+        let waves: Vec<(f64, f64)> = times.iter().map(|time| libm::sincos(turn * time)).collect();
         let of = |w: &DVector<f64>| {
-            let sum = w.iter().zip(&times).fold((0.0, 0.0), |(c, s), (w, time)| {
-                let (sin, cos) = libm::sincos(turn * time);
-                (c + w * cos, s + w * sin)
-            });
+            let along = |(c, s), (w, (sin, cos)): (&f64, &(f64, f64))| (c + w * cos, s + w * sin);
+            let sum = w.iter().zip(&waves).fold((0.0, 0.0), along);
             sum.0 * sum.0 + sum.1 * sum.1
         };
         weighed.iter().map(of).sum()
     };
-    let powers: Vec<f64> = (LOWEST..last).map(power).collect();
+    let powers: Vec<f64> = (LOWEST..last).into_par_iter().map(power).collect();
     let height = |at: usize| {
         let about = at.saturating_sub(ABOUT)..(at + ABOUT + 1).min(powers.len());
         powers[at] / median(powers[about].to_vec()).unwrap_or(f64::INFINITY).max(f64::MIN_POSITIVE)

@@ -43,6 +43,8 @@ pub struct Judged {
     pub noise: Noise,
     /// ln of its probability, but for a constant.
     pub log_evidence: f64,
+    /// Its value as it was sifted.
+    pub sifted: f64,
 }
 
 /// The problem about a fit, with all its effects put back into the residual.
@@ -273,7 +275,7 @@ impl<'s> Linear<'s> {
     }
 
     /// All columns, as white noise weighs them.
-    fn condensed(&self, noise: &Noise) -> Arc<CondensedDesign> {
+    pub fn condensed(&self, noise: &Noise) -> Arc<CondensedDesign> {
         let key = std::array::from_fn(|at| [noise.sensors[at].white, noise.sensors[at].moving]);
         self.condensed.get(key, || self.weighing.condensed(&self.design, noise))
     }

@@ -18,6 +18,8 @@ use crate::{
 const JUDGED: (usize, usize) = (8, 4);
 /// Of those, the likeliest, which are judged with all sensors together.
 const TOGETHER: usize = 3;
+/// What falls behind the set that is to be improved by this, axis by axis, is not judged any further.
+const FAR: f64 = 25.0;
 /// Effects replaced by the likeliest others.
 const REPLACED: usize = 5;
 /// Of the effects that a quieter noise would have on a sensor, those that are tried in pairs.
@@ -54,7 +56,7 @@ impl Linear<'_> {
             set.push(effect);
             (set, self.scene.reach(effect).to_vec())
         });
-        Some(self.best_of(sets.collect(), &from.noise))
+        Some(self.best_of(sets.collect(), from))
     }
 
     /// The best set with two effects of one sensor more. Each alone may leave the other in the drift, and so gain nothing.
@@ -63,7 +65,7 @@ impl Linear<'_> {
         for kind in &self.scene.kinds {
             sets.extend(self.pairs(&from.set, *kind, &from.noise.quieter())?);
         }
-        Some(self.best_of(sets, &from.noise))
+        Some(self.best_of(sets, from))
     }
 
     /// A set with the likeliest pairs of effects that reach a sensor.
@@ -98,7 +100,7 @@ impl Linear<'_> {
             }
             sets.push((fewer, taken.sensors.to_vec()));
         }
-        Some(self.best_of(sets, &from.noise))
+        Some(self.best_of(sets, from))
     }
 
     /// The best set with one effect replaced by another, or all those of a sensor by one or two, in the shapes that are
@@ -106,7 +108,7 @@ impl Linear<'_> {
     pub fn changed_anew(&self, fit: &Fit, from: &Judged) -> Option<Option<(Self, Judged)>> {
         let mut best: Option<(Self, Judged)> = None;
         let mut better = |linear: Self, sets: Vec<Reaching>| {
-            let found = linear.best_of(sets, &from.noise);
+            let found = linear.best_of(sets, from);
             if let Some(found) = found
                 && best.as_ref().is_none_or(|(_, most)| found.log_evidence > most.log_evidence)
             {
@@ -156,11 +158,12 @@ impl Linear<'_> {
         Some(others.take(REPLACED).map(with).collect())
     }
 
-    /// The best of some sets, the noise of the sensors beside each estimated anew.
-    fn best_of(&self, sets: Vec<Reaching>, noise: &Noise) -> Option<Judged> {
-        let sifted: Vec<Option<Sifted>> =
-            sets.par_iter().map(|(set, anew)| self.sift(set, noise, anew, &NEAR)).collect();
-        let mut sifted: Vec<Sifted> = sifted.into_iter().flatten().collect();
+    /// The best of some sets that may do better than another, the noise of the sensors beside each estimated anew.
+    fn best_of(&self, sets: Vec<Reaching>, from: &Judged) -> Option<Judged> {
+        let sift = |(set, anew): &Reaching| self.sift(set, &from.noise, anew, &NEAR);
+        let sifted: Vec<Option<Sifted>> = sets.par_iter().map(sift).collect();
+        let is_near = |sifted: &Sifted| sifted.value > from.sifted - FAR;
+        let mut sifted: Vec<Sifted> = sifted.into_iter().flatten().filter(is_near).collect();
         sifted.sort_by(|a, b| b.value.total_cmp(&a.value));
         sifted.truncate(TOGETHER);
         let judged: Vec<Option<Judged>> =

@@ -20,6 +20,8 @@ use crate::{
 const STEPS: usize = 8;
 /// A step is small enough when no parameter moves by more than this share of its standard error.
 const SETTLED: f64 = 0.05;
+/// After a step that moved none by more than this many of them, the derivative is that of before.
+const NEAR: f64 = 100.0;
 
 /// Prior standard deviation of a term of the baseline, in usual sizes.
 const FREE: f64 = 1e4;
@@ -72,12 +74,18 @@ pub fn refit(scene: &Scene<'_>, doses: Vec<Dose>, noise: Option<&Noise>) -> Opti
     let residual = scene.residual(&doses)?;
     let mut fit = Fit { doses, residual };
     let mut least: Option<Noise> = None;
+    let mut near: Option<(Weighing<'_>, Design)> = None;
     for _ in 0..STEPS {
-        let reference = scene.reference(fit.doses.clone(), &scene.fine)?;
-        let signatures = signatures(&reference, &columns, &|_| Vec::new())?;
-        let given = crate::recording::SensorKind::ALL.map(|kind| reference.output(kind));
-        let weighing = Weighing::new(scene, given);
-        let design = Design::new(scene, columns.clone(), &signatures, &fit.residual);
+        let (weighing, design) = match near.take() {
+            Some((weighing, design)) => (weighing, design.leaving(&fit.residual)),
+            None => {
+                let reference = scene.reference(fit.doses.clone(), &scene.fine)?;
+                let signatures = signatures(&reference, &columns, &|_| Vec::new())?;
+                let given = crate::recording::SensorKind::ALL.map(|kind| reference.output(kind));
+                let design = Design::new(scene, columns.clone(), &signatures, &fit.residual);
+                (Weighing::new(scene, given), design)
+            }
+        };
         let noise = noise.cloned().unwrap_or_else(|| {
             let white = weighing.white(&fit.residual);
             least.as_ref().map_or_else(|| white.clone(), |least| white.clone().at_most(least))
@@ -116,6 +124,7 @@ pub fn refit(scene: &Scene<'_>, doses: Vec<Dose>, noise: Option<&Noise>) -> Opti
         if largest < SETTLED {
             break;
         }
+        near = (largest < NEAR).then_some((weighing, design));
     }
     Some(fit)
 }

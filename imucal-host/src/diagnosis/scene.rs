@@ -10,6 +10,7 @@ use std::{
 
 use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 use super::{
     block::{Block, cut},
@@ -234,10 +235,13 @@ impl<'a> Scene<'a> {
     pub fn residual(&self, doses: &[Dose]) -> Option<Means> {
         let chain = Chain::new(doses);
         let input = inputs(&chain.truth(self.motion, &self.recording.time), &Matrix3::identity());
-        let mut means: Means = Default::default();
-        for kind in &self.kinds {
+        let of = |kind: &SensorKind| {
             let output = chain.output(*kind, &self.triads[*kind as usize], &input)?;
-            means[*kind as usize] = self.difference(*kind, &output);
+            Some((*kind, self.difference(*kind, &output)))
+        };
+        let mut means: Means = Default::default();
+        for (kind, difference) in self.kinds.par_iter().map(of).collect::<Option<Vec<_>>>()? {
+            means[kind as usize] = difference;
         }
         Some(self.seen(means))
     }

@@ -33,10 +33,10 @@ const STEPS: usize = 8;
 impl Linear<'_> {
     /// Evidence of a sifted set; as it was sifted where no rig guides the sensor, or none that would show its offsets.
     pub fn together(&self, sifted: Sifted) -> Option<Judged> {
-        let Sifted { set, noise, value } = sifted;
+        let Sifted { set, noise, value: sifted } = sifted;
         let fitted = self.fitted(&set);
         let Some((normal, offsets)) = self.offset(&noise, &fitted) else {
-            return Some(Judged { set, noise, log_evidence: value });
+            return Some(Judged { set, noise, log_evidence: sifted, sifted });
         };
         let (baseline, groups) = (self.baseline.len(), self.groups(&set, &fitted));
         let value = |sigma: f64| log_evidence(&without(&normal, offsets, sigma)?, &noise, baseline, &groups);
@@ -49,7 +49,7 @@ impl Linear<'_> {
             }
         }
         let surprise: f64 = set.iter().map(|effect| self.surprise(effect)).sum();
-        Some(Judged { set, noise, log_evidence: most - surprise })
+        Some(Judged { set, noise, log_evidence: most - surprise, sifted })
     }
 
     /// Scatter of the sensors that show it, rad.

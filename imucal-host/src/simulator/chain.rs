@@ -2,6 +2,7 @@
 
 use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 use super::{dose::Dose, truth::Motion};
 use crate::{
@@ -27,7 +28,7 @@ impl<'a> Chain<'a> {
     /// The truth of each row: times of the sensor's clock, s.
     pub fn truth(&self, motion: &dyn Motion, times: &[f64]) -> Vec<Truth> {
         let mut rows: Vec<Truth> = times
-            .iter()
+            .par_iter()
             .map(|time| {
                 let shown = self.doses.iter().fold(*time, |shown, dose| match dose.effect.act {
                     Act::Clock(alter) => alter(&dose.values, shown),
@@ -66,9 +67,9 @@ impl<'a> Chain<'a> {
             SensorKind::Gyr => row.w_iq_q,
             SensorKind::Mag => row.b_q,
         };
-        let unbiased = Triad { bias: Vector3::zeros(), ..triad };
-        let mut output: Vec<_> = input.iter().map(|row| triad.predict(&given(row))).collect::<Option<_>>()?;
-        let sensed: Vec<_> = input.iter().map(|row| unbiased.predict(&given(row))).collect::<Option<_>>()?;
+        let k = triad.sensitivity()?;
+        let sensed: Vec<_> = input.iter().map(|row| k * given(row)).collect();
+        let mut output: Vec<_> = sensed.iter().map(|sensed| sensed + triad.bias).collect();
         let mut run = SensorRun { input, sensed: &sensed, output: &mut output };
         for dose in &self.doses {
             if let Act::Sensor(of, alter) = dose.effect.act
@@ -106,5 +107,5 @@ impl<'a> Chain<'a> {
 
 /// The rows as a unit on the table is given them.
 pub fn inputs(rows: &[Truth], c_t_q: &Matrix3<f64>) -> Vec<Input> {
-    rows.iter().map(|row| Input::of(row, c_t_q)).collect()
+    rows.par_iter().map(|row| Input::of(row, c_t_q)).collect()
 }

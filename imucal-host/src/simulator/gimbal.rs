@@ -74,11 +74,8 @@ impl Chain {
 /// C_p_n of a rig's base.
 pub fn base(machine: &Machine) -> Matrix3<f64> {
     let [tilt_x, tilt_y] = machine.tilt;
-    let mut base = Chain::base();
-    base.turn(&Vector3::z(), Swing::still(machine.heading));
-    base.turn(&Vector3::y(), Swing::still(tilt_y));
-    base.turn(&Vector3::x(), Swing::still(tilt_x));
-    base.c
+    let turn = |axis: Vector3<f64>, angle: f64| rotation::exp(&(axis * angle));
+    turn(Vector3::z(), machine.heading) * turn(Vector3::y(), tilt_y) * turn(Vector3::x(), tilt_x)
 }
 
 /// The pose of a rig.

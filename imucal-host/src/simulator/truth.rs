@@ -38,7 +38,7 @@ impl Place {
 }
 
 /// A movement: a source of truth.
-pub trait Motion {
+pub trait Motion: Sync {
     /// Its length, s.
     fn duration(&self) -> f64;
 
@@ -59,7 +59,7 @@ pub trait Motion {
 }
 
 /// A movement that was recorded, row by row.
-pub trait Recorded: Motion + Sync {
+pub trait Recorded: Motion {
     /// Whether it moves, row by row.
     fn moving(&self) -> &[bool];
 
