@@ -48,7 +48,7 @@ impl Model {
         for kind in SensorKind::ALL {
             if let (Some(triple), Some(triad)) = (recording.sensor(kind), stored.triad(kind)) {
                 model.triads[kind as usize] = si(triad, triple.nominal);
-                model.errors[kind as usize] = errors(triad, triple.nominal);
+                model.errors[kind as usize] = errors(kind, triad, triple.nominal);
                 model.calibrated.push(kind);
             }
         }
@@ -68,10 +68,22 @@ fn because(error: ApplyError) -> String {
 }
 
 /// Standard errors of a gain from nominal SI to SI, and of a bias in nominal SI.
-fn errors(stored: &StoredTriad, nominal: Nominal) -> (Matrix3<f64>, Vector3<f64>) {
+fn errors(kind: SensorKind, stored: &StoredTriad, nominal: Nominal) -> (Matrix3<f64>, Vector3<f64>) {
     let per_si = stored.unit_out.per_si().unwrap_or(nominal.per_unit);
-    let gain = Matrix3::from_fn(|row, column| stored.gain_std[row][column]) * (nominal.per_unit / per_si);
-    (gain, Vector3::from(stored.bias_std) / nominal.per_unit)
+    let unsure = unsure(kind, stored);
+    let std = |value: f64| if value > 0.0 { value * unsure } else { 0.0 };
+    let gain =
+        Matrix3::from_fn(|row, column| std(stored.gain_std[row][column])) * (nominal.per_unit / per_si);
+    (gain, Vector3::from(stored.bias_std).map(std) / nominal.per_unit)
+}
+
+/// By how much a standard error is larger since the noise was told by few residuals: √(ν/(ν − 2)), the standard deviation
+/// of Student's t; with two degrees of freedom or fewer it tells nothing.
+fn unsure(kind: SensorKind, stored: &StoredTriad) -> f64 {
+    // A motion turns about three axes; a rest's or a sample's norm is one number.
+    let equations = f64::from(stored.observations) * if kind == SensorKind::Gyr { 3.0 } else { 1.0 };
+    let freedom = equations - f64::from(stored.parameters);
+    if freedom > 2.0 { (freedom / (freedom - 2.0)).sqrt() } else { f64::INFINITY }
 }
 
 impl Model {
@@ -112,10 +124,8 @@ mod tests {
     use super::*;
     use crate::recording::Unit;
 
-    #[test]
-    fn counts_become_what_the_calibration_makes_of_them() {
-        let nominal = Nominal { offset: 32768.0, per_unit: 415.0 };
-        let stored = StoredTriad {
+    fn stored() -> StoredTriad {
+        StoredTriad {
             unit_in: Unit::Counts,
             unit_out: Unit::Gravity,
             gain: [[2.5e-4, 1e-6, 0.0], [0.0, 2.4e-4, 0.0], [0.0, 2e-6, 2.6e-4]],
@@ -131,7 +141,28 @@ mod tests {
             coverage: 1.0,
             field_norm: None,
             temperature: None,
+        }
+    }
+
+    #[test]
+    fn a_model_of_few_residuals_is_less_sure_of_its_errors_and_one_of_two_knows_nothing() {
+        let of = |observations: u32, kind| {
+            let stored = StoredTriad { observations, bias_std: [0.5, 0.0, 0.2], ..stored() };
+            errors(kind, &stored, Nominal { offset: 0.0, per_unit: 1.0 }).1
         };
+        let many = of(100_009, SensorKind::Acc);
+        assert!((many - Vector3::new(0.5, 0.0, 0.2)).norm() < 1e-4, "{many}");
+        let eight = of(17, SensorKind::Acc);
+        assert!((eight - Vector3::new(0.5, 0.0, 0.2) * (8.0f64 / 6.0).sqrt()).norm() < 1e-12, "{eight}");
+        assert_eq!(of(11, SensorKind::Acc), Vector3::new(f64::INFINITY, 0.0, f64::INFINITY));
+        // A motion tells three numbers.
+        assert!(of(11, SensorKind::Gyr).x < 0.53);
+    }
+
+    #[test]
+    fn counts_become_what_the_calibration_makes_of_them() {
+        let nominal = Nominal { offset: 32768.0, per_unit: 415.0 };
+        let stored = stored();
         let raw = Vector3::new(37_000.0, 29_000.0, 33_123.0);
         let gain = Matrix3::from_fn(|i, j| stored.gain[i][j]);
         let expected = gain * (raw - Vector3::from(stored.bias)) * 9.80665;
