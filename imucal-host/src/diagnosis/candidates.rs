@@ -13,6 +13,8 @@ pub struct Candidates {
     pub baseline: Vec<&'static Effect>,
     /// Effects that may be added.
     pub effects: Vec<&'static Effect>,
+    /// Those among them that were taken out of the baseline: every sensor has them, and they are no noise.
+    pub taken_out: Vec<&'static Effect>,
     /// Effects that the recording cannot show, and why.
     pub untestable: Vec<(&'static Effect, &'static str)>,
 }
@@ -73,7 +75,8 @@ impl Candidates {
         };
         baseline.extend(NUISANCES.iter().filter(|effect| reached(effect) && is_free(effect)));
         let elsewhere = calibrated(SensorKind::Mag);
-        let mut candidates = Self { baseline, effects: Vec::new(), untestable: Vec::new() };
+        let mut candidates =
+            Self { baseline, effects: Vec::new(), taken_out: Vec::new(), untestable: Vec::new() };
         let is_term = |effect: &Effect| term(effect, kinds).is_some() || on_clock(effect);
         for effect in others.into_iter().filter(|effect| is_term(effect) || !named(effect)) {
             // What is fixed to a calibrated sensor is iron, and the triad's terms would be the same by another name.
@@ -91,6 +94,7 @@ impl Candidates {
                 candidates.untestable.push((effect, "no gimbals turn the sensor"));
             } else {
                 candidates.effects.push(effect);
+                candidates.taken_out.extend(named(effect).then_some(effect));
             }
         }
         candidates

@@ -235,14 +235,17 @@ impl<'s> Linear<'s> {
     ) -> Option<Sifted> {
         let fitted = self.fitted(set);
         let mut noise = start.clone();
-        let condensed = self.condensed(start).picked(None, &fitted);
-        let every: Vec<usize> = (0..fitted.len()).collect();
+        let is_new = |column: &usize| !fitted.contains(column);
+        let taken_out = self.candidates.taken_out.iter().flat_map(|term| self.design.of(term)).filter(is_new);
+        let known: Vec<usize> = fitted.iter().copied().chain(taken_out).collect();
+        let condensed = self.condensed(start).picked(None, &known);
+        let every: Vec<usize> = (0..known.len()).collect();
         let fit = |kind: &SensorKind| self.weighing.fit(&condensed, *kind, &every, start, steps);
         let asked: Vec<SensorKind> =
             self.scene.kinds.iter().copied().filter(|kind| anew.contains(kind)).collect();
         let found: Vec<SensorNoise> = asked.par_iter().map(fit).collect();
         asked.into_iter().zip(found).for_each(|(kind, found)| noise.sensors[kind as usize] = found);
-        let normal = noise.normal(&condensed, fitted.len());
+        let normal = noise.normal(&condensed.picked(None, &every[..fitted.len()]), fitted.len());
         let value = log_evidence(&normal, &noise, self.baseline.len(), &self.groups(set, &fitted))?
             - set.iter().map(|effect| self.surprise(effect)).sum::<f64>();
         Some(Sifted { set: set.to_vec(), noise, value })
@@ -256,8 +259,12 @@ impl<'s> Linear<'s> {
         set.iter().map(of).collect()
     }
 
-    /// −ln of an effect's prior: one of the candidates, in one of its shapes or such as are as likely.
+    /// −ln of an effect's prior: one of the candidates, in one of its shapes or such as are as likely. What was taken out of
+    /// the baseline is no surprise.
     pub fn surprise(&self, effect: &Effect) -> f64 {
+        if self.candidates.taken_out.iter().any(|term| std::ptr::eq(*term, effect)) {
+            return 0.0;
+        }
         let at = self.candidates.effects.iter().position(|other| std::ptr::eq(*other, effect));
         let spread = at.map_or(0.0, |at| self.shapes[at].spread);
         let shapes = (shape::choices(effect, self.scene.duration()) as f64).ln();

@@ -1,6 +1,7 @@
 //! Where the gap between simulator and recording lies, which unmodelled effect causes it, and how far it shrinks.
 
 pub mod block;
+mod borne;
 pub mod candidates;
 mod carried;
 pub mod convention;
@@ -187,7 +188,7 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
     let remarks = match linear.scene.swings {
         Some(_) => Vec::new(),
         None => {
-            let mut remarks = unborne(&mut causes, &gap::closed_of_own(linear, &best.set, &best.noise)?);
+            let mut remarks = borne::leave_out(&mut causes, linear, &best.set, &best.noise)?;
             remarks.extend(carried::leave_out(&mut causes, &linear.scene.blocks));
             remarks
         }
@@ -236,22 +237,6 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
         next_experiment,
         ..untestable(recording, String::new())
     })
-}
-
-/// Takes out causes that no held-out block bears out, or that are too small to matter: where no rig guides the sensor,
-/// what hand and reference add is no noise of any kind that is estimated, and evidence alone is too sure.
-fn unborne(causes: &mut Vec<Cause>, of_own: &[gap::Share]) -> Vec<String> {
-    let borne = |(cause, share): &(Cause, &gap::Share)| {
-        cause.material && share.value > REMAINDER && share.interval[0] > 0.0
-    };
-    let (kept, out): (Vec<_>, Vec<_>) = causes.drain(..).zip(of_own).partition(borne);
-    let out: Vec<Cause> = out.into_iter().map(|(cause, _)| cause).collect();
-    *causes = kept.into_iter().map(|(cause, _)| cause).collect();
-    if out.is_empty() {
-        return Vec::new();
-    }
-    let names: Vec<&str> = out.iter().map(|cause| cause.effect.as_str()).collect();
-    vec![format!("not asserted, since held-out data do not bear them out: {}", names.join(", "))]
 }
 
 fn is_followed(following: &Following, tests: usize) -> bool {

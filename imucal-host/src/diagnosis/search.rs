@@ -103,6 +103,9 @@ impl<'s> Explained<'s> {
     /// With the noise that suits its set.
     fn settled(mut self) -> Option<Self> {
         self.best = self.linear.judge(&self.best.set, &self.best.noise, &SensorKind::ALL, &FAR)?;
+        if self.best.set.is_empty() {
+            self.none = self.best.clone();
+        }
         Some(self)
     }
 

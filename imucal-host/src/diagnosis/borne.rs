@@ -1,0 +1,39 @@
+//! Which causes are borne out by blocks that no fit has seen.
+//!
+//! Where no rig guides the sensor, what hand and reference add is no noise of any kind that is estimated, and evidence
+//! alone is too sure. A cause that is not borne out may spoil what the others would foretell: the worst is taken out
+//! first, and the others are asked again.
+
+use super::{finding::Cause, gap, linear::Linear, noise::Noise};
+use crate::effect::Effect;
+
+/// A cause closes at least this share of what its own sensors show.
+const LEAST: f64 = 0.05;
+
+/// Takes out the causes of a set that no held-out block bears out or that are too small to matter, and says so; `causes`
+/// are those of `set`, in its order. `None` where nothing can be fitted.
+pub fn leave_out(
+    causes: &mut Vec<Cause>,
+    linear: &Linear<'_>,
+    set: &[&'static Effect],
+    noise: &Noise,
+) -> Option<Vec<String>> {
+    let mut kept = set.to_vec();
+    let mut out = Vec::new();
+    loop {
+        let shares = gap::closed_of_own(linear, &kept, noise)?;
+        let fails = |at: &usize| {
+            let share = &shares[*at];
+            !causes[*at].material || share.value <= LEAST || share.interval[0] <= 0.0
+        };
+        let failing = (0..kept.len()).filter(fails);
+        let Some(worst) = failing.min_by(|a, b| shares[*a].value.total_cmp(&shares[*b].value)) else { break };
+        kept.remove(worst);
+        out.push(causes.remove(worst).effect);
+    }
+    let names = out.join(", ");
+    Some(match out.is_empty() {
+        true => Vec::new(),
+        false => vec![format!("not asserted, since held-out data do not bear them out: {names}")],
+    })
+}
