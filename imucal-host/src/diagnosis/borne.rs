@@ -4,14 +4,16 @@
 //! alone is too sure. A cause that is not borne out may spoil what the others would foretell: the worst is taken out
 //! first, and the others are asked again.
 
-use super::{finding::Cause, gap, linear::Linear, noise::Noise};
+use super::{estimate, finding::Cause, gap, linear::Linear, noise::Noise};
 use crate::effect::Effect;
 
 /// A cause closes at least this share of what its own sensors show.
 const LEAST: f64 = 0.05;
+/// One of its amplitudes at least is so many standard errors from zero: of one that is not, nobody could take out anything.
+const ERRORS: f64 = 2.0;
 
-/// Takes out the causes of a set that no held-out block bears out or that are too small to matter, and says so; `causes`
-/// are those of `set`, in its order. `None` where nothing can be fitted.
+/// Takes out the causes of a set that no held-out block bears out, that are too small to matter or of no known size, and
+/// says so; `causes` are those of `set`, in its order. `None` where nothing can be fitted.
 pub fn leave_out(
     causes: &mut Vec<Cause>,
     linear: &Linear<'_>,
@@ -23,8 +25,9 @@ pub fn leave_out(
     loop {
         let shares = gap::closed_of_own(linear, &kept, noise)?;
         let fails = |at: &usize| {
-            let share = &shares[*at];
-            !causes[*at].material || share.value <= LEAST || share.interval[0] <= 0.0
+            let (share, cause) = (&shares[*at], &causes[*at]);
+            let matters = cause.material && estimate::is_sized(kept[*at], &cause.parameters, ERRORS);
+            !matters || share.value <= LEAST || share.interval[0] <= 0.0
         };
         let failing = (0..kept.len()).filter(fails);
         let Some(worst) = failing.min_by(|a, b| shares[*a].value.total_cmp(&shares[*b].value)) else { break };

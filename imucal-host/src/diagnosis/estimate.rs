@@ -73,3 +73,11 @@ pub fn is_material(effect: &Effect, amounts: &[Amount]) -> bool {
             && amount.value.is_some_and(|value| value.abs() >= parameter.material)
     })
 }
+
+/// At least one amplitude is further from zero than so many of its standard errors.
+pub fn is_sized(effect: &Effect, amounts: &[Amount], errors: f64) -> bool {
+    effect.parameters.iter().zip(amounts).any(|(parameter, amount)| {
+        let far = |value: f64| amount.std_error.is_none_or(|error| value.abs() >= errors * error);
+        parameter.role == Role::Amplitude && amount.value.is_some_and(far)
+    })
+}

@@ -11,9 +11,9 @@
 //! | B, E | columns of the baseline and of effects |
 //! | Λ | a prior so loose that it only keeps the inverse finite |
 //!
-//! An effect's size is not known beforehand: its evidence is the mean over a few scales, those of the other effects being
-//! the likeliest. Source: Kass and Raftery, Bayes factors, J. Am. Stat. Assoc. 90 (1995); the projection is Neyman's
-//! efficient score.
+//! An effect's size is not known beforehand, nor whether it acts on one axis alone: its evidence is the mean over a few
+//! scales of all its amplitudes and of each, those of the other effects being the likeliest. Source: Kass and Raftery,
+//! Bayes factors, J. Am. Stat. Assoc. 90 (1995); the projection is Neyman's efficient score.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -23,6 +23,8 @@ use super::design::{LOOSE, Normal, loosened};
 pub const SEEN: f64 = 25.0;
 /// Sizes an effect may have, in usual ones.
 const SCALES: [f64; 8] = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
+/// Share of effects of several amplitudes of which one stands alone: a shock moves one axis, one of them is curved.
+const ALONE: f64 = 0.3;
 /// How often each effect of several is given its likeliest scale.
 const SWEEPS: usize = 2;
 
@@ -70,23 +72,29 @@ impl Projected {
         let owner: Vec<usize> =
             effects.iter().enumerate().flat_map(|(k, own)| own.iter().map(move |_| k)).collect();
         let (score, information) = self.part(&places);
-        let mut scales = vec![3; effects.len()];
+        let mut usual = DVector::repeat(places.len(), SCALES[3]);
+        let mut priors = vec![0.0; effects.len()];
         let mut log_sum = 0.0;
         for _ in 0..if effects.len() > 1 { SWEEPS } else { 1 } {
             let mut breadth = 0.0;
             for effect in 0..effects.len() {
-                let along: [f64; SCALES.len()] = std::array::from_fn(|scale| {
-                    scales[effect] = scale;
-                    log_bayes_factor(&score, &information, &owner, &scales)
-                });
-                let best = (0..SCALES.len()).max_by(|a, b| along[*a].total_cmp(&along[*b])).unwrap_or(0);
-                scales[effect] = best;
-                breadth += along.iter().map(|value| (value - along[best]).exp()).sum::<f64>().ln();
-                log_sum = along[best] + breadth;
+                let own: Vec<usize> = (0..places.len()).filter(|at| owner[*at] == effect).collect();
+                let (mut most, mut best) = (f64::NEG_INFINITY, (0.0, usual.clone()));
+                let mut values = Vec::new();
+                for (prior, sizes) in sizes(own.len()) {
+                    own.iter().zip(sizes).for_each(|(at, size)| usual[*at] = size);
+                    let value = prior + log_bayes_factor(&score, &information, &usual);
+                    if value > most {
+                        (most, best) = (value, (prior, usual.clone()));
+                    }
+                    values.push(value);
+                }
+                (priors[effect], usual) = best;
+                breadth += values.iter().map(|value| (value - most).exp()).sum::<f64>().ln();
+                log_sum = most - priors[effect] + priors.iter().sum::<f64>() + breadth;
             }
         }
-        let choices = effects.len() as f64 * (SCALES.len() as f64).ln();
-        if log_sum.is_nan() { f64::NEG_INFINITY } else { log_sum - choices }
+        if log_sum.is_nan() { f64::NEG_INFINITY } else { log_sum }
     }
 
     /// Of columns that are those at `with` less those at `without`.
@@ -121,16 +129,26 @@ impl Projected {
     }
 }
 
-fn log_bayes_factor(
-    score: &DVector<f64>,
-    information: &DMatrix<f64>,
-    owner: &[usize],
-    scales: &[usize],
-) -> f64 {
+/// Usual sizes that an effect's amplitudes may have, and ln of the prior of each: all of them alike, or one alone.
+fn sizes(count: usize) -> impl Iterator<Item = (f64, Vec<f64>)> {
+    let alone = if count > 1 { ALONE } else { 0.0 };
+    let all = std::iter::once((1.0 - alone, None));
+    let each = (0..count).map(move |at| (alone / count as f64, Some(at)));
+    let acts = move |at: usize, only: Option<usize>| only.is_none_or(|only| only == at);
+    all.chain(each).filter(|(share, _)| *share > 0.0).flat_map(move |(share, only)| {
+        SCALES.into_iter().map(move |scale| {
+            let sizes = (0..count).map(|at| if acts(at, only) { scale } else { 0.0 }).collect();
+            ((share / SCALES.len() as f64).ln(), sizes)
+        })
+    })
+}
+
+/// ln BF of columns of these usual sizes.
+fn log_bayes_factor(score: &DVector<f64>, information: &DMatrix<f64>, usual: &DVector<f64>) -> f64 {
     let n = score.len();
-    let a = DVector::from_fn(n, |i, _| SCALES[scales[owner[i]]]);
-    let scaled = DMatrix::from_fn(n, n, |i, j| a[i] * information[(i, j)] * a[j]) + DMatrix::identity(n, n);
+    let scaled =
+        DMatrix::from_fn(n, n, |i, j| usual[i] * information[(i, j)] * usual[j]) + DMatrix::identity(n, n);
     let Some(factor) = scaled.cholesky() else { return f64::NEG_INFINITY };
-    let scaled_score = score.component_mul(&a);
+    let scaled_score = score.component_mul(usual);
     0.5 * (scaled_score.dot(&factor.solve(&scaled_score)) - factor.ln_determinant())
 }

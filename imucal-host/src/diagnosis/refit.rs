@@ -21,7 +21,7 @@ const STEPS: usize = 8;
 /// A step is small enough when no parameter moves by more than this share of its standard error.
 const SETTLED: f64 = 0.05;
 /// After a step that moved none by more than this many of them, the derivative is that of before.
-const NEAR: f64 = 100.0;
+const NEAR: f64 = 1.0;
 
 /// Prior standard deviation of a term of the baseline, in usual sizes.
 const FREE: f64 = 1e4;
