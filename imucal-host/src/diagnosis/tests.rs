@@ -295,3 +295,24 @@ fn effects_that_share_nothing_are_as_likely_together_as_each_by_itself() {
     let each = projected.log_bayes_factor(&[&[0]]) + projected.log_bayes_factor(&[&[1]]);
     assert!((both - each).abs() < 1e-9, "{both} {each}");
 }
+
+#[test]
+fn the_evidence_of_an_effect_allows_for_one_amplitude_that_stands_alone() {
+    let (scores, informations) = ([30.0, -1.0, 2.0], [16.0, 9.0, 4.0]);
+    let information = DVector::from_row_slice(&informations);
+    let projected = Projected {
+        score: DVector::from_row_slice(&scores),
+        information: DMatrix::from_diagonal(&information),
+        before: information,
+    };
+    let of = |at: usize, a: f64| {
+        let (grown, score): (f64, f64) = (1.0 + a * a * informations[at], scores[at] * a);
+        (0.5 * (score * score / grown - grown.ln())).exp()
+    };
+    let each = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0].map(|a| {
+        let amplitudes = [0, 1, 2].map(|at| of(at, a));
+        0.7 * amplitudes.iter().product::<f64>() + 0.1 * amplitudes.iter().sum::<f64>()
+    });
+    let expected = (each.iter().sum::<f64>() / 8.0).ln();
+    assert!((projected.log_bayes_factor(&[&[0, 1, 2]]) - expected).abs() < 1e-9);
+}
