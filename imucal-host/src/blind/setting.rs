@@ -4,7 +4,10 @@ use nalgebra::Vector3;
 
 use crate::{
     recording::{gravity::normal_gravity, manifest::Axis},
-    simulator::{Conditions, DriftKind, NoiseLevel, Place, Programme, Simulation, UnitKind, random::Random},
+    simulator::{
+        Conditions, DriftKind, NoiseLevel, Place, Programme, Simulation, SimulationError, UnitKind,
+        random::Random,
+    },
 };
 
 /// Orders of the gimbals, outermost first.
@@ -42,7 +45,7 @@ pub(super) fn draw(seed: u64, random: &mut Random) -> Simulation {
     };
     // The others last as long as they take, and mixed ones what they are given.
     let duration = logarithmic(DURATION, random);
-    Simulation {
+    fitting(Simulation {
         unit: UnitKind::ALL[random.below(UnitKind::ALL.len())],
         programme,
         axes: AXES[random.below(AXES.len())],
@@ -51,6 +54,14 @@ pub(super) fn draw(seed: u64, random: &mut Random) -> Simulation {
         seed,
         conditions: conditions(random),
         ..Simulation::default()
+    })
+}
+
+/// As long as can be, if its movements do not fit into the length that was drawn.
+fn fitting(simulation: Simulation) -> Simulation {
+    match simulation.schedule() {
+        Err(SimulationError::TooShort { .. }) => Simulation { duration: Some(DURATION.1), ..simulation },
+        _ => simulation,
     }
 }
 
@@ -80,7 +91,18 @@ fn place(random: &mut Random) -> Place {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulator::random::Purpose;
+    use crate::simulator::{Motion, random::Purpose};
+
+    #[test]
+    fn movements_that_do_not_fit_are_given_the_longest_time() {
+        let of = |duration| {
+            let drawn =
+                Simulation { programme: Programme::Mixed, duration: Some(duration), ..Simulation::default() };
+            fitting(drawn).schedule().unwrap().duration()
+        };
+        assert!((of(60.0) - DURATION.1).abs() < 1.0);
+        assert!((of(300.0) - 300.0).abs() < 1.0);
+    }
 
     #[test]
     fn recordings_last_two_to_eleven_minutes_and_differ() {
@@ -88,7 +110,7 @@ mod tests {
         let mut random = Random::new(4, Purpose::Case);
         for seed in 0..60 {
             let simulation = draw(seed, &mut random);
-            let duration = crate::simulator::Motion::duration(&simulation.schedule().unwrap());
+            let duration = simulation.schedule().unwrap().duration();
             assert!((119.0..651.0).contains(&duration), "{duration} {simulation:?}");
             if !programmes.contains(&simulation.programme.name()) {
                 programmes.push(simulation.programme.name());
