@@ -37,6 +37,8 @@ pub fn leave_out(
     let names = out.join(", ");
     Some(match out.is_empty() {
         true => Vec::new(),
-        false => vec![format!("not asserted, since held-out data do not bear them out: {names}")],
+        false => vec![format!(
+            "not asserted, since held-out data do not bear them out or no size of theirs is told from zero: {names}"
+        )],
     })
 }
