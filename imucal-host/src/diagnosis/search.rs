@@ -20,7 +20,8 @@ const MOST: (usize, usize) = (3, 5);
 /// The first effect must raise the evidence by this, beyond its share of the prior, and each further one by the latter:
 /// where one thing is wrong, another is less of a surprise. How many false alarms that makes is told by `imucal blind`.
 const GAIN: (f64, f64) = (0.5, 0.0);
-/// A set of no more effects must raise it by this.
+/// A set of as many effects must raise it by this; one of fewer need not, since what the data would rather be without is
+/// not asserted.
 const CHANGE: f64 = 0.5;
 /// Fits of the baseline, each with the noise that the last one left, where no rig guides the sensor.
 const SETTLING: usize = 2;
@@ -174,6 +175,7 @@ fn improved<'s>(at: &Explained<'s>, most: usize) -> Option<Option<Step<'s>>> {
     let Explained { linear, fit, best, .. } = at;
     let gains = |judged: &Judged, least: f64| judged.log_evidence > best.log_evidence + least;
     let gain = if best.set.is_empty() { GAIN.0 } else { GAIN.1 };
+    let change = |judged: &Judged| if judged.set.len() < best.set.len() { 0.0 } else { CHANGE };
     let room = most.saturating_sub(best.set.len());
     if room > 0
         && let Some(next) = linear.added(best, &|_| true)?.filter(|next| gains(next, gain))
@@ -181,7 +183,7 @@ fn improved<'s>(at: &Explained<'s>, most: usize) -> Option<Option<Step<'s>>> {
         return Some(Some(Step::to(next)));
     }
     if !best.set.is_empty()
-        && let Some(next) = linear.changed(best)?.filter(|next| gains(next, CHANGE))
+        && let Some(next) = linear.changed(best)?.filter(|next| gains(next, change(next)))
     {
         return Some(Some(Step::to(next)));
     }
