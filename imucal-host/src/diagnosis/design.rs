@@ -92,8 +92,7 @@ pub struct Normal {
 }
 
 /// Normal equations of a channel, and the places of its columns among all.
-#[derive(Clone, Debug)]
-pub struct Part {
+struct Part {
     normal: Normal,
     ids: Vec<usize>,
 }
@@ -116,7 +115,11 @@ impl Normal {
 
     /// Of condensed columns, the last being the residual.
     fn of(columns: &Condensed, whitening: &Whitening) -> Self {
-        let all = whitening.products(columns);
+        Self::within(&whitening.products(columns), whitening)
+    }
+
+    /// Of the products of columns, the last being the residual.
+    pub fn within(all: &DMatrix<f64>, whitening: &Whitening) -> Self {
         let n = all.ncols() - 1;
         Self {
             information: all.view((0, 0), (n, n)).into_owned(),
@@ -161,7 +164,7 @@ impl Channel {
     }
 
     /// Some of its columns, by their place in `ids`, and behind them its residual.
-    fn gathered(&self, places: &[usize]) -> DMatrix<f64> {
+    pub fn gathered(&self, places: &[usize]) -> DMatrix<f64> {
         let mut x = DMatrix::zeros(self.y.len(), places.len() + 1);
         for (to, from) in places.iter().enumerate() {
             x.set_column(to, &self.x.column(*from));
@@ -173,7 +176,12 @@ impl Channel {
 
 impl Design {
     /// Channels of the sensors that are there, with columns and a residual.
-    pub fn new(scene: &Scene<'_>, columns: Vec<Column>, signatures: &[Means], residual: &Means) -> Self {
+    pub fn new(
+        scene: &Scene<'_>,
+        columns: Vec<Column>,
+        signatures: &[impl Borrow<Means> + Sync],
+        residual: &Means,
+    ) -> Self {
         let places: Vec<(SensorKind, usize)> =
             scene.kinds.iter().flat_map(|kind| (0..3).map(move |axis| (*kind, axis))).collect();
         let channels = places
@@ -183,8 +191,18 @@ impl Design {
         Self { size: columns.len(), columns, channels }
     }
 
+    /// A residual without columns.
+    pub fn of_residual(scene: &Scene<'_>, residual: &Means) -> Self {
+        Self::new(scene, Vec::new(), &[] as &[Means], residual)
+    }
+
     /// Some of its columns, by index, and further ones behind them; `columns` names the first of these.
-    pub fn extended(&self, kept: &[usize], columns: Vec<Column>, further: &[Means]) -> Self {
+    pub fn extended(
+        &self,
+        kept: &[usize],
+        columns: Vec<Column>,
+        further: &[impl Borrow<Means> + Sync],
+    ) -> Self {
         let channels = self
             .channels
             .par_iter()
@@ -233,7 +251,13 @@ impl Design {
 
     /// Normal equations of some columns, given each channel's whitening.
     pub fn normal(&self, whitenings: &[Whitening], wanted: &[usize]) -> Normal {
-        sum(wanted.len(), &self.by_channel(whitenings, wanted))
+        let part = |(channel, whitening): (&Channel, &Whitening)| {
+            let (from, ids) = places(&channel.ids, wanted);
+            let columns = whitening.latents().condensed(&channel.gathered(&from));
+            Part { normal: Normal::of(&columns, whitening), ids }
+        };
+        let parts: Vec<Part> = self.channels.par_iter().zip(whitenings).map(part).collect();
+        sum(wanted.len(), &parts)
     }
 
     /// Normal equations of some columns and of sparse ones before them, which a channel may have.
@@ -253,44 +277,6 @@ impl Design {
         };
         let parts: Vec<Part> = self.channels.par_iter().zip(whitenings).zip(&sparse).map(part).collect();
         sum(count + wanted.len(), &parts)
-    }
-
-    /// Normal equations of some columns, channel by channel.
-    pub fn by_channel(&self, whitenings: &[Whitening], wanted: &[usize]) -> Vec<Part> {
-        let part = |(channel, whitening): (&Channel, &Whitening)| {
-            let (from, ids) = places(&channel.ids, wanted);
-            let columns = whitening.latents().condensed(&channel.gathered(&from));
-            Part { normal: Normal::of(&columns, whitening), ids }
-        };
-        self.channels.par_iter().zip(whitenings).map(part).collect()
-    }
-
-    /// Normal equations of some columns and, behind them, of further ones: `alone` has those of the first, which stand
-    /// where none of the further reaches a channel.
-    pub fn normal_with<M: Borrow<Means> + Sync>(
-        &self,
-        whitenings: &[Whitening],
-        wanted: &[usize],
-        alone: &[Part],
-        further: &[M],
-    ) -> Normal {
-        let part = |(channel, whitening): (&Channel, &Whitening)| {
-            let (mut more, mut data) = (Vec::new(), Vec::new());
-            append(channel.kind, channel.axis, wanted.len(), further, &mut more, &mut data);
-            if more.is_empty() {
-                return None;
-            }
-            let (from, mut ids) = places(&channel.ids, wanted);
-            let own = channel.gathered(&from);
-            let own = own.columns(0, from.len());
-            let all = own.iter().copied().chain(data).chain(channel.y.iter().copied());
-            ids.extend(more);
-            let x = DMatrix::from_iterator(channel.y.len(), ids.len() + 1, all);
-            Some(Part { normal: Normal::of(&whitening.latents().condensed(&x), whitening), ids })
-        };
-        let parts: Vec<Option<Part>> = self.channels.par_iter().zip(whitenings).map(part).collect();
-        let known = parts.iter().zip(alone).map(|(part, alone)| part.as_ref().unwrap_or(alone));
-        sum(wanted.len() + further.len(), known)
     }
 
     /// All columns, given what the blocks of a channel have in common.
@@ -339,19 +325,25 @@ impl CondensedDesign {
 }
 
 /// Normal equations of all channels, of so many columns.
-fn sum<'p>(size: usize, parts: impl IntoIterator<Item = &'p Part>) -> Normal {
+fn sum(size: usize, parts: &[Part]) -> Normal {
     let mut normal = Normal::zeros(size);
-    parts.into_iter().for_each(|part| normal.add(&part.normal, &part.ids));
+    parts.iter().for_each(|part| normal.add(&part.normal, &part.ids));
     normal
 }
 
 /// Which of a channel's columns are wanted, by their place among `ids`, and the places of these among the wanted.
-fn places(ids: &[usize], wanted: &[usize]) -> (Vec<usize>, Vec<usize>) {
+pub fn places(ids: &[usize], wanted: &[usize]) -> (Vec<usize>, Vec<usize>) {
     let to = |id: &usize| wanted.iter().position(|wanted| wanted == id);
     ids.iter().enumerate().filter_map(|(from, id)| Some((from, to(id)?))).unzip()
 }
 
-fn channel(kind: SensorKind, axis: usize, blocks: usize, signatures: &[Means], residual: &Means) -> Channel {
+fn channel(
+    kind: SensorKind,
+    axis: usize,
+    blocks: usize,
+    signatures: &[impl Borrow<Means>],
+    residual: &Means,
+) -> Channel {
     let (mut ids, mut data) = (Vec::new(), Vec::new());
     append(kind, axis, 0, signatures, &mut ids, &mut data);
     let x = DMatrix::from_vec(blocks, ids.len(), data);
@@ -360,7 +352,7 @@ fn channel(kind: SensorKind, axis: usize, blocks: usize, signatures: &[Means], r
 }
 
 /// Appends the signatures that reach a channel; they are numbered from `first` on.
-fn append(
+pub fn append(
     kind: SensorKind,
     axis: usize,
     first: usize,

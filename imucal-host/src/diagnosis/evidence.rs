@@ -72,26 +72,24 @@ impl Projected {
         let owner: Vec<usize> =
             effects.iter().enumerate().flat_map(|(k, own)| own.iter().map(move |_| k)).collect();
         let (score, information) = self.part(&places);
+        let all = Columns { score, information };
         let mut usual = DVector::repeat(places.len(), SCALES[3]);
         let mut priors = vec![0.0; effects.len()];
         let mut log_sum = 0.0;
         for _ in 0..if effects.len() > 1 { SWEEPS } else { 1 } {
             let mut breadth = 0.0;
             for effect in 0..effects.len() {
-                let own: Vec<usize> = (0..places.len()).filter(|at| owner[*at] == effect).collect();
-                let (mut most, mut best) = (f64::NEG_INFINITY, (0.0, usual.clone()));
-                let mut values = Vec::new();
-                for (prior, sizes) in sizes(own.len()) {
-                    own.iter().zip(sizes).for_each(|(at, size)| usual[*at] = size);
-                    let value = prior + log_bayes_factor(&score, &information, &usual);
-                    if value > most {
-                        (most, best) = (value, (prior, usual.clone()));
-                    }
-                    values.push(value);
-                }
-                (priors[effect], usual) = best;
-                breadth += values.iter().map(|value| (value - most).exp()).sum::<f64>().ln();
-                log_sum = most - priors[effect] + priors.iter().sum::<f64>() + breadth;
+                let (own, others): (Vec<usize>, Vec<usize>) =
+                    (0..places.len()).partition(|at| owner[*at] == effect);
+                let Some((beside, given)) = all.given(&own, &others, &usual) else {
+                    return f64::NEG_INFINITY;
+                };
+                let sized = given.sized();
+                let Some(best) = sized.iter().max_by(|a, b| a.value.total_cmp(&b.value)) else { continue };
+                own.iter().enumerate().for_each(|(k, at)| usual[*at] = best.size(k));
+                priors[effect] = best.prior;
+                breadth += sized.iter().map(|sized| (sized.value - best.value).exp()).sum::<f64>().ln();
+                log_sum = beside + best.value - best.prior + priors.iter().sum::<f64>() + breadth;
             }
         }
         if log_sum.is_nan() { f64::NEG_INFINITY } else { log_sum }
@@ -129,26 +127,106 @@ impl Projected {
     }
 }
 
-/// Usual sizes that an effect's amplitudes may have, and ln of the prior of each: all of them alike, or one alone.
-fn sizes(count: usize) -> impl Iterator<Item = (f64, Vec<f64>)> {
-    let alone = if count > 1 { ALONE } else { 0.0 };
-    let all = std::iter::once((1.0 - alone, None));
-    let each = (0..count).map(move |at| (alone / count as f64, Some(at)));
-    let acts = move |at: usize, only: Option<usize>| only.is_none_or(|only| only == at);
-    all.chain(each).filter(|(share, _)| *share > 0.0).flat_map(move |(share, only)| {
-        SCALES.into_iter().map(move |scale| {
-            let sizes = (0..count).map(|at| if acts(at, only) { scale } else { 0.0 }).collect();
-            ((share / SCALES.len() as f64).ln(), sizes)
-        })
-    })
+/// Score and information of some columns.
+struct Columns {
+    score: DVector<f64>,
+    information: DMatrix<f64>,
 }
 
-/// ln BF of columns of these usual sizes.
-fn log_bayes_factor(score: &DVector<f64>, information: &DMatrix<f64>, usual: &DVector<f64>) -> f64 {
-    let n = score.len();
-    let scaled =
-        DMatrix::from_fn(n, n, |i, j| usual[i] * information[(i, j)] * usual[j]) + DMatrix::identity(n, n);
-    let Some(factor) = scaled.cholesky() else { return f64::NEG_INFINITY };
-    let scaled_score = score.component_mul(usual);
-    0.5 * (scaled_score.dot(&factor.solve(&scaled_score)) - factor.ln_determinant())
+/// A usual size of an effect's amplitudes: of all of them alike, or of one alone.
+struct Sized {
+    scale: f64,
+    only: Option<usize>,
+    /// ln of its prior.
+    prior: f64,
+    /// ln BF and that prior.
+    value: f64,
+}
+
+impl Sized {
+    /// Usual size of the amplitude at this place.
+    fn size(&self, at: usize) -> f64 {
+        if self.only.is_none_or(|only| only == at) { self.scale } else { 0.0 }
+    }
+}
+
+impl Columns {
+    /// Some of the columns with others of usual sizes integrated out, and ln BF of these.
+    fn given(&self, own: &[usize], others: &[usize], usual: &DVector<f64>) -> Option<(f64, Self)> {
+        let score = |at: &[usize]| DVector::from_fn(at.len(), |i, _| self.score[at[i]]);
+        let pick = |rows: &[usize], columns: &[usize]| {
+            DMatrix::from_fn(rows.len(), columns.len(), |i, j| self.information[(rows[i], columns[j])])
+        };
+        let acting: Vec<usize> = others.iter().copied().filter(|at| usual[*at] > 0.0).collect();
+        let mut scaled = pick(&acting, &acting);
+        for (i, one) in acting.iter().enumerate() {
+            for (j, other) in acting.iter().enumerate() {
+                scaled[(i, j)] = usual[*one] * scaled[(i, j)] * usual[*other];
+            }
+            scaled[(i, i)] += 1.0;
+        }
+        let factor = scaled.cholesky()?;
+        let sizes = DVector::from_fn(acting.len(), |i, _| usual[acting[i]]);
+        let scaled_score = score(&acting).component_mul(&sizes);
+        let solved = factor.solve(&scaled_score);
+        let mut across = pick(&acting, own);
+        across.row_iter_mut().zip(sizes.iter()).for_each(|(mut row, size)| row *= *size);
+        let beside = 0.5 * (scaled_score.dot(&solved) - factor.ln_determinant());
+        let given = Self {
+            score: score(own) - across.tr_mul(&solved),
+            information: pick(own, own) - across.tr_mul(&factor.solve(&across)),
+        };
+        Some((beside, given))
+    }
+
+    /// ln BF of each size that an effect of these columns may have.
+    fn sized(&self) -> Vec<Sized> {
+        let n = self.score.len();
+        let alone = if n > 1 { ALONE } else { 0.0 };
+        let own = self.information.clone().symmetric_eigen();
+        let along = own.eigenvectors.tr_mul(&self.score);
+        let mut sized = Vec::with_capacity(SCALES.len() * (n + 1));
+        let mut add = |share: f64, only: Option<usize>, value: &dyn Fn(f64) -> f64| {
+            let prior = (share / SCALES.len() as f64).ln();
+            sized.extend(SCALES.map(|scale| Sized { scale, only, prior, value: prior + value(scale) }));
+        };
+        add(1.0 - alone, None, &|scale| {
+            let each = own.eigenvalues.iter().zip(along.iter());
+            each.map(|(information, score)| log_bayes_factor(*score, *information, scale)).sum()
+        });
+        for at in (0..n).filter(|_| n > 1) {
+            let (score, information) = (self.score[at], self.information[(at, at)]);
+            add(alone / n as f64, Some(at), &|scale| log_bayes_factor(score, information, scale));
+        }
+        sized
+    }
+}
+
+/// ln BF of one column of this usual size.
+fn log_bayes_factor(score: f64, information: f64, usual: f64) -> f64 {
+    let (score, scaled) = (usual * score, 1.0 + usual * usual * information);
+    if scaled > 0.0 { 0.5 * (score * score / scaled - scaled.ln()) } else { f64::NEG_INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_others_leave_and_the_others_are_as_evident_as_all_together() {
+        let x = DMatrix::from_fn(12, 5, |i, j| (0.7 * (i * (j + 1)) as f64 + j as f64).sin());
+        let all = Columns { score: DVector::from_fn(5, |i, _| 3.0 - i as f64), information: x.tr_mul(&x) };
+        let usual = DVector::from_vec(vec![0.3, 0.0, 1.0, 0.3, 1.0]);
+        let (beside, given) = all.given(&[1, 4], &[0, 2, 3], &usual).unwrap();
+        for sized in given.sized() {
+            let mut sizes = usual.clone();
+            (sizes[1], sizes[4]) = (sized.size(0), sized.size(1));
+            let scales = DMatrix::from_diagonal(&sizes);
+            let grown = DMatrix::identity(5, 5) + &scales * &all.information * &scales;
+            let scaled = &scales * &all.score;
+            let explained = scaled.dot(&(grown.clone().try_inverse().unwrap() * &scaled));
+            let expected = 0.5 * (explained - grown.determinant().ln());
+            assert!((beside + sized.value - sized.prior - expected).abs() < 1e-9);
+        }
+    }
 }

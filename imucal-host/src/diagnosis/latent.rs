@@ -133,13 +133,19 @@ impl Latents {
         Self { weights, places, knots, between, stretches, courses, log_determinant }
     }
 
-    /// Some columns over the blocks.
-    pub fn condensed(self: &Arc<Self>, x: &DMatrix<f64>) -> Condensed {
-        let columns = x.ncols();
+    /// (D⁻¹X)ᵀ.
+    pub fn weighted(&self, x: &DMatrix<f64>) -> DMatrix<f64> {
         let mut weighted = x.transpose();
         for (mut row, w) in weighted.column_iter_mut().zip(&self.weights) {
             row *= *w;
         }
+        weighted
+    }
+
+    /// Some columns over the blocks.
+    pub fn condensed(self: &Arc<Self>, x: &DMatrix<f64>) -> Condensed {
+        let columns = x.ncols();
+        let weighted = self.weighted(x);
         let mut beside = DMatrix::zeros(columns, self.knots);
         for ((knot, share), row) in self.places.iter().zip(weighted.column_iter()) {
             beside.column_mut(*knot).axpy(1.0 - share, &row, 1.0);

@@ -1,6 +1,7 @@
 //! Where the gap between simulator and recording lies, which unmodelled effect causes it, and how far it shrinks.
 
 pub mod block;
+pub mod bordered;
 mod borne;
 pub mod candidates;
 mod carried;

@@ -2,6 +2,8 @@
 //!
 //! Gauss–Newton: the residual at full rate, its derivative from the nodes. Steps that make it worse are halved.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -61,10 +63,10 @@ pub fn signatures(
     reference: &Reference<'_>,
     columns: &[Column],
     neutral: &(dyn Fn(&'static Effect) -> Vec<f64> + Sync),
-) -> Option<Vec<Means>> {
+) -> Option<Vec<Arc<Means>>> {
     columns
         .par_iter()
-        .map(|column| reference.signature(column.effect, column.parameter, &neutral(column.effect)))
+        .map(|column| reference.known_signature(column.effect, column.parameter, &neutral(column.effect)))
         .collect()
 }
 
@@ -102,7 +104,7 @@ pub fn refit(scene: &Scene<'_>, doses: Vec<Dose>, noise: Option<&Noise>) -> Opti
         let largest = moved.fold(0.0f64, f64::max);
         let energy = |fit: &Fit| {
             let (precision, at) = prior(&fit.doses, &columns);
-            let data = Design::new(scene, Vec::new(), &[], &fit.residual).normal(&whitenings, &[]).energy;
+            let data = Design::of_residual(scene, &fit.residual).normal(&whitenings, &[]).energy;
             data + precision.component_mul(&at).dot(&at)
         };
         let before = energy(&fit);

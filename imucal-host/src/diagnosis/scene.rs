@@ -315,14 +315,17 @@ impl Reference<'_> {
         &self.truth
     }
 
-    /// A signature, computed once.
+    /// A [`signature`](Self::signature), computed once.
     pub fn known_signature(
         &self,
         effect: &'static Effect,
         parameter: usize,
         shape: &[f64],
     ) -> Option<Arc<Means>> {
-        let key = (effect.id.as_str(), parameter, shape.iter().map(|value| value.to_bits()).collect());
+        // What the run holds is altered where it stands.
+        let is_held = self.doses.iter().any(|dose| std::ptr::eq(dose.effect, effect));
+        let bits = shape.iter().filter(|_| !is_held).map(|value| value.to_bits()).collect();
+        let key = (effect.id.as_str(), parameter, bits);
         let locked = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = locked().get(&key) {
             return Some(Arc::clone(known));

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::{
-    design::{Design, Part},
+    bordered::Bordered,
+    design::Design,
     evidence::Projected,
     scanned::{Scanned, Shaped},
     scene::{Means, Reference, Scene, amplitudes},
@@ -33,13 +34,9 @@ const BATCH: usize = 12;
 pub struct Backdrop<'a> {
     /// The recording's scene.
     pub scene: &'a Scene<'a>,
-    /// Columns fitted in any case, and the residual.
-    pub design: &'a Design,
-    /// Indices of those columns.
-    pub fitted: &'a [usize],
-    /// Σ⁻¹ of each channel.
-    pub whitenings: &'a [Whitening],
-    alone: Vec<Part>,
+    /// Number of those columns.
+    fitted: usize,
+    bordered: Bordered<'a>,
 }
 
 impl<'a> Backdrop<'a> {
@@ -47,10 +44,10 @@ impl<'a> Backdrop<'a> {
     pub fn new(
         scene: &'a Scene<'a>,
         design: &'a Design,
-        fitted: &'a [usize],
+        fitted: &[usize],
         whitenings: &'a [Whitening],
     ) -> Self {
-        Self { scene, design, fitted, whitenings, alone: design.by_channel(whitenings, fitted) }
+        Self { scene, fitted: fitted.len(), bordered: Bordered::new(design, whitenings, fitted) }
     }
 }
 
@@ -161,10 +158,9 @@ fn project(
         .par_iter()
         .map(|(shape, parameter)| reference.known_signature(effect, *parameter, shape))
         .collect();
-    let Backdrop { design, fitted, whitenings, alone, .. } = backdrop;
-    let normal = design.normal_with(whitenings, fitted, alone, &means?);
-    let first: Vec<usize> = (0..fitted.len()).collect();
-    let others: Vec<usize> = (fitted.len()..normal.score.len()).collect();
+    let normal = backdrop.bordered.with(&means?);
+    let first: Vec<usize> = (0..backdrop.fitted).collect();
+    let others: Vec<usize> = (backdrop.fitted..normal.score.len()).collect();
     Some((Projected::new(&normal, &first, &others)?, own.len()))
 }
 

@@ -134,6 +134,18 @@ impl Whitening {
 
     /// Xᵀ Σ⁻¹ X of columns that were condensed from the same blocks.
     pub fn products(&self, x: &Condensed) -> DMatrix<f64> {
+        self.less(x, &self.latent(x))
+    }
+
+    /// Xᵀ Σ⁻¹ X of condensed columns, given what they show of all but white noise.
+    pub fn less(&self, x: &Condensed, latent: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut products = x.plain.clone();
+        products.gemm(-1.0, latent, &latent.transpose(), 1.0);
+        products
+    }
+
+    /// What condensed columns show of all but white noise, Bᵀ and Yᵀ: a row a column.
+    pub fn latent(&self, x: &Condensed) -> DMatrix<f64> {
         let (n, courses) = (x.plain.ncols(), self.latents.courses);
         let (along, knots) = self.shared(x);
         let states = self.factor.as_ref().map_or(0, |_| self.latents.knots * self.processes);
@@ -145,9 +157,7 @@ impl Whitening {
             }
             factor.forward(&mut latent.as_mut_slice()[courses * n..], n);
         }
-        let mut products = x.plain.clone();
-        products.gemm(-1.0, &latent, &latent.transpose(), 1.0);
-        products
+        latent
     }
 
     /// B, and Zᵀ (D + σ² U Uᵀ)⁻¹ X; columns as in those condensed.
