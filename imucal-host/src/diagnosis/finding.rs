@@ -102,8 +102,8 @@ pub struct Cause {
     pub parameters: Vec<Amount>,
     /// It is large enough to matter.
     pub material: bool,
-    /// Share of the explainable gap that it closes, on held-out blocks; `None` for a fault of the recording itself, which
-    /// is undone or left out before any gap is measured.
+    /// Share of the explainable gap that it closes, on held-out blocks; `None` for what adds none that could be closed: a
+    /// burst of noise, axes or a unit that were mistaken, which the baseline takes up.
     pub gap_closed: Option<f64>,
     /// Its 95 % interval.
     pub gap_closed_ci95: Option<[f64; 2]>,

@@ -147,7 +147,7 @@ fn response(effect: &Effect, values: &[f64]) -> Option<Matrix3<f64>> {
 }
 
 /// Rows that a fault has spoilt are not used.
-fn leave_out(finding: &Finding, recording: &Recording, kind: SensorKind, usable: &mut [bool]) {
+pub fn leave_out(finding: &Finding, recording: &Recording, kind: SensorKind, usable: &mut [bool]) {
     let Some(triple) = recording.sensor(kind) else { return };
     if finding.effect.id.ends_with(".stuck_samples") {
         for (usable, pair) in usable.iter_mut().skip(1).zip(triple.values.windows(2)) {

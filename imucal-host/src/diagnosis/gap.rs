@@ -26,7 +26,7 @@ use super::{
 use crate::effect::Effect;
 
 /// Folds.
-const FOLDS: usize = 8;
+pub const FOLDS: usize = 8;
 /// Stretches dealt to folds, s.
 const STRETCH: f64 = 3.0;
 /// Standard deviation of an effect's prior, in usual sizes: what few blocks tell of it must not run away on the others.
@@ -36,7 +36,7 @@ const SCATTER: f64 = 6.0;
 /// What a driver follows tells what is left within this share of it: it is another function than the one that is there.
 const VAGUE: f64 = 0.15;
 /// Whitened squared size of an effect that the search may miss.
-const UNSEEN: f64 = 50.0;
+pub const UNSEEN: f64 = 50.0;
 
 /// A share of the explainable gap.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -12,6 +12,7 @@ pub mod driver;
 pub mod estimate;
 pub mod evidence;
 pub mod experiment;
+pub mod fault;
 pub mod finding;
 pub mod following;
 pub mod footing;
@@ -89,9 +90,14 @@ pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str
     };
     let candidates = Candidates::new(&setting, &options.without);
     let explained = search::search(&scene, &candidates, progress);
-    let answer = explained.as_ref().and_then(|explained| answer(recording, explained, progress));
-    match answer {
-        Some(answer) => with_faults(beyond_model(answer, &footing.model), &footing),
+    let answered = explained.as_ref().and_then(|explained| {
+        let (diagnosis, explainable) = answer(recording, explained, progress)?;
+        let mut diagnosis = with_faults(beyond_model(diagnosis, &footing.model), &footing);
+        fault::tell(&mut diagnosis, &fault::faults(recording, &footing.findings, explained), explainable);
+        Some(diagnosis)
+    });
+    match answered {
+        Some(diagnosis) => diagnosis,
         None => untestable(recording, "the baseline cannot be fitted to this recording".to_owned()),
     }
 }
@@ -156,7 +162,12 @@ fn untestable(recording: &Recording, why: String) -> Diagnosis {
     }
 }
 
-fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&str)) -> Option<Diagnosis> {
+/// What the search has found, and the whitened squared size of the gap that can be explained.
+fn answer(
+    recording: &Recording,
+    explained: &Explained<'_>,
+    progress: &dyn Fn(&str),
+) -> Option<(Diagnosis, f64)> {
     let (linear, best) = (&explained.linear, &explained.best);
     let drivers = driver::drivers(linear.scene, &linear.weighing.given);
     let after = following::following_anew(linear, &best.set, &best.noise, &drivers)?;
@@ -223,7 +234,7 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
         (false, true) => Verdict::Partly,
         (false, false) => Verdict::Unknown,
     };
-    Some(Diagnosis {
+    let diagnosis = Diagnosis {
         verdict,
         remarks,
         gap: gap::table(linear, &best.set, &best.noise)?,
@@ -237,7 +248,8 @@ fn answer(recording: &Recording, explained: &Explained<'_>, progress: &dyn Fn(&s
         not_testable,
         next_experiment,
         ..untestable(recording, String::new())
-    })
+    };
+    Some((diagnosis, closed.explainable))
 }
 
 fn is_followed(following: &Following, tests: usize) -> bool {

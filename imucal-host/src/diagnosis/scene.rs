@@ -198,6 +198,16 @@ impl<'a> Scene<'a> {
         if self.view.is_some() { &SensorKind::ALL } else { effect.sensors }
     }
 
+    /// It is looked at by way of the rests of a hand.
+    pub fn is_viewed(&self) -> bool {
+        self.view.is_some()
+    }
+
+    /// The movement is told at a row.
+    pub fn is_known(&self, row: usize) -> bool {
+        self.motion.known().get(row).copied().unwrap_or(false)
+    }
+
     /// A block tells something on an axis of a sensor.
     pub fn tells(&self, kind: SensorKind, block: usize, axis: usize) -> bool {
         self.view.as_ref().is_none_or(|view| view.tells(kind, block, axis))
@@ -231,16 +241,21 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// Recorded less simulated, block by block. `None` where a triad is singular.
-    pub fn residual(&self, doses: &[Dose]) -> Option<Means> {
+    /// What the simulator puts out at each row, by sensor. `None` where a triad is singular.
+    pub fn simulated(&self, doses: &[Dose]) -> Option<Vec<(SensorKind, Vec<Vector3<f64>>)>> {
         let chain = Chain::new(doses);
         let input = inputs(&chain.truth(self.motion, &self.recording.time), &Matrix3::identity());
-        let of = |kind: &SensorKind| {
-            let output = chain.output(*kind, &self.triads[*kind as usize], &input)?;
-            Some((*kind, self.difference(*kind, &output)))
-        };
+        let of =
+            |kind: &SensorKind| Some((*kind, chain.output(*kind, &self.triads[*kind as usize], &input)?));
+        self.kinds.par_iter().map(of).collect()
+    }
+
+    /// Recorded less simulated, block by block. `None` where a triad is singular.
+    pub fn residual(&self, doses: &[Dose]) -> Option<Means> {
+        let simulated = self.simulated(doses)?;
+        let of = |(kind, output): &(SensorKind, Vec<_>)| (*kind, self.difference(*kind, output));
         let mut means: Means = Default::default();
-        for (kind, difference) in self.kinds.par_iter().map(of).collect::<Option<Vec<_>>>()? {
+        for (kind, difference) in simulated.par_iter().map(of).collect::<Vec<_>>() {
             means[kind as usize] = difference;
         }
         Some(self.seen(means))

@@ -95,9 +95,6 @@ fn closed(diagnosis: &Diagnosis) -> String {
 /// `97 % (95 to 98 %)`; without an interval, the share alone.
 fn share_words(share: f64, [low, high]: [f64; 2]) -> String {
     let percent = |share: f64| 100.0 * share;
-    if !share.is_finite() {
-        return "an unknown share".to_owned();
-    }
     match low.is_finite() && high.is_finite() {
         true => format!("{:.0} % ({:.0} to {:.0} %)", percent(share), percent(low), percent(high)),
         false => format!("{:.0} %", percent(share)),
@@ -147,10 +144,15 @@ fn write_causes(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
             if diagnosis.causes.len() == 1 { "cause".to_owned() } else { format!("cause {}", index + 1) };
         writeln!(text, "\n{heading}: {}", cause.effect)?;
         let certain = finite(cause.probability, certainty);
-        let share =
-            share_words(cause.gap_closed.unwrap_or(f64::NAN), cause.gap_closed_ci95.unwrap_or([f64::NAN; 2]));
+        let share = match cause.gap_closed.filter(|share| share.is_finite()) {
+            Some(share) => {
+                let ends = cause.gap_closed_ci95.unwrap_or([f64::NAN; 2]);
+                format!("closes {} of the gap", share_words(share, ends))
+            }
+            None => "was undone or left out before the gap was measured".to_owned(),
+        };
         let material = if cause.material { "" } else { "; too small to matter" };
-        text.push_str(&hanging("  ", &format!("probability {certain}; closes {share} of the gap{material}")));
+        text.push_str(&hanging("  ", &format!("probability {certain}; {share}{material}")));
         let amounts: Vec<String> = cause.parameters.iter().map(amount).collect();
         text.push_str(&hanging("  how much:  ", &amounts.join("; ")));
         if let Some(effect) = effect::find(&cause.effect) {
