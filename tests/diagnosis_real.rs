@@ -4,6 +4,7 @@
 use imucal_host::{
     calibrate::{self, calibrate},
     diagnosis::{Diagnosis, Options, Verdict, diagnose, finding::Cause},
+    observe::motion::of_reference,
     recording::{Recording, SensorKind},
     store::StoredCalibration,
 };
@@ -236,8 +237,21 @@ fn two_parts_of_one_recording_seldom_differ() {
     assert!(f64::from(alarms) <= FALSE_ALARMS * f64::from(count), "{alarms} of {count}");
 }
 
+/// What the magnetometer shows more `during` some times than the field of the others, turned by the reference alone, µT.
+fn added(recording: &Recording, calm: impl Fn(f64) -> bool, during: impl Fn(f64) -> bool) -> Vector3<f64> {
+    let attitudes = of_reference(recording.reference.as_deref().expect("an optical reference"));
+    let samples = &recording.mag.as_ref().expect("a magnetometer").values;
+    let rows = || recording.time.iter().zip(attitudes.iter().zip(samples));
+    let told = || {
+        rows().filter_map(|(time, (c_t_n, b))| Some((*time, (*c_t_n)?, *b))).filter(|(.., b)| b.x.is_finite())
+    };
+    let mean = |each: Vec<Vector3<f64>>| each.iter().sum::<Vector3<f64>>() / each.len() as f64;
+    let field = mean(told().filter(|(time, ..)| calm(*time)).map(|(_, c_t_n, b)| c_t_n * b).collect());
+    mean(told().filter(|(time, ..)| during(*time)).map(|(_, c_t_n, b)| b - c_t_n.tr_mul(&field)).collect())
+}
+
 #[test]
-fn a_magnet_that_came_near_for_a_while_is_named_with_its_times() {
+fn a_magnet_that_came_near_for_a_while_is_named_with_its_field_and_its_times() {
     let Some(calm) = read("broad-01-undisturbed") else { return };
     let Some(disturbed) = read("broad-32-magnet-1cm") else { return };
     let diagnosis = against(&disturbed, &model(&calm));
@@ -253,5 +267,8 @@ fn a_magnet_that_came_near_for_a_while_is_named_with_its_times() {
         diagnosis.gap_closed_total_ci95
     );
     assert!((value("t_start") - 38.5).abs() < 1.5 && (value("t_end") - 95.0).abs() < 1.5);
+    let magnet = Vector3::new(value("x"), value("y"), value("z"));
+    let plain = added(&disturbed, |t| !(36.0..98.0).contains(&t), |t| (42.0..92.0).contains(&t));
+    assert!((magnet - plain).amax() < 1.0, "{magnet} {plain}");
     assert!(diagnosis.gap_closed_total.expect("causes") >= 0.9);
 }

@@ -14,8 +14,10 @@ const FAR: f64 = 5.0;
 const ABRUPT: f64 = 8.0;
 /// Within twice this time, s.
 const PASSAGE: f64 = 0.25;
+/// Between two abrupt changes no further apart, s, a hand stops on its way: that belongs to the same passage.
+const STOP: f64 = 0.5;
 
-/// Takes the rows of blocks during which `residual` changes abruptly out of `counts`, usable rows of each block by sensor.
+/// Takes the rows of blocks in which `residual` changes abruptly, or between two such, out of `counts`, usable rows of each block by sensor.
 pub fn leave_out_passages(residual: &Means, blocks: &[Block], counts: &mut [Vec<usize>; 3]) {
     for (values, counts) in residual.iter().zip(counts).filter_map(|(v, c)| Some((v.as_ref()?, c))) {
         let told: Vec<usize> = (0..blocks.len()).filter(|k| counts[*k] > 0).collect();
@@ -27,10 +29,22 @@ pub fn leave_out_passages(residual: &Means, blocks: &[Block], counts: &mut [Vec<
             (values[*after] - values[*before]).norm()
         };
         let changes: Vec<f64> = (0..told.len()).map(change).collect();
+        let mut abrupt: Vec<f64> = Vec::new();
         for resting in [true, false] {
             let alike = || (0..told.len()).filter(|at| blocks[told[*at]].rest.is_some() == resting);
             let Some(usual) = median(alike().map(|at| changes[at]).collect()) else { continue };
-            alike().filter(|at| changes[*at] > ABRUPT * usual).for_each(|at| counts[told[at]] = 0);
+            abrupt.extend(alike().filter(|at| changes[*at] > ABRUPT * usual).map(|at| blocks[told[at]].time));
+        }
+        abrupt.sort_by(f64::total_cmp);
+        for at in told {
+            let next = abrupt.partition_point(|time| *time < blocks[at].time);
+            let after = abrupt.get(next).copied();
+            let before = abrupt[..next].last().copied();
+            let is_abrupt = after == Some(blocks[at].time);
+            let is_between = before.zip(after).is_some_and(|(before, after)| after - before <= STOP);
+            if is_abrupt || is_between {
+                counts[at] = 0;
+            }
         }
     }
 }
@@ -60,6 +74,33 @@ pub fn leave_out(
         for (count, spread) in counts[kind as usize].iter_mut().zip(spreads) {
             if spread.is_some_and(|spread| spread > FAR * usual) {
                 *count = 0;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    #[test]
+    fn a_passage_is_left_out_with_the_moment_at_which_the_hand_stops_and_nothing_far_from_it_is() {
+        let time = |k: usize| 0.1 * k as f64;
+        let blocks: Vec<Block> =
+            (0..400).map(|k| Block { rows: 3 * k..3 * k + 3, time: time(k), rest: None }).collect();
+        // Brought near from 20.0 to 20.4 s, held there, and laid down from 20.8 to 21.2 s.
+        let field = |t: f64| 30.0 * (((t - 20.0) / 0.4).clamp(0.0, 1.0) + ((t - 20.8) / 0.4).clamp(0.0, 1.0));
+        let noise = |k: usize| 0.5 * ((k * k) as f64).sin();
+        let values = (0..400).map(|k| Vector3::new(field(time(k)), noise(k), noise(k + 7))).collect();
+        let mut counts = [Vec::new(), Vec::new(), vec![3; 400]];
+        leave_out_passages(&[None, None, Some(values)], &blocks, &mut counts);
+        for (k, count) in counts[2].iter().enumerate() {
+            match time(k) {
+                t if (20.0..21.2).contains(&t) => assert_eq!(*count, 0, "{t}"),
+                t if !(19.0..22.2).contains(&t) => assert_eq!(*count, 3, "{t}"),
+                _ => {}
             }
         }
     }
