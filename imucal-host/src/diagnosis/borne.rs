@@ -2,9 +2,17 @@
 //!
 //! Where no rig guides the sensor, what hand and reference add is no noise of any kind that is estimated, and evidence
 //! alone is too sure. A cause that is not borne out may spoil what the others would foretell: the worst is taken out
-//! first, and the others are asked again.
+//! first, and the others are asked again. Against a calibration made elsewhere an error of a given triad is a gap as well,
+//! which nine products of rates may stand for as well as six misalignments: a cause must be borne out beside the triad's
+//! terms, were they free.
 
-use super::{estimate, finding::Cause, gap, linear::Linear, noise::Noise};
+use super::{
+    estimate,
+    finding::Cause,
+    gap::{self, Share},
+    linear::Linear,
+    noise::Noise,
+};
 use crate::effect::Effect;
 
 /// A cause closes at least this share of what its own sensors show.
@@ -27,12 +35,18 @@ pub fn leave_out(
         let fails = |at: &usize| {
             let (share, cause) = (&shares[*at], &causes[*at]);
             let matters = cause.material && estimate::is_sized(kept[*at], &cause.parameters, ERRORS);
-            !matters || share.value <= LEAST || share.interval[0] <= 0.0
+            !matters || !is_borne(share)
         };
         let failing = (0..kept.len()).filter(fails);
         let Some(worst) = failing.min_by(|a, b| shares[*a].value.total_cmp(&shares[*b].value)) else { break };
         kept.remove(worst);
         out.push(causes.remove(worst).effect);
+    }
+    for at in (0..kept.len()).rev() {
+        if !is_borne_beside_terms(at, &kept, linear, noise)? {
+            kept.remove(at);
+            out.push(causes.remove(at).effect);
+        }
     }
     let names = out.join(", ");
     Some(match out.is_empty() {
@@ -41,4 +55,25 @@ pub fn leave_out(
             "not asserted, since held-out data do not bear them out or no size of theirs is told from zero: {names}"
         )],
     })
+}
+
+fn is_borne(share: &Share) -> bool {
+    share.value > LEAST && share.interval[0] > 0.0
+}
+
+/// Whether held-out blocks bear out a cause of a set with the terms of its triads free, where these are given.
+fn is_borne_beside_terms(
+    at: usize,
+    set: &[&'static Effect],
+    linear: &Linear<'_>,
+    noise: &Noise,
+) -> Option<bool> {
+    let is_other = |term: &&'static Effect| !set.iter().any(|own| std::ptr::eq(*own, *term));
+    let terms: Vec<&'static Effect> =
+        linear.candidates.given_beside(set[at]).into_iter().filter(is_other).collect();
+    if terms.is_empty() {
+        return Some(true);
+    }
+    let all: Vec<&'static Effect> = set.iter().copied().chain(terms).collect();
+    gap::closed_of_own(linear, &all, noise)?.get(at).map(is_borne)
 }

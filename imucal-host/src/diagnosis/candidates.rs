@@ -105,6 +105,17 @@ impl Candidates {
         self.baseline.iter().any(|term| std::ptr::eq(*term, effect))
     }
 
+    /// Terms of triads that a calibration made elsewhere gives, of the sensors that an effect reaches.
+    pub fn given_beside(&self, effect: &Effect) -> Vec<&'static Effect> {
+        let stands_for =
+            |term: &Effect| is_triad_term(term, &SensorKind::ALL) || ELSEWHERE.contains(&term.id.as_str());
+        let is_given = |term: &&&'static Effect| {
+            let is_taken_out = self.taken_out.iter().any(|taken| std::ptr::eq(*taken, **term));
+            stands_for(term) && !is_taken_out && term.sensors.iter().all(|kind| effect.sensors.contains(kind))
+        };
+        if stands_for(effect) { Vec::new() } else { self.effects.iter().filter(is_given).copied().collect() }
+    }
+
     /// An effect's parameters among those of all candidates, in their order; none for a term of the baseline.
     pub fn shape(&self, shapes: &[Shaped], effect: &Effect) -> Vec<f64> {
         let at = self.effects.iter().position(|other| std::ptr::eq(*other, effect));
