@@ -151,7 +151,7 @@ impl Sized {
 }
 
 impl Columns {
-    /// Some of the columns with others of usual sizes integrated out, and ln BF of these.
+    /// Some of the columns with others of usual sizes integrated out, and ln BF of these; `None` where these are no numbers.
     fn given(&self, own: &[usize], others: &[usize], usual: &DVector<f64>) -> Option<(f64, Self)> {
         let score = |at: &[usize]| DVector::from_fn(at.len(), |i, _| self.score[at[i]]);
         let pick = |rows: &[usize], columns: &[usize]| {
@@ -176,7 +176,8 @@ impl Columns {
             score: score(own) - across.tr_mul(&solved),
             information: pick(own, own) - across.tr_mul(&factor.solve(&across)),
         };
-        Some((beside, given))
+        // Eigenvalues are sought for without an end in numbers that are none.
+        given.information.iter().all(|value| value.is_finite()).then_some((beside, given))
     }
 
     /// ln BF of each size that an effect of these columns may have.
@@ -211,6 +212,14 @@ fn log_bayes_factor(score: f64, information: f64, usual: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn information_that_is_no_number_is_no_evidence() {
+        let information = DMatrix::from_fn(3, 3, |i, j| if i + j == 3 { f64::NAN } else { 1.0 });
+        let (score, before) = (DVector::repeat(3, 1.0), DVector::repeat(3, 1.0));
+        let projected = Projected { score, information, before };
+        assert_eq!(projected.log_bayes_factor(&[&[0, 1, 2]]), f64::NEG_INFINITY);
+    }
 
     #[test]
     fn what_others_leave_and_the_others_are_as_evident_as_all_together() {
