@@ -24,6 +24,7 @@ mod latest;
 pub mod linear;
 pub mod model;
 mod moves;
+pub mod nodes;
 pub mod noise;
 pub mod orientation;
 pub mod refit;

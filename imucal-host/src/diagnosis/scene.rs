@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use super::{
     block::{Block, cut},
     hand::{Held, View},
+    nodes::Nodes,
     scatter::Turned,
     unsteady,
 };
@@ -33,51 +34,6 @@ const NODES: (f64, f64) = (0.045, 0.0175);
 /// At rest on a rig nothing changes from one to the next, s.
 const RESTING: f64 = 0.25;
 
-/// Rows at which a run is simulated.
-#[derive(Clone, Debug, Default)]
-pub struct Nodes {
-    times: Vec<f64>,
-    blocks: Vec<usize>,
-}
-
-impl Nodes {
-    /// So many rows of each block, evenly over it, of those where the movement is told.
-    fn choose(
-        time: &[f64],
-        blocks: &[Block],
-        count: impl Fn(&Block) -> usize,
-        told: impl Fn(usize) -> bool,
-    ) -> Self {
-        let mut nodes = Self::default();
-        for (index, block) in blocks.iter().enumerate() {
-            let (rows, count) = (block.rows.len(), count(block).max(1));
-            let evenly = (0..count).map(|k| block.rows.start + (2 * k + 1) * rows / (2 * count));
-            for row in evenly.filter(|row| told(*row)) {
-                nodes.times.push(time[row]);
-                nodes.blocks.push(index);
-            }
-        }
-        nodes
-    }
-
-    /// Means over the blocks; a block without a node takes the value before it.
-    fn averaged(&self, values: &[Vector3<f64>], blocks: usize) -> Vec<Vector3<f64>> {
-        let mut sums = vec![(Vector3::zeros(), 0.0); blocks];
-        for (block, value) in self.blocks.iter().zip(values) {
-            sums[*block].0 += value;
-            sums[*block].1 += 1.0;
-        }
-        let mut last = Vector3::zeros();
-        sums.iter()
-            .map(|(sum, count)| {
-                if *count > 0.0 {
-                    last = sum / *count;
-                }
-                last
-            })
-            .collect()
-    }
-}
 /// A derivative's step along an amplitude, as a share of its usual size; along a shape, of its usual value; of an
 /// instant, s.
 const STEP: (f64, f64, f64) = (0.1, 0.02, 0.25);

@@ -4,6 +4,8 @@
 //! more than it usually does, at rest or in motion. The mean of such a block is no more than that of a passage, and tells
 //! nothing that a step or an episode could be held to. A rig's own movement brings nothing near.
 
+use nalgebra::Vector3;
+
 use super::{block::Block, scene::Means};
 use crate::recording::{Recording, SensorKind, median};
 
@@ -17,36 +19,39 @@ const PASSAGE: f64 = 0.25;
 /// Between two abrupt changes no further apart, s, a hand stops on its way: that belongs to the same passage.
 const STOP: f64 = 0.5;
 
-/// Takes the rows of blocks in which `residual` changes abruptly, or between two such, out of `counts`, usable rows of each block by sensor.
+/// Takes the rows of blocks in which `residual` changes abruptly, or between two such, out of `counts`, usable rows of
+/// each block by sensor.
 pub fn leave_out_passages(residual: &Means, blocks: &[Block], counts: &mut [Vec<usize>; 3]) {
     for (values, counts) in residual.iter().zip(counts).filter_map(|(v, c)| Some((v.as_ref()?, c))) {
         let told: Vec<usize> = (0..blocks.len()).filter(|k| counts[*k] > 0).collect();
-        let change = |at: usize| -> f64 {
-            let time = blocks[told[at]].time;
-            let before = told[..at].iter().rev().take_while(|k| time - blocks[**k].time <= PASSAGE).last();
-            let after = told[at..].iter().take_while(|k| blocks[**k].time - time <= PASSAGE).last();
-            let (before, after) = (before.unwrap_or(&told[at]), after.unwrap_or(&told[at]));
-            (values[*after] - values[*before]).norm()
-        };
-        let changes: Vec<f64> = (0..told.len()).map(change).collect();
-        let mut abrupt: Vec<f64> = Vec::new();
-        for resting in [true, false] {
-            let alike = || (0..told.len()).filter(|at| blocks[told[*at]].rest.is_some() == resting);
-            let Some(usual) = median(alike().map(|at| changes[at]).collect()) else { continue };
-            abrupt.extend(alike().filter(|at| changes[*at] > ABRUPT * usual).map(|at| blocks[told[at]].time));
-        }
-        abrupt.sort_by(f64::total_cmp);
-        for at in told {
-            let next = abrupt.partition_point(|time| *time < blocks[at].time);
-            let after = abrupt.get(next).copied();
-            let before = abrupt[..next].last().copied();
-            let is_abrupt = after == Some(blocks[at].time);
-            let is_between = before.zip(after).is_some_and(|(before, after)| after - before <= STOP);
-            if is_abrupt || is_between {
-                counts[at] = 0;
-            }
+        let abrupt = abrupt(values, blocks, &told);
+        let time = |at: usize| blocks[told[at]].time;
+        abrupt.iter().for_each(|at| counts[told[*at]] = 0);
+        for stop in abrupt.windows(2).filter(|pair| time(pair[1]) - time(pair[0]) <= STOP) {
+            told[stop[0]..stop[1]].iter().for_each(|block| counts[*block] = 0);
         }
     }
+}
+
+/// Places among the blocks `told` of those about which a sensor's residual changes abruptly, in their order.
+fn abrupt(values: &[Vector3<f64>], blocks: &[Block], told: &[usize]) -> Vec<usize> {
+    let change = |at: usize| -> f64 {
+        let time = blocks[told[at]].time;
+        let before = told[..at].iter().rev().take_while(|k| time - blocks[**k].time <= PASSAGE).last();
+        let after = told[at..].iter().take_while(|k| blocks[**k].time - time <= PASSAGE).last();
+        let (before, after) = (before.unwrap_or(&told[at]), after.unwrap_or(&told[at]));
+        (values[*after] - values[*before]).norm()
+    };
+    let changes: Vec<f64> = (0..told.len()).map(change).collect();
+    let rests = |at: &usize| blocks[told[*at]].rest.is_some();
+    let usual = [false, true].map(|resting| {
+        // A block with no other near has no change.
+        let alike = (0..told.len()).filter(|at| rests(at) == resting && changes[*at] > 0.0);
+        median(alike.map(|at| changes[at]).collect())
+    });
+    let is_abrupt =
+        |at: &usize| usual[usize::from(rests(at))].is_some_and(|usual| changes[*at] > ABRUPT * usual);
+    (0..told.len()).filter(is_abrupt).collect()
 }
 
 /// Takes the rows of such blocks out of `counts`, usable rows of each block by sensor.
@@ -61,7 +66,7 @@ pub fn leave_out(
         let spread = |block: &Block| -> f64 {
             let rows: Vec<usize> = block.rows.clone().filter(|row| usable[kind as usize][*row]).collect();
             let n = rows.len() as f64;
-            let mean = rows.iter().map(|row| triple.values[*row]).sum::<nalgebra::Vector3<f64>>() / n;
+            let mean = rows.iter().map(|row| triple.values[*row]).sum::<Vector3<f64>>() / n;
             (rows.iter().map(|row| (triple.values[*row] - mean).norm_squared()).sum::<f64>() / n).sqrt()
         };
         let resting = |block: &Block, count: usize| block.rest.is_some() && count > 1;
@@ -81,8 +86,6 @@ pub fn leave_out(
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
-
     use super::*;
 
     #[test]
