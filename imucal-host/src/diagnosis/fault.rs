@@ -23,7 +23,7 @@ use super::{
     design::{loosened, places},
     finding::{Diagnosis, Gap},
     footing::leave_out,
-    gap::{FOLDS, Share, UNSEEN},
+    gap::{FOLDS, Share},
     search::Explained,
 };
 use crate::{
@@ -172,14 +172,8 @@ impl Fault {
         let all = folds.iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
         let ratio = |[explainable, closed]: [f64; 2]| closed / explainable.max(f64::MIN_POSITIVE);
         let left = folds.map(|fold| ratio([all[0] - fold[0], all[1] - fold[1]]));
-        let n = FOLDS as f64;
-        let mean = left.iter().sum::<f64>() / n;
-        let variance = (n - 1.0) / n * left.iter().map(|l| (l - mean).powi(2)).sum::<f64>();
-        let bound = |x: f64| x.clamp(0.0, 1.0);
-        let vague = (self.chance().powi(2) + self.cost.powi(2)) / all[0].powi(2);
-        let (value, wide) = (ratio(all), 1.96 * (variance + vague).sqrt());
-        let least = bound(value - wide) * all[0] / (all[0] + UNSEEN);
-        Share { value: bound(value), interval: [least, bound(value + wide)] }
+        let further = (self.chance().powi(2) + self.cost.powi(2)) / all[0].powi(2);
+        Share::new(ratio(all), &left, further, all[0])
     }
 }
 

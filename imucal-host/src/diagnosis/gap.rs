@@ -36,7 +36,7 @@ const SCATTER: f64 = 6.0;
 /// What a driver follows tells what is left within this share of it: it is another function than the one that is there.
 const VAGUE: f64 = 0.15;
 /// Whitened squared size of an effect that the search may miss.
-pub const UNSEEN: f64 = 50.0;
+const UNSEEN: f64 = 50.0;
 
 /// A share of the explainable gap.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +45,20 @@ pub struct Share {
     pub value: f64,
     /// 95 % interval, within 0 and 1.
     pub interval: [f64; 2],
+}
+
+impl Share {
+    /// With the values that are `left` when one fold is left out, a further variance, and the whitened squared size of
+    /// the gap.
+    pub fn new(value: f64, left: &[f64], further: f64, whole: f64) -> Self {
+        let n = left.len() as f64;
+        let mean = left.iter().sum::<f64>() / n;
+        let variance = (n - 1.0) / n * left.iter().map(|l| (l - mean).powi(2)).sum::<f64>();
+        let wide = 1.96 * (variance + further).sqrt();
+        let bound = |x: f64| x.clamp(0.0, 1.0);
+        let least = bound(value - wide) * whole / (whole + UNSEEN);
+        Self { value: bound(value), interval: [least, bound(value + wide)] }
+    }
 }
 
 /// What was closed on held-out blocks.
@@ -119,13 +133,8 @@ fn closed_in(
                 rest(gains) / (rest(&closed) + (costs + remainder) * (n - 1.0) / n).max(f64::MIN_POSITIVE)
             })
             .collect();
-        let mean = left.iter().sum::<f64>() / n;
-        let variance = (n - 1.0) / n * left.iter().map(|l| (l - mean).powi(2)).sum::<f64>();
         let vague = VAGUE * remainder / explainable;
-        let sigma = (variance + (SCATTER / whole).powi(2) + vague * vague).sqrt();
-        let bound = |x: f64| x.clamp(0.0, 1.0);
-        let least = bound(value - 1.96 * sigma) * whole / (whole + UNSEEN);
-        Share { value: bound(value), interval: [least, bound(value + 1.96 * sigma)] }
+        Share::new(value, &left, (SCATTER / whole).powi(2) + vague * vague, whole)
     };
     let total = share(&closed);
     let mut each = Vec::new();
