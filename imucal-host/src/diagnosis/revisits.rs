@@ -58,7 +58,10 @@ fn rests(motion: &dyn Motion) -> Vec<Matrix3<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulator::{Place, Programme};
+    use crate::{
+        effect::{Machine, Truth},
+        simulator::{Place, Programme, recent::Recent},
+    };
 
     #[test]
     fn a_programme_with_revisits_has_no_remark() {
@@ -83,8 +86,8 @@ mod tests {
             fn duration(&self) -> f64 {
                 20.0
             }
-            fn truth(&self, time: f64, rig: &dyn Fn(&mut crate::effect::Machine)) -> crate::effect::Truth {
-                self.0.truth(time, rig)
+            fn truth_among(&self, time: f64, rig: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
+                self.0.truth_among(time, rig, recent)
             }
             fn encoders(&self, time: f64) -> Option<[f64; 3]> {
                 self.0.encoders(time)

@@ -186,6 +186,10 @@ impl<'a> Scene<'a> {
         Chain::new(doses).truth(self.motion.steady(), &nodes.times)
     }
 
+    fn inputs(&self, doses: &[Dose], nodes: &Nodes) -> Vec<Input> {
+        Chain::new(doses).inputs(self.motion.steady(), &nodes.times, &Matrix3::identity())
+    }
+
     /// The truth in the middle of each block, without any effect.
     pub fn plain(&self) -> Vec<Truth> {
         match &self.view {
@@ -200,7 +204,7 @@ impl<'a> Scene<'a> {
     /// What the simulator puts out at each row, by sensor. `None` where a triad is singular.
     pub fn simulated(&self, doses: &[Dose]) -> Option<Vec<(SensorKind, Vec<Vector3<f64>>)>> {
         let chain = Chain::new(doses);
-        let input = inputs(&chain.truth(self.motion, &self.recording.time), &Matrix3::identity());
+        let input = chain.inputs(self.motion, &self.recording.time, &Matrix3::identity());
         let of =
             |kind: &SensorKind| Some((*kind, chain.output(*kind, &self.triads[*kind as usize], &input)?));
         self.kinds.par_iter().map(of).collect()
@@ -322,20 +326,21 @@ impl Reference<'_> {
         }
         let outputs = match effect.act {
             Act::Rig(_) | Act::Clock(_) => {
-                let truth = self.scene.truth(&doses, self.nodes);
-                let input = inputs(&truth, &Matrix3::identity());
-                self.scene.outputs(&doses, effect.sensors, &input)?
+                self.scene.outputs(&doses, effect.sensors, &self.scene.inputs(&doses, self.nodes))?
             }
             Act::Field(alter) if !self.doses.iter().any(|dose| std::ptr::eq(dose.effect, effect)) => {
                 // Field effects come after all that moves the rig; their order among themselves is of second order.
-                let mut truth = self.truth.clone();
-                alter(&doses.last()?.values, &mut truth);
-                let input = inputs(&truth, &Matrix3::identity());
+                let values = &doses.last()?.values;
+                let altered = |row: &Truth| {
+                    let mut row = *row;
+                    alter(values, &mut row);
+                    Input::of(&row, &Matrix3::identity())
+                };
+                let input: Vec<Input> = self.truth.par_iter().map(altered).collect();
                 self.scene.outputs(&doses, effect.sensors, &input)?
             }
             Act::Field(_) => {
-                let input = inputs(&self.scene.truth(&doses, self.nodes), &Matrix3::identity());
-                self.scene.outputs(&doses, effect.sensors, &input)?
+                self.scene.outputs(&doses, effect.sensors, &self.scene.inputs(&doses, self.nodes))?
             }
             Act::Triad(..) | Act::Sensor(..) | Act::Signal(..) | Act::Data(..) => {
                 self.scene.outputs(&doses, effect.sensors, &self.input)?

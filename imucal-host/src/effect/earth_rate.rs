@@ -19,7 +19,7 @@ pub(super) fn effect() -> Effect {
         .like("gyr.bias", "rests in opposite attitudes")
 }
 
-fn alter(values: &[f64], rows: &mut [Truth]) {
+fn alter(values: &[f64], row: &mut Truth) {
     let share = values.first().copied().unwrap_or(0.0);
-    rows.iter_mut().for_each(|row| row.w_it_t += row.w_ie_t * share);
+    row.w_it_t += row.w_ie_t * share;
 }

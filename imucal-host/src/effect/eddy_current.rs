@@ -23,7 +23,7 @@ pub(super) fn effect() -> Effect {
     .like("mag.motor_current", "motor current without rotation")
 }
 
-fn alter(values: &[f64], rows: &mut [Truth]) {
+fn alter(values: &[f64], row: &mut Truth) {
     let tau = values.first().copied().unwrap_or(0.0);
-    rows.iter_mut().for_each(|row| row.b_t += row.w_pt_t.cross(&row.b_t) * tau);
+    row.b_t += row.w_pt_t.cross(&row.b_t) * tau;
 }

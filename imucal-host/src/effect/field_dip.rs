@@ -15,15 +15,13 @@ pub(super) fn effect() -> Effect {
         .on(SensorKind::Mag)
 }
 
-fn alter(values: &[f64], rows: &mut [Truth]) {
+fn alter(values: &[f64], row: &mut Truth) {
     let angle = values.first().copied().unwrap_or(0.0);
-    for row in rows {
-        let c_t_n = row.c_p_n * row.c_t_p;
-        let b_n = c_t_n * row.b_t;
-        // About a horizontal axis across the field; a vertical field has none.
-        if let Some(across) = b_n.cross(&Vector3::z()).try_normalize(0.0) {
-            row.add_field(&c_t_n, &(rotation::exp(&(across * angle)) * b_n - b_n));
-        }
+    let c_t_n = row.c_p_n * row.c_t_p;
+    let b_n = c_t_n * row.b_t;
+    // About a horizontal axis across the field; a vertical field has none.
+    if let Some(across) = b_n.cross(&Vector3::z()).try_normalize(0.0) {
+        row.add_field(&c_t_n, &(rotation::exp(&(across * angle)) * b_n - b_n));
     }
 }
 
@@ -35,10 +33,10 @@ mod tests {
     #[test]
     fn the_field_keeps_its_length_and_heading_and_points_further_down() {
         let plain = Tumble::new(4, 2).truth(12.0, &|_| ());
-        let mut rows = [plain];
-        alter(&[0.1], &mut rows);
+        let mut row = plain;
+        alter(&[0.1], &mut row);
         let of = |truth: &Truth| truth.c_p_n * truth.c_t_p * truth.b_t;
-        let (before, after) = (of(&plain), of(&rows[0]));
+        let (before, after) = (of(&plain), of(&row));
         assert!((after.norm() - before.norm()).abs() < 1e-12);
         assert!((after.y.atan2(after.x) - before.y.atan2(before.x)).abs() < 1e-12);
         let dip = |b: &Vector3<f64>| b.z.atan2(b.xy().norm());

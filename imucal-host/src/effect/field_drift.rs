@@ -14,10 +14,8 @@ pub(super) fn effect() -> Effect {
         .like("mag.temp_bias", "several attitudes at each of two temperatures")
 }
 
-fn alter(values: &[f64], rows: &mut [Truth]) {
+fn alter(values: &[f64], row: &mut Truth) {
     let slope_p = vector(values, 0);
-    for row in rows {
-        let c_t_p = row.c_t_p;
-        row.add_field(&c_t_p, &(slope_p * row.time));
-    }
+    let c_t_p = row.c_t_p;
+    row.add_field(&c_t_p, &(slope_p * row.time));
 }

@@ -25,12 +25,10 @@ pub(super) fn effect() -> Effect {
         .like("mag.gimbal_soft_iron_outer", "the unit remounted on the other side of the centre")
 }
 
-fn alter(values: &[f64], rows: &mut [Truth]) {
+fn alter(values: &[f64], row: &mut Truth) {
     let [xx, yy, xy, xz, yz, ..] = *values else { return };
     let gradient = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, -xx - yy);
     let arm_t = vector(values, 5);
-    for row in rows {
-        let c_t_p = row.c_t_p;
-        row.add_field(&c_t_p, &(gradient * (c_t_p * arm_t)));
-    }
+    let c_t_p = row.c_t_p;
+    row.add_field(&c_t_p, &(gradient * (c_t_p * arm_t)));
 }

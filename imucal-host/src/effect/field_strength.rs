@@ -13,7 +13,7 @@ pub(super) fn effect() -> Effect {
     Effect::new("mag.field_strength", Act::Field(alter), parameters, words).on(SensorKind::Mag)
 }
 
-fn alter(values: &[f64], rows: &mut [Truth]) {
+fn alter(values: &[f64], row: &mut Truth) {
     let share = values.first().copied().unwrap_or(0.0);
-    rows.iter_mut().for_each(|row| row.b_t *= 1.0 + share);
+    row.b_t *= 1.0 + share;
 }

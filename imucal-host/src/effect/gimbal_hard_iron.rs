@@ -9,7 +9,7 @@ use nalgebra::Matrix3;
 use super::{Act, Effect, Parameter, SensorKind, Truth, Words, XYZ, vector};
 
 pub(super) fn outer() -> Effect {
-    effect("outer", Act::Field(|values, rows| alter(values, rows, |row| row.c_t_o)))
+    effect("outer", Act::Field(|values, row| alter(values, row, |row| row.c_t_o)))
         .like(
             "mag.gimbal_soft_iron_outer",
             "a coil that changes the field in the room: only soft iron follows it",
@@ -18,7 +18,7 @@ pub(super) fn outer() -> Effect {
 }
 
 pub(super) fn middle() -> Effect {
-    effect("middle", Act::Field(|values, rows| alter(values, rows, |row| row.c_t_m)))
+    effect("middle", Act::Field(|values, row| alter(values, row, |row| row.c_t_m)))
         .like(
             "mag.gimbal_hard_iron_outer",
             "turns of the middle gimbal alone; along its axis the two are the same",
@@ -36,10 +36,8 @@ fn effect(gimbal: &str, act: Act) -> Effect {
     Effect::new(&id, act, Parameter::amplitudes(&XYZ, "uT", 0.5), words).on(SensorKind::Mag)
 }
 
-fn alter(values: &[f64], rows: &mut [Truth], frame: impl Fn(&Truth) -> Matrix3<f64>) {
+fn alter(values: &[f64], row: &mut Truth, frame: impl Fn(&Truth) -> Matrix3<f64>) {
     let d_g = vector(values, 0);
-    for row in rows {
-        let c_t_g = frame(row);
-        row.add_field(&c_t_g, &d_g);
-    }
+    let c_t_g = frame(row);
+    row.add_field(&c_t_g, &d_g);
 }

@@ -9,7 +9,7 @@ use nalgebra::Matrix3;
 use super::{Act, Effect, Parameter, SYMMETRIC, SensorKind, Truth, Words, symmetric};
 
 pub(super) fn outer() -> Effect {
-    effect("outer", Act::Field(|values, rows| alter(values, rows, |row| row.c_t_o)))
+    effect("outer", Act::Field(|values, row| alter(values, row, |row| row.c_t_o)))
         .like(
             "mag.gimbal_hard_iron_outer",
             "a coil that changes the field in the room: only soft iron follows it",
@@ -18,7 +18,7 @@ pub(super) fn outer() -> Effect {
 }
 
 pub(super) fn middle() -> Effect {
-    effect("middle", Act::Field(|values, rows| alter(values, rows, |row| row.c_t_m)))
+    effect("middle", Act::Field(|values, row| alter(values, row, |row| row.c_t_m)))
         .like(
             "mag.gimbal_hard_iron_middle",
             "a coil that changes the field in the room: only soft iron follows it",
@@ -37,11 +37,9 @@ fn effect(gimbal: &str, act: Act) -> Effect {
     Effect::new(&id, act, Parameter::amplitudes(&SYMMETRIC, "-", 5e-3), words).on(SensorKind::Mag)
 }
 
-fn alter(values: &[f64], rows: &mut [Truth], frame: impl Fn(&Truth) -> Matrix3<f64>) {
+fn alter(values: &[f64], row: &mut Truth, frame: impl Fn(&Truth) -> Matrix3<f64>) {
     let induced = symmetric(values);
-    for row in rows {
-        let c_t_g = frame(row);
-        let b_g = c_t_g * row.b_t;
-        row.add_field(&c_t_g, &(induced * b_g));
-    }
+    let c_t_g = frame(row);
+    let b_g = c_t_g * row.b_t;
+    row.add_field(&c_t_g, &(induced * b_g));
 }

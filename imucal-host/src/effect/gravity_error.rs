@@ -13,7 +13,7 @@ pub(super) fn effect() -> Effect {
         .like("acc.scale", "a known centripetal acceleration; not data with 1 g alone")
 }
 
-fn alter(values: &[f64], rows: &mut [Truth]) {
+fn alter(values: &[f64], row: &mut Truth) {
     let factor = 1.0 + values.first().copied().unwrap_or(0.0);
-    rows.iter_mut().for_each(|row| row.f_t *= factor);
+    row.f_t *= factor;
 }

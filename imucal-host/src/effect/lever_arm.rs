@@ -18,9 +18,7 @@ pub(super) fn effect() -> Effect {
         .like("acc.vibration_rectification", "the same rate about another axis")
 }
 
-fn alter(values: &[f64], rows: &mut [Truth]) {
+fn alter(values: &[f64], row: &mut Truth) {
     let arm = vector(values, 0);
-    for row in rows {
-        row.f_t += row.dw_it_t.cross(&arm) + row.w_it_t.cross(&row.w_it_t.cross(&arm));
-    }
+    row.f_t += row.dw_it_t.cross(&arm) + row.w_it_t.cross(&row.w_it_t.cross(&arm));
 }

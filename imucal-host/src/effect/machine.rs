@@ -71,4 +71,10 @@ impl Machine {
             skew: [0.0; 2],
         }
     }
+
+    /// Its table turns against its base as another's does.
+    pub fn turns_like(&self, other: &Self) -> bool {
+        let same_axes = self.axes == other.axes && self.skew == other.skew && self.wobble == other.wobble;
+        same_axes && self.gimbals == other.gimbals
+    }
 }

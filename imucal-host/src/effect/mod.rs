@@ -99,8 +99,8 @@ pub enum Act {
     Rig(fn(&[f64], &mut Machine)),
     /// The rig's time that a row of this time shows, s.
     Clock(fn(&[f64], f64) -> f64),
-    /// Alters the truth of all rows.
-    Field(fn(&[f64], &mut [Truth])),
+    /// Alters the truth of a row.
+    Field(fn(&[f64], &mut Truth)),
     /// Alters a triad of the baseline: true SI in the enclosure's axes to raw SI.
     Triad(SensorKind, fn(&[f64], &mut Triad<f64>)),
     /// Alters a triad's output.

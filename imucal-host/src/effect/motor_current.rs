@@ -29,12 +29,10 @@ pub(super) fn effect() -> Effect {
     .like("mag.bandwidth", "motor current without rotation, or a coil step at rest")
 }
 
-fn alter(values: &[f64], rows: &mut [Truth]) {
-    for row in rows {
-        let stators = [row.c_t_p, row.c_t_o, row.c_t_m];
-        let rates = row.gimbals.map(|gimbal| gimbal.rate);
-        for (k, (c_t_k, rate)) in stators.iter().zip(rates).enumerate() {
-            row.add_field(c_t_k, &(vector(values, 3 * k) * rate));
-        }
+fn alter(values: &[f64], row: &mut Truth) {
+    let stators = [row.c_t_p, row.c_t_o, row.c_t_m];
+    let rates = row.gimbals.map(|gimbal| gimbal.rate);
+    for (k, (c_t_k, rate)) in stators.iter().zip(rates).enumerate() {
+        row.add_field(c_t_k, &(vector(values, 3 * k) * rate));
     }
 }

@@ -19,12 +19,10 @@ pub(super) fn effect() -> Effect {
         .like("mag.bias_step", "another magnetometer in the room: it sees what passes")
 }
 
-fn alter(values: &[f64], rows: &mut [Truth]) {
+fn alter(values: &[f64], row: &mut Truth) {
     let [_, _, _, middle, width] = values else { return };
     let peak_p = vector(values, 0);
-    for row in rows {
-        let off = (row.time - middle) / width;
-        let c_t_p = row.c_t_p;
-        row.add_field(&c_t_p, &(peak_p * libm::exp(-0.5 * off * off)));
-    }
+    let off = (row.time - middle) / width;
+    let c_t_p = row.c_t_p;
+    row.add_field(&c_t_p, &(peak_p * libm::exp(-0.5 * off * off)));
 }

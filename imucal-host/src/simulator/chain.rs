@@ -4,9 +4,9 @@ use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::{dose::Dose, truth::Motion};
+use super::{dose::Dose, recent::Recent, truth::Motion};
 use crate::{
-    effect::{Act, CATALOGUE, DataRun, Effect, Input, SensorRun, SignalRun, Truth},
+    effect::{Act, CATALOGUE, DataRun, Effect, Input, Machine, SensorRun, SignalRun, Truth},
     recording::SensorKind,
 };
 
@@ -27,29 +27,35 @@ impl<'a> Chain<'a> {
 
     /// The truth of each row: times of the sensor's clock, s.
     pub fn truth(&self, motion: &dyn Motion, times: &[f64]) -> Vec<Truth> {
-        let mut rows: Vec<Truth> = times
-            .par_iter()
-            .map(|time| {
-                let shown = self.doses.iter().fold(*time, |shown, dose| match dose.effect.act {
-                    Act::Clock(alter) => alter(&dose.values, shown),
-                    _ => shown,
-                });
-                let truth = motion.truth(shown, &|machine| {
-                    for dose in &self.doses {
-                        if let Act::Rig(alter) = dose.effect.act {
-                            alter(&dose.values, machine);
-                        }
-                    }
-                });
-                Truth { time: *time, ..truth }
-            })
-            .collect();
+        let row = |recent: &mut Recent, time: &f64| self.row(motion, *time, recent);
+        times.par_iter().map_init(Recent::default, row).collect()
+    }
+
+    /// The rows as a unit is given them that is turned on the table; `c_t_q` takes the table's components to its own.
+    pub fn inputs(&self, motion: &dyn Motion, times: &[f64], c_t_q: &Matrix3<f64>) -> Vec<Input> {
+        let row = |recent: &mut Recent, time: &f64| Input::of(&self.row(motion, *time, recent), c_t_q);
+        times.par_iter().map_init(Recent::default, row).collect()
+    }
+
+    fn row(&self, motion: &dyn Motion, time: f64, recent: &mut Recent) -> Truth {
+        let shown = self.doses.iter().fold(time, |shown, dose| match dose.effect.act {
+            Act::Clock(alter) => alter(&dose.values, shown),
+            _ => shown,
+        });
+        let rig = |machine: &mut Machine| {
+            for dose in &self.doses {
+                if let Act::Rig(alter) = dose.effect.act {
+                    alter(&dose.values, machine);
+                }
+            }
+        };
+        let mut row = Truth { time, ..motion.truth_among(shown, &rig, recent) };
         for dose in &self.doses {
             if let Act::Field(alter) = dose.effect.act {
-                alter(&dose.values, &mut rows);
+                alter(&dose.values, &mut row);
             }
         }
-        rows
+        row
     }
 
     /// A triad's output without noise, SI units: K v + b, and what effects make of it. `None` where K is singular.

@@ -12,6 +12,7 @@ mod error;
 pub mod gimbal;
 pub mod programme;
 pub mod random;
+pub mod recent;
 pub mod recorder;
 pub mod replay;
 pub mod run;

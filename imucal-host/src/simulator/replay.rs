@@ -9,13 +9,15 @@
 //! Between rows the nearest row's swing goes on with constant acceleration. Where readings change no more than their
 //! noise would make them, the cubic goes through those of a fifth of a second. Not modelled: readings that lag the gimbal.
 
-use std::f64::consts::TAU;
+use std::{f64::consts::TAU, sync::OnceLock};
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix3, Matrix4, Vector4};
+use rayon::prelude::*;
 
 use super::{
-    gimbal::direction,
-    truth::{Motion, Place, Recorded, on_rig},
+    gimbal::{Pose, direction, pose},
+    recent::Recent,
+    truth::{Motion, Place, Recorded, at_pose, on_rig},
 };
 use crate::{
     effect::{Machine, Swing, Truth},
@@ -51,6 +53,7 @@ pub struct Replay {
     axes: [Axis; 3],
     place: Place,
     steady: Option<Box<Replay>>,
+    poses: OnceLock<Vec<Pose>>,
 }
 
 impl Replay {
@@ -73,10 +76,37 @@ impl Replay {
         let of = |reach: usize| {
             let (swings, known) = swings(time, &angles, &noise, &moving, known.clone(), reach);
             let (time, moving, temperature) = (time.to_vec(), moving.clone(), temperature.clone());
-            Self { time, swings, moving, known, temperature, axes, place, steady: None }
+            Self {
+                time,
+                swings,
+                moving,
+                known,
+                temperature,
+                axes,
+                place,
+                steady: None,
+                poses: OnceLock::new(),
+            }
         };
         let steady = (long > short).then(|| Box::new(of(long)));
         Some(Self { steady, ..of(short) })
+    }
+
+    /// An exact rig on a level base, so many seconds after a row.
+    fn machine(&self, row: usize, since: f64) -> Machine {
+        let swing = |swing: Swing| Swing {
+            angle: swing.angle + since * (swing.rate + 0.5 * since * swing.acceleration),
+            rate: swing.rate + since * swing.acceleration,
+            acceleration: swing.acceleration,
+        };
+        let gimbals = self.swings.get(row).copied().unwrap_or_default().map(swing);
+        Machine { gimbals, ..Machine::exact(self.axes.map(direction)) }
+    }
+
+    /// Poses of an exact rig on a level base, row by row.
+    fn poses(&self) -> &[Pose] {
+        let of = |row: usize| pose(&self.machine(row, 0.0), Matrix3::identity());
+        self.poses.get_or_init(|| (0..self.time.len()).into_par_iter().map(of).collect())
     }
 }
 
@@ -85,17 +115,21 @@ impl Motion for Replay {
         self.time.last().copied().unwrap_or(0.0)
     }
 
-    fn truth(&self, time: f64, rig: &dyn Fn(&mut Machine)) -> Truth {
+    fn truth_among(&self, time: f64, rig: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
         let row = nearest(&self.time, time);
         let since = time - self.time.get(row).copied().unwrap_or(time);
-        let mut machine = Machine::exact(self.axes.map(direction));
-        machine.gimbals = self.swings.get(row).copied().unwrap_or_default().map(|swing| Swing {
-            angle: swing.angle + since * (swing.rate + 0.5 * since * swing.acceleration),
-            rate: swing.rate + since * swing.acceleration,
-            acceleration: swing.acceleration,
-        });
+        let exact = self.machine(row, since);
+        let mut machine = exact;
         rig(&mut machine);
-        on_rig(time, &machine, &self.place, self.temperature.get(row).copied().unwrap_or_default())
+        let temperature = self.temperature.get(row).copied().unwrap_or_default();
+        let known = self.poses().get(row).filter(|_| since == 0.0 && machine.turns_like(&exact));
+        match known {
+            Some(pose) => {
+                let pose = Pose { c_p_n: recent.base(&machine), ..*pose };
+                at_pose(time, &pose, machine.gimbals, &self.place, temperature, recent)
+            }
+            None => on_rig(time, &machine, &self.place, temperature, recent),
+        }
     }
 
     fn encoders(&self, time: f64) -> Option<[f64; 3]> {

@@ -16,7 +16,8 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use rayon::prelude::*;
 
 use super::{
-    gimbal::{Pose, base, direction},
+    gimbal::{Pose, direction},
+    recent::Recent,
     replay::nearest,
     truth::{Motion, Place, Recorded, at_pose},
 };
@@ -103,7 +104,7 @@ impl Motion for Tracked {
     }
 
     /// Of the rig, heading and levelling tilt act; there are no gimbals.
-    fn truth(&self, time: f64, rig: &dyn Fn(&mut Machine)) -> Truth {
+    fn truth_among(&self, time: f64, rig: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
         let row = nearest(&self.time, time);
         let since = time - self.time.get(row).copied().unwrap_or(time);
         let still = State { c_t_p: Matrix3::identity(), w_pt_t: Vector3::zeros(), dw_pt_t: Vector3::zeros() };
@@ -112,7 +113,7 @@ impl Motion for Tracked {
         rig(&mut machine);
         let c_t_p = c_t_p * exp(&((w_pt_t + dw_pt_t * (0.5 * since)) * since));
         let pose = Pose {
-            c_p_n: base(&machine),
+            c_p_n: recent.base(&machine),
             c_t_p,
             c_t_o: c_t_p,
             c_t_m: c_t_p,
@@ -120,7 +121,7 @@ impl Motion for Tracked {
             dw_pt_t,
         };
         let temperature = self.temperature.get(row).copied().unwrap_or_default();
-        at_pose(time, &pose, [Swing::default(); 3], &self.place, temperature)
+        at_pose(time, &pose, [Swing::default(); 3], &self.place, temperature, recent)
     }
 
     fn rig(&self) -> Rig {

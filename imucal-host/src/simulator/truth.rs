@@ -2,7 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::gimbal::{Pose, pose};
+use super::{
+    gimbal::{Pose, pose},
+    recent::Recent,
+};
 use crate::{
     effect::{Machine, Swing, Truth},
     recording::manifest::Rig,
@@ -44,7 +47,12 @@ pub trait Motion: Sync {
 
     /// The truth at a time from 0 to [`duration`](Self::duration), s, on a rig that `rig` may alter before; earlier and
     /// later, that of the nearest end.
-    fn truth(&self, time: f64, rig: &dyn Fn(&mut Machine)) -> Truth;
+    fn truth(&self, time: f64, rig: &dyn Fn(&mut Machine)) -> Truth {
+        self.truth_among(time, rig, &mut Recent::default())
+    }
+
+    /// The same, at one of many times; what they have in common is `recent`.
+    fn truth_among(&self, time: f64, rig: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth;
 
     /// Angles that exact encoders would show, rad, outermost first, not wrapped; `None` without a rig.
     fn encoders(&self, _time: f64) -> Option<[f64; 3]> {
@@ -76,17 +84,25 @@ pub trait Recorded: Motion {
 }
 
 /// The truth on a three-gimbal rig.
-pub fn on_rig(time: f64, machine: &Machine, place: &Place, temperature: f64) -> Truth {
-    at_pose(time, &pose(machine), machine.gimbals, place, temperature)
+pub fn on_rig(time: f64, machine: &Machine, place: &Place, temperature: f64, recent: &mut Recent) -> Truth {
+    let pose = pose(machine, recent.base(machine));
+    at_pose(time, &pose, machine.gimbals, place, temperature, recent)
 }
 
 /// The truth on a table in a pose.
 ///
 /// Without lever arm: the unit sits where the axes meet. The table does not travel, so that specific force is gravity.
-pub fn at_pose(time: f64, pose: &Pose, gimbals: [Swing; 3], place: &Place, temperature: f64) -> Truth {
+pub fn at_pose(
+    time: f64,
+    pose: &Pose,
+    gimbals: [Swing; 3],
+    place: &Place,
+    temperature: f64,
+    recent: &mut Recent,
+) -> Truth {
     let c_t_n = pose.c_p_n * pose.c_t_p;
     let to_t = |v_n: Vector3<f64>| c_t_n.tr_mul(&v_n);
-    let w_ie_t = to_t(place.earth_rate_n());
+    let w_ie_t = to_t(recent.earth_rate_n(place));
     Truth {
         time,
         c_t_p: pose.c_t_p,
@@ -112,6 +128,7 @@ pub fn in_the_open(
     w_nt_t: Vector3<f64>,
     dw_nt_t: Vector3<f64>,
     place: &Place,
+    recent: &mut Recent,
 ) -> Truth {
     let pose = Pose {
         c_p_n: Matrix3::identity(),
@@ -121,7 +138,7 @@ pub fn in_the_open(
         w_pt_t: w_nt_t,
         dw_pt_t: dw_nt_t,
     };
-    at_pose(time, &pose, [Swing::default(); 3], place, 25.0)
+    at_pose(time, &pose, [Swing::default(); 3], place, 25.0, recent)
 }
 
 #[cfg(test)]
@@ -136,7 +153,7 @@ mod tests {
         for k in 0..50 {
             let angle = 0.37 * f64::from(k);
             machine.gimbals = [angle, 1.7 * angle, -2.3 * angle].map(Swing::still);
-            let truth = on_rig(0.0, &machine, &place, 25.0);
+            let truth = on_rig(0.0, &machine, &place, 25.0, &mut Recent::default());
             // Angles to 40 rad, of which each doubling beyond one costs a bit.
             assert!((truth.f_t.norm() - place.gravity).abs() < 1e-12);
             assert!((truth.w_it_t.norm() - EARTH_RATE).abs() < 1e-18);
@@ -149,7 +166,7 @@ mod tests {
     #[test]
     fn a_unit_aligned_with_n_reads_minus_g_down() {
         let machine = Machine::exact([Vector3::z(), Vector3::y(), Vector3::x()]);
-        let truth = on_rig(0.0, &machine, &Place::ankara(), 25.0);
+        let truth = on_rig(0.0, &machine, &Place::ankara(), 25.0, &mut Recent::default());
         assert_eq!(truth.f_t, Vector3::new(0.0, 0.0, -9.7997));
         assert_eq!(truth.b_t, Vector3::new(25.3, 2.6, 40.1));
     }

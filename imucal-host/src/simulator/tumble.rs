@@ -11,7 +11,10 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, UnitSphere};
 
-use super::truth::{Motion, Place, in_the_open};
+use super::{
+    recent::Recent,
+    truth::{Motion, Place, in_the_open},
+};
 use crate::{
     effect::{Machine, Truth},
     recording::manifest::{Rig, RigKind},
@@ -78,7 +81,7 @@ impl Motion for Tumble {
     }
 
     /// No rig turns it: the table is the enclosure.
-    fn truth(&self, time: f64, _: &dyn Fn(&mut Machine)) -> Truth {
+    fn truth_among(&self, time: f64, _: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
         let (attitude, rate, acceleration) = match self.phase(time) {
             Phase::Rest(k) => (self.attitudes[k], Vector3::zeros(), Vector3::zeros()),
             Phase::Turn(k, share) => {
@@ -90,7 +93,7 @@ impl Motion for Tumble {
             }
         };
         let c_t_n = attitude.to_rotation_matrix();
-        in_the_open(time, c_t_n.matrix(), rate, acceleration, &self.place)
+        in_the_open(time, c_t_n.matrix(), rate, acceleration, &self.place, recent)
     }
 
     fn rig(&self) -> Rig {

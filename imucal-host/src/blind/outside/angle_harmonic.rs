@@ -13,8 +13,8 @@ use crate::{
 const NAMES: [&str; 6] = ["x_c", "y_c", "z_c", "x_s", "y_s", "z_s"];
 const GIMBALS: [&str; 3] = ["outer", "middle", "inner"];
 
-/// Alters the truth of all rows.
-type Alter = fn(&[f64], &mut [Truth]);
+/// Alters the truth of a row.
+type Alter = fn(&[f64], &mut Truth);
 
 pub(super) fn effects() -> Vec<Effect> {
     let alters: [[Alter; 3]; 3] = [
@@ -34,15 +34,13 @@ pub(super) fn effects() -> Vec<Effect> {
     list
 }
 
-fn alter<const KIND: usize, const GIMBAL: usize>(values: &[f64], rows: &mut [Truth]) {
+fn alter<const KIND: usize, const GIMBAL: usize>(values: &[f64], row: &mut Truth) {
     let order = if KIND == 1 { 3.0 } else { 5.0 };
-    for row in rows {
-        let (sin, cos) = libm::sincos(order * row.gimbals[GIMBAL].angle);
-        let added = vector(values, 0) * cos + vector(values, 3) * sin;
-        match KIND {
-            0 => row.f_t += added,
-            1 => row.w_it_t += added,
-            _ => row.b_t += added,
-        }
+    let (sin, cos) = libm::sincos(order * row.gimbals[GIMBAL].angle);
+    let added = vector(values, 0) * cos + vector(values, 3) * sin;
+    match KIND {
+        0 => row.f_t += added,
+        1 => row.w_it_t += added,
+        _ => row.b_t += added,
     }
 }

@@ -10,7 +10,7 @@ use super::pairs::Pairs;
 use crate::{
     effect::{Machine, Truth},
     recording::{Recording, SensorKind, integrity::Integrity, manifest::Axis},
-    simulator::{Motion, gimbal::direction, programme::wrap, truth::on_rig},
+    simulator::{Motion, gimbal::direction, programme::wrap, recent::Recent, truth::on_rig},
 };
 
 /// A triad follows where K v + b leaves no more than this share of its variance.
@@ -180,7 +180,7 @@ fn best(
                 gimbal.angle = angle(*row);
                 gimbal.rate = wrap(angle(after) - angle(before)) / span;
             }
-            on_rig(truth.time, &machine, &place, truth.temperature)
+            on_rig(truth.time, &machine, &place, truth.temperature, &mut Recent::default())
         };
         let truth: Vec<Truth> = chosen.iter().map(replayed).collect();
         let shares = kinds.iter().map(|kind| {

@@ -24,7 +24,7 @@ use crate::{
         integrity::Integrity,
         manifest::{Rig, RigKind},
     },
-    simulator::{Motion, Place, Recorded, Tracked},
+    simulator::{Motion, Place, Recorded, Tracked, recent::Recent},
 };
 
 /// Fewer rests than this do not tell an effect from the attitudes' own freedom.
@@ -252,8 +252,8 @@ impl Motion for Held {
         self.tracked.duration()
     }
 
-    fn truth(&self, time: f64, rig: &dyn Fn(&mut Machine)) -> Truth {
-        let truth = self.tracked.truth(time, rig);
+    fn truth_among(&self, time: f64, rig: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
+        let truth = self.tracked.truth_among(time, rig, recent);
         let earth = truth.w_ie_t;
         Truth {
             w_ie_t: Vector3::zeros(),

@@ -10,6 +10,7 @@ use crate::{
         course::Course,
         gimbal::direction,
         random::{Purpose, Random},
+        recent::Recent,
         truth::{Motion, Place, on_rig},
     },
 };
@@ -135,10 +136,10 @@ impl Motion for Schedule {
         self.segments.iter().map(|segment| segment.duration).sum()
     }
 
-    fn truth(&self, time: f64, rig: &dyn Fn(&mut Machine)) -> Truth {
+    fn truth_among(&self, time: f64, rig: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
         let mut machine = self.machine(time);
         rig(&mut machine);
-        on_rig(time, &machine, &self.place, self.climate.temperature(time))
+        on_rig(time, &machine, &self.place, self.climate.temperature(time), recent)
     }
 
     fn encoders(&self, time: f64) -> Option<[f64; 3]> {
