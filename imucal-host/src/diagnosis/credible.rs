@@ -1,5 +1,7 @@
 //! Which other effects could stand in a cause's place.
 
+use rayon::prelude::*;
+
 use super::{
     linear::{Judged, Linear},
     noise::NEAR,
@@ -46,18 +48,19 @@ pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> O
     let mut judged: Vec<(f64, Option<&'static Effect>)> =
         vec![(best.log_evidence, Some(cause)), (none.log_evidence, None)];
     let others = ranked.iter().filter(|(value, effect)| !std::ptr::eq(*effect, cause) && *value > own - FAR);
-    for (_, effect) in others.take(JUDGED) {
-        let mut set = rest.clone();
-        set.push(effect);
+    let others: Vec<&'static Effect> = others.take(JUDGED).map(|(_, effect)| *effect).collect();
+    let offsets = linear.offsets(&best.noise);
+    let instead = |effect: &&'static Effect| {
+        let set: Vec<&'static Effect> = rest.iter().copied().chain([*effect]).collect();
         let anew: Vec<_> =
             linear.scene.reach(cause).iter().chain(linear.scene.reach(effect)).copied().collect();
         let sifted = linear.sift(&set, &best.noise, &anew, &NEAR);
         // What falls behind axis by axis is not judged any further.
-        let sifted = sifted.filter(|sifted| sifted.value > standard.value - BEHIND);
-        if let Some(found) = sifted.and_then(|sifted| linear.together(sifted)) {
-            judged.push((found.log_evidence, Some(effect)));
-        }
-    }
+        let sifted = sifted.filter(|sifted| sifted.value > standard.value - BEHIND)?;
+        Some((linear.together(sifted, &offsets)?.log_evidence, Some(*effect)))
+    };
+    let instead: Vec<Option<_>> = others.par_iter().map(instead).collect();
+    judged.extend(instead.into_iter().flatten());
     judged.sort_by(|a, b| b.0.total_cmp(&a.0));
     let most = judged[0].0;
     let total: f64 = judged.iter().map(|(value, _)| (value - most).exp()).sum();

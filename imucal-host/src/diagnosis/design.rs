@@ -65,7 +65,8 @@ pub struct Design {
 /// All channels, as white noise weighs them: what is the same whatever the drift and the scatter.
 #[derive(Clone, Debug)]
 pub struct CondensedDesign {
-    channels: Vec<CondensedChannel>,
+    /// The channels, sensor by sensor.
+    pub channels: Vec<CondensedChannel>,
 }
 
 /// One axis of one sensor.
@@ -172,6 +173,11 @@ impl Channel {
         x.set_column(places.len(), &self.y);
         x
     }
+
+    /// All of its columns, and behind them its residual.
+    fn all(&self) -> DMatrix<f64> {
+        self.gathered(&(0..self.ids.len()).collect::<Vec<_>>())
+    }
 }
 
 impl Design {
@@ -260,30 +266,26 @@ impl Design {
         sum(wanted.len(), &parts)
     }
 
-    /// Normal equations of some columns and of sparse ones before them, which a channel may have.
-    pub fn normal_beside(
+    /// All columns and before them `count` sparse ones, which a channel may have, given what its blocks have in common.
+    pub fn condensed_beside(
         &self,
-        whitenings: &[Whitening],
+        latents: &(dyn Fn(&Channel) -> Latents + Sync),
         sparse: &(dyn Fn(&Channel) -> Sparse + Sync),
-        wanted: &[usize],
-    ) -> Normal {
-        let sparse: Vec<Sparse> = self.channels.par_iter().map(sparse).collect();
-        let count = sparse.iter().map(|sparse| sparse.count).max().unwrap_or_default();
-        let part = |((channel, whitening), sparse): ((&Channel, &Whitening), &Sparse)| {
-            let (from, to) = places(&channel.ids, wanted);
-            let columns = whitening.latents().condensed_beside(sparse, &channel.gathered(&from));
-            let ids = (0..sparse.count).chain(to.iter().map(|to| count + to)).collect();
-            Part { normal: Normal::of(&columns, whitening), ids }
-        };
-        let parts: Vec<Part> = self.channels.par_iter().zip(whitenings).zip(&sparse).map(part).collect();
-        sum(count + wanted.len(), &parts)
+        count: usize,
+    ) -> CondensedDesign {
+        let channels = self.channels.par_iter().map(|channel| {
+            let sparse = sparse(channel);
+            let columns = Arc::new(latents(channel)).condensed_beside(&sparse, &channel.all());
+            let ids = (0..sparse.count).chain(channel.ids.iter().map(|id| count + id)).collect();
+            CondensedChannel { kind: channel.kind, ids, columns }
+        });
+        CondensedDesign { channels: channels.collect() }
     }
 
     /// All columns, given what the blocks of a channel have in common.
     pub fn condensed(&self, latents: &(dyn Fn(&Channel) -> Latents + Sync)) -> CondensedDesign {
         let channels = self.channels.par_iter().map(|channel| {
-            let every: Vec<usize> = (0..channel.ids.len()).collect();
-            let columns = Arc::new(latents(channel)).condensed(&channel.gathered(&every));
+            let columns = Arc::new(latents(channel)).condensed(&channel.all());
             CondensedChannel { kind: channel.kind, ids: channel.ids.clone(), columns }
         });
         CondensedDesign { channels: channels.collect() }
@@ -318,6 +320,11 @@ impl CondensedDesign {
             .par_iter()
             .map(|channel| Normal::of(&channel.columns, &whitening(channel)))
             .collect();
+        self.sum(size, &parts)
+    }
+
+    /// Normal equations of all channels, of so many columns, from those of each.
+    pub fn sum(&self, size: usize, parts: &[Normal]) -> Normal {
         let mut normal = Normal::zeros(size);
         parts.iter().zip(&self.channels).for_each(|(part, channel)| normal.add(part, &channel.ids));
         normal
@@ -361,11 +368,11 @@ pub fn append(
     data: &mut Vec<f64>,
 ) {
     for (id, signature) in signatures.iter().enumerate() {
-        let reaching =
-            along(signature.borrow(), kind, axis).filter(|column| column.iter().any(|v| *v != 0.0));
-        if let Some(column) = reaching {
+        if let Some(values) = &signature.borrow()[kind as usize]
+            && values.iter().any(|v| v[axis] != 0.0)
+        {
             ids.push(first + id);
-            data.extend(column);
+            data.extend(values.iter().map(|v| v[axis]));
         }
     }
 }

@@ -1,18 +1,18 @@
 //! Whether a sensor's residual follows a driver: score tests, and evidence with a noise of its own.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
-    design::{Design, Normal, loosened},
+    bordered::Bordered,
+    design::Design,
     driver::{Driver, TIME},
     evidence::Projected,
     frequency,
     linear::{Linear, log_evidence},
     noise::{NEAR, Noise},
     scene::{Means, Scene},
-    whitening::Whitening,
 };
 use crate::{effect::Effect, recording::SensorKind};
 
@@ -51,78 +51,21 @@ pub fn following(
 ) -> Option<Vec<Following>> {
     let fitted = linear.fitted(set);
     let whitenings = linear.whitenings(noise);
-    let normal = linear.design.normal(&whitenings, &fitted);
+    let bordered = Bordered::new(&linear.design, &whitenings, &fitted);
     let kinds = linear.scene.kinds.iter();
     let pairs: Vec<(SensorKind, &Driver)> = kinds
         .flat_map(|kind| drivers.iter().map(move |driver| (*kind, driver)))
         .filter(|(kind, driver)| !driver.columns(*kind).is_empty())
         .collect();
     let follow = |(kind, driver): &(SensorKind, &Driver)| {
-        let projected = across(linear, &whitenings, *kind, driver, &fitted).projected(&normal)?;
-        let places: Vec<usize> = (0..projected.score.len()).collect();
-        follow(linear.scene, *kind, driver, &projected, &places)
+        let normal = bordered.with(&means(*kind, driver, noise));
+        let every: Vec<usize> = (0..normal.score.len()).collect();
+        let (first, others) = every.split_at(fitted.len());
+        follow(linear.scene, *kind, driver, &Projected::new(&normal, first, others)?)
     };
     let mut found: Vec<Following> = pairs.par_iter().map(follow).collect::<Option<_>>()?;
     sort(&mut found);
     Some(found)
-}
-
-/// What a driver's columns share with those fitted.
-struct Across {
-    /// Dᵀ Σ⁻¹ r.
-    score: DVector<f64>,
-    /// Dᵀ Σ⁻¹ D.
-    information: DMatrix<f64>,
-    /// Xᵀ Σ⁻¹ D.
-    cross: DMatrix<f64>,
-}
-
-impl Across {
-    /// With the fitted columns, of these normal equations, projected out.
-    fn projected(self, fitted: &Normal) -> Option<Projected> {
-        let factor = loosened(fitted.information.clone())?;
-        let solved = factor.solve(&self.cross);
-        Some(Projected {
-            score: self.score - solved.tr_mul(&fitted.score),
-            before: self.information.diagonal(),
-            information: self.information - self.cross.tr_mul(&solved),
-        })
-    }
-}
-
-fn across(
-    linear: &Linear<'_>,
-    whitenings: &[Whitening],
-    kind: SensorKind,
-    driver: &Driver,
-    fitted: &[usize],
-) -> Across {
-    let columns = driver.columns(kind);
-    let n = columns.len();
-    let (mut score, mut information) = (DVector::zeros(n), DMatrix::zeros(n, n));
-    let mut cross = DMatrix::zeros(fitted.len(), n);
-    for (channel, whitening) in linear.design.channels.iter().zip(whitenings) {
-        let own: Vec<usize> =
-            (0..n).filter(|at| channel.kind == kind && columns[*at].1 == channel.axis).collect();
-        let shared: Vec<(usize, usize)> = (0..fitted.len())
-            .filter_map(|to| Some((to, channel.ids.iter().position(|id| *id == fitted[to])?)))
-            .collect();
-        for at in &own {
-            let values = &driver.functions[columns[*at].0].values;
-            let mut weighed = DVector::zeros(values.len());
-            whitening.apply(values, weighed.as_mut_slice());
-            score[*at] = channel.y.dot(&weighed);
-            for other in &own {
-                let other_values = &driver.functions[columns[*other].0].values;
-                information[(*other, *at)] =
-                    other_values.iter().zip(weighed.iter()).map(|(a, b)| a * b).sum();
-            }
-            for (to, from) in &shared {
-                cross[(*to, *at)] = channel.x.column(*from).dot(&weighed);
-            }
-        }
-    }
-    Across { score, information, cross }
 }
 
 /// As [`following`], but what would show in a quieter noise is judged again by its evidence, with a noise estimated
@@ -171,7 +114,7 @@ fn judged(
     driver: &Driver,
     choices: usize,
 ) -> Option<Following> {
-    let (mut design, fitted) = with_drivers(linear, set, kind, std::slice::from_ref(driver), noise);
+    let (mut design, fitted) = with_driver(linear, set, kind, driver, noise);
     let every: Vec<usize> = (0..design.size).collect();
     let mut groups = linear.groups(set, &linear.fitted(set));
     // The other sensors do not show it.
@@ -187,8 +130,7 @@ fn judged(
     let gain = log_evidence(&normal, &anew, linear.baseline.len(), &groups)? - before - (choices as f64).ln();
     let gain = if driver.name == TIME { gain - DRIFTING } else { gain };
     let projected = Projected::new(&normal, &every[..fitted], &every[fitted..])?;
-    let following =
-        follow(linear.scene, kind, driver, &projected, &(0..every.len() - fitted).collect::<Vec<_>>())?;
+    let following = follow(linear.scene, kind, driver, &projected)?;
     Some(Following { p_value: libm::exp(-gain.max(0.0)), ..following })
 }
 
@@ -203,24 +145,24 @@ impl Following {
     }
 }
 
-/// The columns of the baseline and a set, and of drivers of one sensor behind them, whose usual size is that of white
-/// noise in a sample; with the number of the former.
-fn with_drivers(
+/// The columns of the baseline and a set, and of a driver of one sensor behind them; with the number of the former.
+fn with_driver(
     linear: &Linear<'_>,
     set: &[&'static Effect],
     kind: SensorKind,
-    drivers: &[Driver],
+    driver: &Driver,
     noise: &Noise,
 ) -> (Design, usize) {
     let fitted = linear.fitted(set);
-    let usual = noise.sensors[kind as usize].white.iter().sum::<f64>() / 3.0;
-    let means: Vec<Means> = drivers
-        .iter()
-        .flat_map(|driver| driver.columns(kind).into_iter().map(move |at| (driver, at)))
-        .map(|(driver, (function, axis))| on(kind, axis, &driver.functions[function].values, usual))
-        .collect();
     let columns = fitted.iter().map(|id| linear.design.columns[*id]).collect();
-    (linear.design.extended(&fitted, columns, &means), fitted.len())
+    (linear.design.extended(&fitted, columns, &means(kind, driver, noise)), fitted.len())
+}
+
+/// Signatures of a driver on a sensor, of the size of white noise in a sample.
+fn means(kind: SensorKind, driver: &Driver, noise: &Noise) -> Vec<Means> {
+    let usual = noise.sensors[kind as usize].white.iter().sum::<f64>() / 3.0;
+    let columns = driver.columns(kind).into_iter();
+    columns.map(|(function, axis)| on(kind, axis, &driver.functions[function].values, usual)).collect()
 }
 
 /// A signature on one axis of one sensor.
@@ -231,14 +173,9 @@ fn on(kind: SensorKind, axis: usize, values: &[f64], usual: f64) -> Means {
     means
 }
 
-fn follow(
-    scene: &Scene<'_>,
-    kind: SensorKind,
-    driver: &Driver,
-    projected: &Projected,
-    places: &[usize],
-) -> Option<Following> {
-    let (statistic, dimensions) = score_test(projected, places);
+fn follow(scene: &Scene<'_>, kind: SensorKind, driver: &Driver, projected: &Projected) -> Option<Following> {
+    let places: Vec<usize> = (0..projected.score.len()).collect();
+    let (statistic, dimensions) = score_test(projected, &places);
     let p_value = match ChiSquared::new(dimensions.max(1) as f64) {
         Ok(distribution) if dimensions > 0 => distribution.sf(statistic / CAUTION),
         _ => 1.0,
@@ -246,7 +183,7 @@ fn follow(
     let single =
         |place: &usize| projected.score[*place].powi(2) / projected.information[(*place, *place)].max(1e-12);
     let most = places.iter().max_by(|a, b| single(a).total_cmp(&single(b)))?;
-    let (function, axis) = *driver.columns(kind).get(most - places[0])?;
+    let (function, axis) = *driver.columns(kind).get(*most)?;
     Some(Following {
         kind,
         driver: driver.name.clone(),

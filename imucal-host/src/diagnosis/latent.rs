@@ -20,6 +20,8 @@ use std::{ops::Range, sync::Arc};
 
 use nalgebra::{DMatrix, Matrix3};
 
+use super::gram;
+
 /// Distance between knots, s.
 pub const SPACING: f64 = 2.5;
 /// Most courses of a stretch: one for each gimbal.
@@ -159,7 +161,8 @@ impl Latents {
                 }
             }
         }
-        Condensed { latents: Arc::clone(self), plain: weighted * x, along, beside }
+        let plain = gram::with_product(DMatrix::zeros(columns, columns), 1.0, &weighted, x);
+        Condensed { latents: Arc::clone(self), plain, along, beside }
     }
 
     /// Sparse columns, and behind them some others.

@@ -9,12 +9,14 @@ use super::{
     design::{CondensedDesign, Design, Normal},
     evidence::Projected,
     latest::Latest,
+    likelihood::restricted,
     noise::{Noise, SensorNoise, Weighing},
     refit::{Fit, columns, signatures},
     scan::{Beside, Scan},
     scanned::Shaped,
     scene::{Reference, Scene},
     shape,
+    together::Offsets,
     whitening::Whitening,
 };
 use crate::{
@@ -65,11 +67,12 @@ pub struct Linear<'s> {
     /// Effects of the fit beside the baseline.
     held: Vec<Dose>,
     normals: Latest<Noise, Normal>,
-    condensed: Latest<[Spread; 3], CondensedDesign>,
+    condensed: Latest<White, CondensedDesign>,
+    offsets: Latest<White, Option<Offsets>>,
 }
 
-/// White noise of a sensor at rest and in motion, by axis.
-type Spread = [[f64; 3]; 2];
+/// White noise of each sensor at rest and in motion, by axis.
+type White = [[[f64; 3]; 2]; 3];
 
 impl<'s> Linear<'s> {
     /// About a fit, with its columns alone: nothing can be added.
@@ -146,8 +149,19 @@ impl<'s> Linear<'s> {
     ) -> Self {
         let baseline = candidates.baseline.iter().flat_map(|term| design.of(term)).collect();
         let held = fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect)).cloned().collect();
-        let (normals, condensed) = (Latest::default(), Latest::default());
-        Self { scene, candidates, design, weighing, baseline, shapes, scan, held, normals, condensed }
+        Self {
+            scene,
+            candidates,
+            design,
+            weighing,
+            baseline,
+            shapes,
+            scan,
+            held,
+            normals: Latest::default(),
+            condensed: Latest::default(),
+            offsets: Latest::default(),
+        }
     }
 
     /// An effect's signature is the same about another fit but for the second order: no sensor it reaches has an effect in
@@ -222,7 +236,8 @@ impl<'s> Linear<'s> {
         anew: &[SensorKind],
         steps: &[f64],
     ) -> Option<Judged> {
-        self.together(self.sift(set, start, anew, steps)?)
+        let sifted = self.sift(set, start, anew, steps)?;
+        self.together(sifted, &self.offsets(start))
     }
 
     /// The same axis by axis.
@@ -283,8 +298,12 @@ impl<'s> Linear<'s> {
 
     /// All columns, as white noise weighs them.
     pub fn condensed(&self, noise: &Noise) -> Arc<CondensedDesign> {
-        let key = std::array::from_fn(|at| [noise.sensors[at].white, noise.sensors[at].moving]);
-        self.condensed.get(key, || self.weighing.condensed(&self.design, noise))
+        self.condensed.get(white(noise), || self.weighing.condensed(&self.design, noise))
+    }
+
+    /// All columns and the gimbals' offsets, as white noise weighs them.
+    pub fn offsets(&self, noise: &Noise) -> Arc<Option<Offsets>> {
+        self.offsets.get(white(noise), || self.offset(noise))
     }
 
     /// Scores of all columns but the baseline's, with the baseline projected out.
@@ -334,6 +353,10 @@ impl<'s> Linear<'s> {
     }
 }
 
+fn white(noise: &Noise) -> White {
+    noise.sensors.map(|sensor| [sensor.white, sensor.moving])
+}
+
 /// The same effect with the same parameters beside its amplitudes.
 fn has_same_shape(one: &Dose, other: &Dose) -> bool {
     let mut values = one.effect.parameters.iter().zip(one.values.iter().zip(&other.values));
@@ -366,5 +389,5 @@ pub fn log_evidence(normal: &Normal, noise: &Noise, baseline: usize, groups: &[V
         score: normal.score.rows(0, baseline).into_owned(),
         ..normal.clone()
     };
-    Some(projected.log_bayes_factor(&parts) - 0.5 * super::noise::restricted(&alone) - noise.surprise())
+    Some(projected.log_bayes_factor(&parts) - 0.5 * restricted(&alone) - noise.surprise())
 }

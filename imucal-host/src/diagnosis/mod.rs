@@ -9,6 +9,7 @@ pub mod convention;
 pub mod credible;
 pub mod design;
 pub mod driver;
+mod eliminated;
 pub mod estimate;
 pub mod evidence;
 pub mod experiment;
@@ -18,9 +19,11 @@ pub mod following;
 pub mod footing;
 pub mod frequency;
 pub mod gap;
+mod gram;
 pub mod hand;
 pub mod latent;
 mod latest;
+mod likelihood;
 pub mod linear;
 pub mod model;
 mod moves;
@@ -42,6 +45,8 @@ pub mod together;
 mod unsteady;
 mod white;
 pub mod whitening;
+
+use rayon::prelude::*;
 
 pub use self::finding::{Diagnosis, Verdict};
 use self::{
@@ -181,7 +186,7 @@ fn answer(
     let closed = gap::closed(linear, &best.set, &best.noise, left.map_or(0.0, |f| f.size))?;
     progress("held out");
     let standings: Vec<credible::Standing> =
-        best.set.iter().map(|cause| credible::standing(linear, best, cause)).collect::<Option<_>>()?;
+        best.set.par_iter().map(|cause| credible::standing(linear, best, cause)).collect::<Option<_>>()?;
     progress("alternatives judged");
     let amounts = estimate::amounts(explained)?;
     let mut causes: Vec<Cause> = Vec::new();

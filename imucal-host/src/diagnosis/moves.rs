@@ -166,8 +166,9 @@ impl Linear<'_> {
         let mut sifted: Vec<Sifted> = sifted.into_iter().flatten().filter(is_near).collect();
         sifted.sort_by(|a, b| b.value.total_cmp(&a.value));
         sifted.truncate(TOGETHER);
-        let judged: Vec<Option<Judged>> =
-            sifted.into_par_iter().map(|sifted| self.together(sifted)).collect();
+        let offsets = self.offsets(&from.noise);
+        let together = |sifted| self.together(sifted, &offsets);
+        let judged: Vec<Option<Judged>> = sifted.into_par_iter().map(together).collect();
         judged.into_iter().flatten().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
     }
 

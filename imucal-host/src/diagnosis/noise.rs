@@ -1,24 +1,21 @@
 //! The noise of each channel: white, drifting, and what a rest or a movement has in common.
 //!
 //! White noise comes from neighbouring blocks. Drifts and scatter come from the restricted likelihood of the blocks'
-//! residuals (Patterson and Thompson 1971), so that what the model has taken up is not missed in the noise:
-//!
-//! ```text
-//! −2 ln L = ln|Σ| + ln|XᵀΣ⁻¹X + Λ| − ln|Λ| + rᵀΣ⁻¹r − zᵀ(XᵀΣ⁻¹X + Λ)⁻¹z      z = XᵀΣ⁻¹r
-//! ```
+//! residuals ([`super::likelihood`]), so that what the model has taken up is not missed in the noise.
 //!
 //! Each sensor has its own; the axes of a sensor share drift and scatter. Not modelled: noise that axes have in common,
 //! white noise that changes in the course of the recording.
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{
     block::Block,
-    design::{Channel, CondensedChannel, CondensedDesign, Design, Normal},
+    design::{Channel, CondensedDesign, Design, Normal},
     latent::Latents,
+    likelihood::Likelihood,
     scatter::Scattered,
     scene::Scene,
     whitening::{Process, Whitening},
@@ -158,13 +155,9 @@ impl<'s> Weighing<'s> {
         design.channels.par_iter().map(whitening).collect()
     }
 
-    /// Σ⁻¹ of each channel of a design, but for the scatter.
-    pub fn drifting(&self, design: &Design, noise: &Noise) -> Vec<Whitening> {
-        let whitening = |channel: &Channel| {
-            let latents = Latents::new(&self.times, self.weights(channel, noise, &|_| true), &[]);
-            noise.sensors[channel.kind as usize].whitening(&Arc::new(latents))
-        };
-        design.channels.par_iter().map(whitening).collect()
+    /// What the blocks of a channel have in common, but for the scatter.
+    pub fn drifting(&self, channel: &Channel, noise: &Noise) -> Latents {
+        Latents::new(&self.times, self.weights(channel, noise, &|_| true), &[])
     }
 
     /// A design's columns, as white noise weighs them.
@@ -215,11 +208,9 @@ impl<'s> Weighing<'s> {
         start: &Noise,
         steps: &[f64],
     ) -> SensorNoise {
-        let picked = design.picked(Some(kind), columns);
-        let likelihood = |sensor: &SensorNoise| {
-            let whitening = |channel: &CondensedChannel| sensor.whitening(&channel.columns.latents);
-            restricted(&picked.normal(columns.len(), &whitening)) + 2.0 * sensor.surprise()
-        };
+        let asked = Likelihood::new(design, kind, columns);
+        let likelihood =
+            |sensor: &SensorNoise| asked.of(sensor.scatter, sensor.drifts()) + 2.0 * sensor.surprise();
         let start = SensorNoise { breadth: 0.0, ..start.sensors[kind as usize] };
         // Between two correlation times lies a hill: each is searched by itself.
         let mut starts = SLOW.map(|slow| start.with_slow(slow)).map(|start| (start, likelihood(&start)));
@@ -292,9 +283,12 @@ impl<'s> Weighing<'s> {
 impl SensorNoise {
     /// Σ⁻¹ of one of the sensor's axes.
     fn whitening(&self, latents: &Arc<Latents>) -> Whitening {
-        let drifts = [(FAST, self.drift[0]), (self.slow, self.drift[1])];
-        let drifts = drifts.map(|(time, sigma)| Process { time, sigma });
-        Whitening::new(Arc::clone(latents), self.scatter, &drifts)
+        Whitening::new(Arc::clone(latents), self.scatter, &self.drifts())
+    }
+
+    /// The fast and the slow drift.
+    fn drifts(&self) -> [Process; 2] {
+        [(FAST, self.drift[0]), (self.slow, self.drift[1])].map(|(time, sigma)| Process { time, sigma })
     }
 
     /// −ln of the prior of all that are as likely, but for a constant.
@@ -309,22 +303,9 @@ impl SensorNoise {
     }
 }
 
-/// Prior information on a column: a usual size is one, and this many of them would be no surprise.
-const LOOSE: f64 = 30.0;
-
 /// ln of a sum of likelihoods, each −2 ln of it, over the greatest.
 fn log_sum(least: f64, each: impl Iterator<Item = f64>) -> f64 {
     each.map(|value| (-0.5 * (value - least)).exp()).sum::<f64>().ln()
-}
-
-/// −2 ln of the restricted likelihood, but for a constant.
-pub fn restricted(normal: &Normal) -> f64 {
-    let n = normal.score.len();
-    let prior = 1.0 / (LOOSE * LOOSE);
-    let loosened = &normal.information + DMatrix::identity(n, n) * prior;
-    let Some(factor) = loosened.cholesky() else { return f64::INFINITY };
-    let explained = normal.score.dot(&factor.solve(&normal.score));
-    normal.log_determinant + factor.ln_determinant() - n as f64 * prior.ln() + normal.energy - explained
 }
 
 #[cfg(test)]

@@ -118,8 +118,9 @@ fn gimbals_that_turn_all_sensors_at_once_are_one_chance_and_no_harmonic_of_the_e
         let harmonic = find("rig.encoder_harmonic").unwrap();
         let with = linear.sift(&[harmonic], &none.noise, &SensorKind::ALL, &FAR).unwrap();
         let axis_by_axis = with.value - none.value;
-        let none = linear.together(none).unwrap();
-        let together = linear.together(with).unwrap().log_evidence - none.log_evidence;
+        let offsets = linear.offsets(&white);
+        let none = linear.together(none, &offsets).unwrap();
+        let together = linear.together(with, &offsets).unwrap().log_evidence - none.log_evidence;
         assert!(axis_by_axis > 0.0 && together < 0.0, "{axis_by_axis} {together}");
     });
 }

@@ -14,11 +14,13 @@
 //! such chance looks like six, and an effect that turns them all seems sure: it sifts the sets of which the best are
 //! judged here. Not modelled: that the gyroscope sees offsets change.
 
-use nalgebra::{Cholesky, DMatrix, Dyn};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::{
     block::Block,
-    design::{Channel, Normal},
+    design::{Channel, CondensedDesign, Normal},
+    eliminated::eliminated,
     latent::Sparse,
     linear::{Judged, Linear, Sifted, log_evidence},
     noise::Noise,
@@ -28,28 +30,32 @@ use crate::recording::SensorKind;
 
 /// Ratio of scatters that are tried, and how often they are changed.
 const RATIO: f64 = 1.5;
-const STEPS: usize = 8;
+const STEPS: i32 = 8;
+
+/// All columns, as white noise and drift weigh them, and before them the gimbals' offsets at so many nodes.
+pub struct Offsets {
+    condensed: CondensedDesign,
+    count: usize,
+}
 
 impl Linear<'_> {
     /// Evidence of a sifted set; as it was sifted where no rig guides the sensor, or none that would show its offsets.
-    pub fn together(&self, sifted: Sifted) -> Option<Judged> {
+    pub fn together(&self, sifted: Sifted, offsets: &Option<Offsets>) -> Option<Judged> {
         let Sifted { set, noise, value: sifted } = sifted;
-        let fitted = self.fitted(&set);
-        let Some((normal, offsets)) = self.offset(&noise, &fitted) else {
+        let Some(Offsets { condensed, count }) = offsets else {
             return Some(Judged { set, noise, log_evidence: sifted, sifted });
         };
+        let fitted = self.fitted(&set);
+        let known: Vec<usize> = (0..*count).chain(fitted.iter().map(|id| count + id)).collect();
+        let normal = noise.normal(&condensed.picked(None, &known), known.len());
         let (baseline, groups) = (self.baseline.len(), self.groups(&set, &fitted));
-        let value = |sigma: f64| log_evidence(&without(&normal, offsets, sigma)?, &noise, baseline, &groups);
-        let mut sigma = self.usual_scatter(&noise);
-        let mut most = value(sigma)?;
-        for factor in [RATIO, 1.0 / RATIO] {
-            for _ in 0..STEPS {
-                let Some(found) = value(sigma * factor).filter(|found| *found > most) else { break };
-                (most, sigma) = (found, sigma * factor);
-            }
-        }
+        let usual = self.usual_scatter(&noise);
+        let value = |steps: i32| {
+            let without = without(&normal, *count, usual * RATIO.powi(steps))?;
+            log_evidence(&without, &noise, baseline, &groups)
+        };
         let surprise: f64 = set.iter().map(|effect| self.surprise(effect)).sum();
-        Some(Judged { set, noise, log_evidence: most - surprise, sifted })
+        Some(Judged { log_evidence: likeliest(&value)? - surprise, set, noise, sifted })
     }
 
     /// Scatter of the sensors that show it, rad.
@@ -59,11 +65,11 @@ impl Linear<'_> {
         (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp()
     }
 
-    /// Normal equations of some columns with the gimbals' offsets at nodes before them, and how many those are; `None`
-    /// where no rig guides the sensor, or nothing but a gyroscope was recorded.
-    fn offset(&self, noise: &Noise, wanted: &[usize]) -> Option<(Normal, usize)> {
+    /// The gimbals' offsets at nodes beside all columns, by a noise's white one; `None` where no rig guides the sensor, or
+    /// nothing but a gyroscope was recorded.
+    pub fn offset(&self, noise: &Noise) -> Option<Offsets> {
         let turned = self.scene.turned.of(self.scene);
-        if turned.is_empty() {
+        if turned.is_empty() || self.scene.kinds == [SensorKind::Gyr] {
             return None;
         }
         let (places, nodes) = nodes(&self.scene.blocks);
@@ -82,10 +88,8 @@ impl Linear<'_> {
                 _ => Sparse { count, rows: places.iter().enumerate().map(row).collect() },
             }
         };
-        let whitenings = self.weighing.drifting(&self.design, noise);
-        let normal = self.design.normal_beside(&whitenings, &sparse, wanted);
-        let offsets = normal.score.len() - wanted.len();
-        (offsets > 0).then_some((normal, offsets))
+        let latents = |channel: &Channel| self.weighing.drifting(channel, noise);
+        Some(Offsets { condensed: self.design.condensed_beside(&latents, &sparse, count), count })
     }
 }
 
@@ -110,22 +114,37 @@ fn nodes(blocks: &[Block]) -> (Vec<[(usize, f64); 2]>, usize) {
     (places, node + 1)
 }
 
+/// The greatest value, at steps from zero up or down as long as it grows.
+fn likeliest(value: &(dyn Fn(i32) -> Option<f64> + Sync)) -> Option<f64> {
+    let near: Vec<Option<f64>> = [0, 1, -1].par_iter().map(|step| value(*step)).collect();
+    let here = near[0]?;
+    let grows = |at: usize| near[at].filter(|found| *found > here);
+    let Some((mut most, way)) = grows(1).map(|m| (m, 1)).or(grows(2).map(|m| (m, -1))) else {
+        return Some(here);
+    };
+    for step in 2..=STEPS {
+        let Some(found) = value(way * step).filter(|found| *found > most) else { break };
+        most = found;
+    }
+    Some(most)
+}
+
 /// Normal equations with the first `count` columns integrated out, whose amounts are normal with this standard deviation.
 fn without(normal: &Normal, count: usize, sigma: f64) -> Option<Normal> {
-    let n = normal.score.len() - count;
-    let own = normal.information.view((0, 0), (count, count)) * (sigma * sigma);
-    let factor: Cholesky<f64, Dyn> = (own + DMatrix::identity(count, count)).cholesky()?;
-    let mut all = DMatrix::zeros(count, n + 1);
-    all.columns_mut(0, n).copy_from(&normal.information.view((0, count), (count, n)));
-    all.set_column(n, &normal.score.rows(0, count));
-    all *= sigma;
-    factor.l_dirty().solve_lower_triangular_mut(&mut all);
-    let less = all.tr_mul(&all);
+    let (size, n) = (normal.score.len(), normal.score.len() - count);
+    let mut all = DMatrix::zeros(size + 1, size + 1);
+    all.view_mut((0, 0), (size, size)).copy_from(&normal.information);
+    all.view_mut((0, size), (size, 1)).copy_from(&normal.score);
+    all[(size, size)] = normal.energy;
+    all.rows_mut(0, count).scale_mut(sigma);
+    all.columns_mut(0, count).scale_mut(sigma);
+    (0..count).for_each(|own| all[(own, own)] += 1.0);
+    let (left, log_determinant) = eliminated(all, count)?;
     Some(Normal {
-        information: normal.information.view((count, count), (n, n)) - less.view((0, 0), (n, n)),
-        score: normal.score.rows(count, n) - less.view((0, n), (n, 1)).column(0),
-        energy: normal.energy - less[(n, n)],
-        log_determinant: normal.log_determinant + factor.ln_determinant(),
+        information: left.view((0, 0), (n, n)).into_owned(),
+        score: left.view((0, n), (n, 1)).column(0).into_owned(),
+        energy: left[(n, n)],
+        log_determinant: normal.log_determinant + log_determinant,
     })
 }
 

@@ -12,13 +12,15 @@
 //! | σ | scatter |
 //! | K | drift: first-order Gauss–Markov processes, at knots |
 //!
-//! Woodbury's identity, twice: what stretches have in common first, the knots after it.
+//! Woodbury's identity, twice: what stretches have in common first, the knots after it. The states of a knot are all drifts
+//! but the first, and their sum: the blocks see that alone, so that few rows of the factor are long.
 
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{
+    gram,
     latent::{COURSES, Condensed, Latents, SPACING, Stretch},
     skyline::{Factor, Skyline},
 };
@@ -41,21 +43,38 @@ struct Common {
     beside: Vec<[f64; COURSES]>,
 }
 
+/// (D + σ² U Uᵀ)⁻¹ of one channel: what is the same whatever the drift.
+#[derive(Clone, Debug)]
+pub struct Still {
+    latents: Arc<Latents>,
+    commons: Vec<Common>,
+    log_determinant: f64,
+}
+
+/// Columns that are weighed so.
+#[derive(Clone, Debug)]
+pub struct Stilled {
+    /// What weighs them.
+    pub still: Arc<Still>,
+    /// Xᵀ (D + σ² U Uᵀ)⁻¹ X.
+    plain: DMatrix<f64>,
+    /// Xᵀ (D + σ² U Uᵀ)⁻¹ Z, a column a knot.
+    knots: DMatrix<f64>,
+}
+
 /// Σ⁻¹ of one channel.
 #[derive(Clone, Debug)]
 pub struct Whitening {
-    latents: Arc<Latents>,
-    commons: Vec<Common>,
+    still: Arc<Still>,
     processes: usize,
     factor: Option<Factor>,
     /// Natural logarithm of Σ's determinant, over blocks with a weight.
     pub log_determinant: f64,
 }
 
-impl Whitening {
-    /// From what blocks have in common, the scatter of that, and drifts. Drifts that make the matrix indefinite by
-    /// rounding are left out.
-    pub fn new(latents: Arc<Latents>, scatter: f64, drifts: &[Process]) -> Self {
+impl Still {
+    /// From what blocks have in common, and the scatter of that.
+    pub fn new(latents: Arc<Latents>, scatter: f64) -> Self {
         let mut log_determinant = latents.log_determinant;
         let mut common = |stretch| {
             let (common, share) = Common::new(stretch, scatter);
@@ -63,104 +82,21 @@ impl Whitening {
             common
         };
         let commons = latents.stretches.iter().map(&mut common).collect();
-        let mut whitening = Self { latents, commons, processes: drifts.len(), factor: None, log_determinant };
-        whitening.factor = whitening.factorise(drifts);
-        if let Some(factor) = &whitening.factor {
-            whitening.log_determinant += factor.log_determinant;
-            for drift in drifts {
-                let steps = (whitening.latents.knots - 1) as f64;
-                whitening.log_determinant += steps * innovation(drift).ln() + 2.0 * drift.sigma.ln();
-            }
-        }
-        whitening
+        Self { latents, commons, log_determinant }
     }
 
-    /// What the blocks have in common.
-    pub fn latents(&self) -> &Arc<Latents> {
-        &self.latents
+    /// Columns that were condensed from the same blocks.
+    pub fn weighed(self: &Arc<Self>, x: &Condensed) -> Stilled {
+        let (along, knots) = self.shared(x);
+        let plain = gram::with_product(x.plain.clone(), -1.0, &along, &along.transpose());
+        Stilled { still: Arc::clone(self), plain, knots }
     }
 
     fn common(&self) -> impl Iterator<Item = (&Stretch, &Common)> {
         self.latents.stretches.iter().zip(&self.commons)
     }
 
-    fn factorise(&self, drifts: &[Process]) -> Option<Factor> {
-        let (p, count) = (self.processes, self.latents.knots);
-        if p == 0 {
-            return None;
-        }
-        let mut first: Vec<usize> = (0..count * p).map(|state| (state / p).saturating_sub(1) * p).collect();
-        for (Stretch { base, beside, .. }, _) in self.common() {
-            for reach in &mut first[base * p..(base + beside.len()) * p] {
-                *reach = (*reach).min(base * p);
-            }
-        }
-        let mut matrix = Skyline::new(first);
-        for (process, drift) in drifts.iter().enumerate() {
-            let (kept, q) = (libm::exp(-SPACING / drift.time), innovation(drift));
-            for knot in 0..count {
-                let inner = if knot == 0 || knot + 1 == count { 1.0 } else { 1.0 + kept * kept };
-                matrix.add(knot * p + process, knot * p + process, inner / q);
-                if knot > 0 {
-                    matrix.add(knot * p + process, (knot - 1) * p + process, -kept / q);
-                }
-            }
-        }
-        let mut spread = |a: usize, b: usize, value: f64| {
-            for (i, j) in (0..p).flat_map(|i| (0..p).map(move |j| (i, j))) {
-                let (row, column) = (a * p + i, b * p + j);
-                // Each pair once: the matrix mirrors what is off its diagonal.
-                if row >= column {
-                    matrix.add(row, column, value);
-                }
-            }
-        };
-        for (knot, (own, next)) in self.latents.between.iter().enumerate() {
-            spread(knot, knot, *own);
-            if knot + 1 < count {
-                spread(knot + 1, knot, *next);
-            }
-        }
-        for (Stretch { base, .. }, Common { beside, .. }) in self.common() {
-            for (i, one) in beside.iter().enumerate() {
-                for (j, other) in beside.iter().enumerate().take(i + 1) {
-                    let both: f64 = one.iter().zip(other).map(|(a, b)| a * b).sum();
-                    spread(base + i, base + j, -both);
-                }
-            }
-        }
-        matrix.factorised()
-    }
-
-    /// Xᵀ Σ⁻¹ X of columns that were condensed from the same blocks.
-    pub fn products(&self, x: &Condensed) -> DMatrix<f64> {
-        self.less(x, &self.latent(x))
-    }
-
-    /// Xᵀ Σ⁻¹ X of condensed columns, given what they show of all but white noise.
-    pub fn less(&self, x: &Condensed, latent: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut products = x.plain.clone();
-        products.gemm(-1.0, latent, &latent.transpose(), 1.0);
-        products
-    }
-
-    /// What condensed columns show of all but white noise, Bᵀ and Yᵀ: a row a column.
-    pub fn latent(&self, x: &Condensed) -> DMatrix<f64> {
-        let (n, courses) = (x.plain.ncols(), self.latents.courses);
-        let (along, knots) = self.shared(x);
-        let states = self.factor.as_ref().map_or(0, |_| self.latents.knots * self.processes);
-        let mut latent = DMatrix::zeros(n, courses + states);
-        latent.columns_mut(0, courses).copy_from(&along);
-        if let Some(factor) = &self.factor {
-            for state in 0..states {
-                latent.set_column(courses + state, &knots.column(state / self.processes));
-            }
-            factor.forward(&mut latent.as_mut_slice()[courses * n..], n);
-        }
-        latent
-    }
-
-    /// B, and Zᵀ (D + σ² U Uᵀ)⁻¹ X; columns as in those condensed.
+    /// Bᵀ, and Xᵀ (D + σ² U Uᵀ)⁻¹ Z; a row a column.
     fn shared(&self, x: &Condensed) -> (DMatrix<f64>, DMatrix<f64>) {
         let mut along = DMatrix::zeros(x.along.nrows(), self.latents.courses);
         let mut knots = x.beside.clone();
@@ -177,23 +113,139 @@ impl Whitening {
         }
         (along, knots)
     }
+}
+
+impl Whitening {
+    /// From what blocks have in common, the scatter of that, and drifts. Drifts that make the matrix indefinite by
+    /// rounding are left out.
+    pub fn new(latents: Arc<Latents>, scatter: f64, drifts: &[Process]) -> Self {
+        Self::drifting(Arc::new(Still::new(latents, scatter)), drifts)
+    }
+
+    /// With drifts beside all else. Those that make the matrix indefinite by rounding are left out.
+    pub fn drifting(still: Arc<Still>, drifts: &[Process]) -> Self {
+        let log_determinant = still.log_determinant;
+        let mut whitening = Self { still, processes: drifts.len(), factor: None, log_determinant };
+        whitening.factor = whitening.factorise(drifts);
+        if let Some(factor) = &whitening.factor {
+            whitening.log_determinant += factor.log_determinant;
+            for drift in drifts {
+                let steps = (whitening.latents().knots - 1) as f64;
+                whitening.log_determinant += steps * innovation(drift).ln() + 2.0 * drift.sigma.ln();
+            }
+        }
+        whitening
+    }
+
+    /// What the blocks have in common.
+    pub fn latents(&self) -> &Arc<Latents> {
+        &self.still.latents
+    }
+
+    fn factorise(&self, drifts: &[Process]) -> Option<Factor> {
+        let (p, count) = (self.processes, self.latents().knots);
+        if p == 0 {
+            return None;
+        }
+        let sum = |knot: usize| knot * p + p - 1;
+        let mut first: Vec<usize> = (0..count * p).map(|state| (state / p).saturating_sub(1) * p).collect();
+        for (Stretch { base, beside, .. }, _) in self.still.common() {
+            for knot in *base..base + beside.len() {
+                let reach = &mut first[sum(knot)];
+                *reach = (*reach).min(base * p);
+            }
+        }
+        let mut matrix = Skyline::new(first);
+        for (process, drift) in drifts.iter().enumerate() {
+            let (kept, q) = (libm::exp(-SPACING / drift.time), innovation(drift));
+            for knot in 0..count {
+                let inner = if knot == 0 || knot + 1 == count { 1.0 } else { 1.0 + kept * kept };
+                for (row, signed) in parts(process, p) {
+                    for (column, also) in parts(process, p) {
+                        let (row, column, sign) = (knot * p + row, knot * p + column, signed * also);
+                        // Each pair once: the matrix mirrors what is off its diagonal.
+                        if row >= column {
+                            matrix.add(row, column, sign * inner / q);
+                        }
+                        if knot > 0 {
+                            matrix.add(row, column - p, -sign * kept / q);
+                        }
+                    }
+                }
+            }
+        }
+        for (knot, (own, next)) in self.latents().between.iter().enumerate() {
+            matrix.add(sum(knot), sum(knot), *own);
+            if knot + 1 < count {
+                matrix.add(sum(knot + 1), sum(knot), *next);
+            }
+        }
+        for (Stretch { base, .. }, Common { beside, .. }) in self.still.common() {
+            for (i, one) in beside.iter().enumerate() {
+                for (j, other) in beside.iter().enumerate().take(i + 1) {
+                    let both: f64 = one.iter().zip(other).map(|(a, b)| a * b).sum();
+                    matrix.add(sum(base + i), sum(base + j), -both);
+                }
+            }
+        }
+        matrix.factorised()
+    }
+
+    /// Xᵀ Σ⁻¹ X of columns that were condensed from the same blocks.
+    pub fn products(&self, x: &Condensed) -> DMatrix<f64> {
+        self.stilled_products(&self.still.weighed(x))
+    }
+
+    /// Xᵀ Σ⁻¹ X of columns that are weighed but for the drifts.
+    pub fn stilled_products(&self, x: &Stilled) -> DMatrix<f64> {
+        let drifts = self.drifts(&x.knots);
+        gram::with_product(x.plain.clone(), -1.0, &drifts, &drifts.transpose())
+    }
+
+    /// Xᵀ Σ⁻¹ X of condensed columns, given what they show of all but white noise.
+    pub fn less(&self, x: &Condensed, latent: &DMatrix<f64>) -> DMatrix<f64> {
+        gram::with_product(x.plain.clone(), -1.0, latent, &latent.transpose())
+    }
+
+    /// What condensed columns show of all but white noise, Bᵀ and Yᵀ: a row a column.
+    pub fn latent(&self, x: &Condensed) -> DMatrix<f64> {
+        let (along, knots) = self.still.shared(x);
+        let drifts = self.drifts(&knots);
+        let mut latent = DMatrix::zeros(x.plain.ncols(), along.ncols() + drifts.ncols());
+        latent.columns_mut(0, along.ncols()).copy_from(&along);
+        latent.columns_mut(along.ncols(), drifts.ncols()).copy_from(&drifts);
+        latent
+    }
+
+    /// Yᵀ, of what columns show at the knots: a row a column.
+    fn drifts(&self, knots: &DMatrix<f64>) -> DMatrix<f64> {
+        let (n, p) = (knots.nrows(), self.processes);
+        let Some(factor) = &self.factor else { return DMatrix::zeros(n, 0) };
+        let mut states = DMatrix::zeros(n, knots.ncols() * p);
+        for (knot, values) in knots.column_iter().enumerate() {
+            states.set_column((knot + 1) * p - 1, &values);
+        }
+        factor.forward(states.as_mut_slice(), n);
+        states
+    }
 
     /// Σ⁻¹ x of one column over the blocks: what white noise alone leaves of it, less what it shows of all else.
     pub fn apply(&self, x: &[f64], out: &mut [f64]) {
-        let Latents { weights, places, knots, .. } = &*self.latents;
+        let Latents { weights, places, knots, .. } = &**self.latents();
         let (along, beside) =
-            self.shared(&self.latents.condensed(&DMatrix::from_column_slice(x.len(), 1, x)));
+            self.still.shared(&self.latents().condensed(&DMatrix::from_column_slice(x.len(), 1, x)));
         let mut drift = vec![0.0; *knots];
         if let Some(factor) = &self.factor {
             let p = self.processes;
-            let mut states: Vec<f64> = beside.iter().flat_map(|knot| std::iter::repeat_n(*knot, p)).collect();
+            let mut states = vec![0.0; *knots * p];
+            states.iter_mut().skip(p - 1).step_by(p).zip(&beside).for_each(|(state, knot)| *state = *knot);
             factor.solve(&mut states);
-            drift.iter_mut().zip(states.chunks_exact(p)).for_each(|(knot, state)| *knot = state.iter().sum());
+            drift.iter_mut().zip(states.iter().skip(p - 1).step_by(p)).for_each(|(knot, sum)| *knot = *sum);
         }
         for (out, (x, (knot, share))) in out.iter_mut().zip(x.iter().zip(places)) {
             *out = x - drift[*knot] * (1.0 - share) - drift[knot + 1] * share;
         }
-        for (stretch, common) in self.common() {
+        for (stretch, common) in self.still.common() {
             let shown = |course: usize| {
                 let drifts = common.beside.iter().zip(&drift[stretch.base..]);
                 let drift: f64 = drifts.map(|(beside, drift)| beside[course] * drift).sum();
@@ -219,6 +271,13 @@ impl Common {
         let beside = stretch.beside.iter().map(|beside| (scaled * Vector3::from(*beside)).into()).collect();
         (Self { scaled, beside }, 2.0 * lower.diagonal().iter().map(|a| a.ln()).sum::<f64>())
     }
+}
+
+/// A drift as a sum of the `count` states of a knot, by their places and signs: the first is what the others leave of the
+/// sum.
+fn parts(process: usize, count: usize) -> impl Iterator<Item = (usize, f64)> {
+    let states = if process == 0 { 0..count } else { process - 1..process };
+    states.map(move |state| (state, if process == 0 && state + 1 < count { -1.0 } else { 1.0 }))
 }
 
 /// Variance of what is new in a process from one knot to the next.
