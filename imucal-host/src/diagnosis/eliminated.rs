@@ -23,8 +23,9 @@ pub fn eliminated(mut matrix: DMatrix<f64>, count: usize) -> Option<(DMatrix<f64
         let to = (from + WIDTH).min(count);
         let factor = matrix.view((from, from), (to - from, to - from)).into_owned().cholesky()?;
         log_determinant += factor.ln_determinant();
-        let mut row = matrix.view((from, to), (to - from, size - to)).into_owned();
-        factor.l_dirty().solve_lower_triangular_mut(&mut row);
+        // Its inverse, so that the long rows are multiplied.
+        let inverse = factor.l().solve_lower_triangular(&DMatrix::identity(to - from, to - from))?;
+        let row = inverse * matrix.view((from, to), (to - from, size - to));
         let column = row.transpose();
         // Above the diagonal, and the squares on it.
         for first in (to..size).step_by(WIDTH) {

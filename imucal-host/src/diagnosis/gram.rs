@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 /// Columns that are multiplied at a time: far more than a kernel's, far fewer than a menu of shapes has.
-const WIDTH: usize = 48;
+const WIDTH: usize = 96;
 
 /// C + α A B, where both C and A B are symmetric.
 pub fn with_product(mut c: DMatrix<f64>, alpha: f64, a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {

@@ -69,6 +69,7 @@ pub struct Linear<'s> {
     normals: Latest<Noise, Normal>,
     condensed: Latest<White, CondensedDesign>,
     offsets: Latest<White, Option<Offsets>>,
+    projected: Latest<Noise, Option<(Projected, Vec<usize>)>>,
 }
 
 /// White noise of each sensor at rest and in motion, by axis.
@@ -161,6 +162,7 @@ impl<'s> Linear<'s> {
             normals: Latest::default(),
             condensed: Latest::default(),
             offsets: Latest::default(),
+            projected: Latest::default(),
         }
     }
 
@@ -306,11 +308,13 @@ impl<'s> Linear<'s> {
         self.offsets.get(white(noise), || self.offset(noise))
     }
 
-    /// Scores of all columns but the baseline's, with the baseline projected out.
-    pub fn projected(&self, noise: &Noise) -> Option<(Projected, Vec<usize>)> {
-        let every = 0..self.design.columns.len();
-        let others: Vec<usize> = every.filter(|id| !self.baseline.contains(id)).collect();
-        Some((Projected::new(&self.normal(noise), &self.baseline, &others)?, others))
+    /// Scores of all columns but the baseline's, with the baseline projected out, and those columns.
+    pub fn projected(&self, noise: &Noise) -> Arc<Option<(Projected, Vec<usize>)>> {
+        self.projected.get(noise.clone(), || {
+            let every = 0..self.design.columns.len();
+            let others: Vec<usize> = every.filter(|id| !self.baseline.contains(id)).collect();
+            Some((Projected::new(&self.normal(noise), &self.baseline, &others)?, others))
+        })
     }
 
     /// Candidates by ln BF of a set with each of them added, best first; the set itself has the value returned beside.
@@ -337,7 +341,8 @@ impl<'s> Linear<'s> {
         additions: &[[&'static Effect; N]],
         noise: &Noise,
     ) -> Option<(f64, Vec<f64>)> {
-        let (projected, others) = self.projected(noise)?;
+        let projected = self.projected(noise);
+        let (projected, others) = projected.as_ref().as_ref()?;
         let places = |effect: &&'static Effect| -> Vec<usize> {
             (0..others.len()).filter(|at| self.design.columns[others[*at]].is_of(effect)).collect()
         };
@@ -349,7 +354,7 @@ impl<'s> Linear<'s> {
         };
         let surprise =
             |more: &[&'static Effect]| more.iter().map(|effect| self.surprise(effect)).sum::<f64>();
-        Some((value(&[]), additions.iter().map(|more| value(more) - surprise(more)).collect()))
+        Some((value(&[]), additions.par_iter().map(|more| value(more) - surprise(more)).collect()))
     }
 }
 

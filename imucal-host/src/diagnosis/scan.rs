@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::{
     candidates::{Candidates, is_shaped},
     design::Design,
@@ -45,8 +47,8 @@ impl<'s> Scan<'s> {
         &self,
         beside: &Beside<'_>,
         noise: &Noise,
-        spread: &dyn Fn(usize) -> f64,
-        kept: &dyn Fn(usize) -> Option<Shaped>,
+        spread: &(dyn Fn(usize) -> f64 + Sync),
+        kept: &(dyn Fn(usize) -> Option<Shaped> + Sync),
     ) -> Option<Vec<Shaped>> {
         let (scene, design) = (self.scene, beside.design);
         let whitenings = beside.weighing.whitenings(design, noise);
@@ -74,6 +76,6 @@ impl<'s> Scan<'s> {
                 None => Some(Shaped::alone(effect.neutral(scene.duration()))),
             }
         };
-        self.candidates.effects.iter().enumerate().map(shape).collect()
+        self.candidates.effects.par_iter().enumerate().map(shape).collect()
     }
 }

@@ -256,11 +256,9 @@ fn swings(
     let interval = (time[time.len() - 1] - time[0]) / (time.len().max(2) - 1) as f64;
     // What hardly moves does so slowly: more readings tell its rate.
     let patient = ((WINDOW / interval).round() as usize).max(reach);
-    let mut swings = Vec::with_capacity(time.len());
-    for row in 0..time.len() {
+    let of = |row: usize| {
         if !moving[row] {
-            swings.push(swing(time, angles, row, patient));
-            continue;
+            return (swing(time, angles, row, patient), false);
         }
         let near = swing(time, angles, row, reach);
         let wide = swing(time, angles, row, reach + 1);
@@ -269,11 +267,12 @@ fn swings(
             let apart = (near[gimbal].rate - wide[gimbal].rate).abs();
             apart > JERK + NOISES * noise[gimbal] / interval
         });
-        if jerked {
-            let to = (row + reach + 1).min(known.len());
-            known[row.saturating_sub(reach)..to].fill(false);
-        }
-        swings.push(near);
+        (near, jerked)
+    };
+    let (swings, jerked): (Vec<[Swing; 3]>, Vec<bool>) = (0..time.len()).into_par_iter().map(of).unzip();
+    for (row, _) in jerked.iter().enumerate().filter(|(_, jerked)| **jerked) {
+        let to = (row + reach + 1).min(known.len());
+        known[row.saturating_sub(reach)..to].fill(false);
     }
     (swings, known)
 }
