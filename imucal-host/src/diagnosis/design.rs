@@ -367,13 +367,17 @@ pub fn append(
     ids: &mut Vec<usize>,
     data: &mut Vec<f64>,
 ) {
-    for (id, signature) in signatures.iter().enumerate() {
-        if let Some(values) = &signature.borrow()[kind as usize]
-            && values.iter().any(|v| v[axis] != 0.0)
-        {
-            ids.push(first + id);
-            data.extend(values.iter().map(|v| v[axis]));
-        }
+    let along = |(id, signature)| {
+        let means: &Means = Borrow::borrow(signature);
+        let values = means[kind as usize].as_ref()?;
+        values.iter().any(|v| v[axis] != 0.0).then_some((first + id, values))
+    };
+    let reaching: Vec<(usize, &Vec<Vector3<f64>>)> =
+        signatures.iter().enumerate().filter_map(along).collect();
+    data.reserve(reaching.iter().map(|(_, values)| values.len()).sum());
+    for (id, values) in reaching {
+        ids.push(id);
+        data.extend(values.iter().map(|v| v[axis]));
     }
 }
 

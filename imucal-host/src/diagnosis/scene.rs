@@ -9,7 +9,7 @@ use std::{
 };
 
 use imucal_core::triad::Triad;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{
@@ -22,10 +22,7 @@ use super::{
 use crate::{
     effect::{Act, Effect, Input, Parameter, Role, Swing, Truth},
     recording::{Recording, SensorKind},
-    simulator::{
-        Dose, Recorded,
-        chain::{Chain, inputs},
-    },
+    simulator::{Dose, Recorded, chain::Chain},
 };
 
 /// Nodes of signatures are this far apart in motion, s; where no rig guides the sensor, which moves briskly then, the
@@ -187,7 +184,7 @@ impl<'a> Scene<'a> {
     }
 
     fn inputs(&self, doses: &[Dose], nodes: &Nodes) -> Vec<Input> {
-        Chain::new(doses).inputs(self.motion.steady(), &nodes.times, &Matrix3::identity())
+        Chain::new(doses).inputs(self.motion.steady(), &nodes.times)
     }
 
     /// The truth in the middle of each block, without any effect.
@@ -204,7 +201,7 @@ impl<'a> Scene<'a> {
     /// What the simulator puts out at each row, by sensor. `None` where a triad is singular.
     pub fn simulated(&self, doses: &[Dose]) -> Option<Vec<(SensorKind, Vec<Vector3<f64>>)>> {
         let chain = Chain::new(doses);
-        let input = chain.inputs(self.motion, &self.recording.time, &Matrix3::identity());
+        let input = chain.inputs(self.motion, &self.recording.time);
         let of =
             |kind: &SensorKind| Some((*kind, chain.output(*kind, &self.triads[*kind as usize], &input)?));
         self.kinds.par_iter().map(of).collect()
@@ -254,7 +251,7 @@ impl<'a> Scene<'a> {
     /// A run that signatures are taken against.
     pub fn reference<'s>(&'s self, doses: Vec<Dose>, nodes: &'s Nodes) -> Option<Reference<'s>> {
         let truth = self.truth(&doses, nodes);
-        let input = inputs(&truth, &Matrix3::identity());
+        let input: Vec<Input> = truth.iter().map(Input::of).collect();
         let outputs = self.outputs(&doses, &SensorKind::ALL, &input)?;
         Some(Reference { scene: self, nodes, doses, truth, input, outputs, known: Known::default() })
     }
@@ -334,7 +331,7 @@ impl Reference<'_> {
                 let altered = |row: &Truth| {
                     let mut row = *row;
                     alter(values, &mut row);
-                    Input::of(&row, &Matrix3::identity())
+                    Input::of(&row)
                 };
                 let input: Vec<Input> = self.truth.par_iter().map(altered).collect();
                 self.scene.outputs(&doses, effect.sensors, &input)?

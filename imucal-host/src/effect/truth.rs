@@ -75,15 +75,27 @@ impl Input {
         (0..rows).map(row).collect()
     }
 
-    /// The truth as a unit sees it that is turned on the table; `c_t_q` takes the table's components to its own.
-    pub fn of(truth: &Truth, c_t_q: &Matrix3<f64>) -> Self {
+    /// The truth as a unit sees it that stands on the table as the table's axes do.
+    pub fn of(truth: &Truth) -> Self {
         Self {
             time: truth.time,
             temperature: truth.temperature,
-            f_q: c_t_q * truth.f_t,
-            w_iq_q: c_t_q * truth.w_it_t,
-            dw_iq_q: c_t_q * truth.dw_it_t,
-            b_q: c_t_q * truth.b_t,
+            f_q: truth.f_t,
+            w_iq_q: truth.w_it_t,
+            dw_iq_q: truth.dw_it_t,
+            b_q: truth.b_t,
+        }
+    }
+
+    /// As a unit sees it that is turned on the table; `c_t_q` takes the table's components to its own.
+    #[must_use]
+    pub fn turned(&self, c_t_q: &Matrix3<f64>) -> Self {
+        Self {
+            f_q: c_t_q * self.f_q,
+            w_iq_q: c_t_q * self.w_iq_q,
+            dw_iq_q: c_t_q * self.dw_iq_q,
+            b_q: c_t_q * self.b_q,
+            ..*self
         }
     }
 }

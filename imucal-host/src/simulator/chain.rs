@@ -1,7 +1,7 @@
 //! The chain from a movement to a unit's samples, with effects at their places.
 
 use imucal_core::triad::Triad;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{dose::Dose, recent::Recent, truth::Motion};
@@ -31,9 +31,9 @@ impl<'a> Chain<'a> {
         times.par_iter().map_init(Recent::default, row).collect()
     }
 
-    /// The rows as a unit is given them that is turned on the table; `c_t_q` takes the table's components to its own.
-    pub fn inputs(&self, motion: &dyn Motion, times: &[f64], c_t_q: &Matrix3<f64>) -> Vec<Input> {
-        let row = |recent: &mut Recent, time: &f64| Input::of(&self.row(motion, *time, recent), c_t_q);
+    /// The rows as a unit is given them whose axes are the table's.
+    pub fn inputs(&self, motion: &dyn Motion, times: &[f64]) -> Vec<Input> {
+        let row = |recent: &mut Recent, time: &f64| Input::of(&self.row(motion, *time, recent));
         times.par_iter().map_init(Recent::default, row).collect()
     }
 
@@ -109,9 +109,4 @@ impl<'a> Chain<'a> {
             }
         }
     }
-}
-
-/// The rows as a unit on the table is given them.
-pub fn inputs(rows: &[Truth], c_t_q: &Matrix3<f64>) -> Vec<Input> {
-    rows.par_iter().map(|row| Input::of(row, c_t_q)).collect()
 }

@@ -1,10 +1,11 @@
 //! A recording of the flight motion simulator: programme, unit, effects and a seed.
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use super::{
     SimulationError,
-    chain::{Chain, inputs},
+    chain::Chain,
     conditions::Conditions,
     dose::Dose,
     programme::{Programme, Schedule, wrap},
@@ -13,7 +14,7 @@ use super::{
     unit::{TriadUnderTest, UnitKind, UnitUnderTest},
 };
 use crate::{
-    effect::{Effect, SignalRun, Truth},
+    effect::{Effect, Input, SignalRun, Truth},
     recording::{
         Manifest, Recording, SensorKind, Unit,
         manifest::{Axis, Identity, PerSensor, Site},
@@ -128,7 +129,7 @@ impl Simulation {
         let rows = (schedule.duration() * self.rate).floor() as usize;
         let time: Vec<f64> = (0..rows).map(|k| k as f64 / self.rate).collect();
         let truth = chain.truth(&schedule, &time);
-        let input = inputs(&truth, &unit.c_t_q);
+        let input: Vec<Input> = truth.par_iter().map(|row| Input::of(row).turned(&unit.c_t_q)).collect();
         let mut random = Random::new(self.seed, Purpose::Noise);
         let manifest = self.manifest(&schedule, &unit);
         let mut recording = Recording::new(name, manifest.clone(), time);
