@@ -105,13 +105,19 @@ impl Candidates {
         self.baseline.iter().any(|term| std::ptr::eq(*term, effect))
     }
 
+    /// Whether an effect was taken out of the baseline.
+    pub fn was_taken_out(&self, effect: &Effect) -> bool {
+        self.taken_out.iter().any(|taken| std::ptr::eq(*taken, effect))
+    }
+
     /// Terms of triads that a calibration made elsewhere gives, of the sensors that an effect reaches.
     pub fn given_beside(&self, effect: &Effect) -> Vec<&'static Effect> {
         let stands_for =
             |term: &Effect| is_triad_term(term, &SensorKind::ALL) || ELSEWHERE.contains(&term.id.as_str());
         let is_given = |term: &&&'static Effect| {
-            let is_taken_out = self.taken_out.iter().any(|taken| std::ptr::eq(*taken, **term));
-            stands_for(term) && !is_taken_out && term.sensors.iter().all(|kind| effect.sensors.contains(kind))
+            stands_for(term)
+                && !self.was_taken_out(term)
+                && term.sensors.iter().all(|kind| effect.sensors.contains(kind))
         };
         if stands_for(effect) { Vec::new() } else { self.effects.iter().filter(is_given).copied().collect() }
     }

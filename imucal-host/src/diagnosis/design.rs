@@ -92,12 +92,6 @@ pub struct Normal {
     pub log_determinant: f64,
 }
 
-/// Normal equations of a channel, and the places of its columns among all.
-struct Part {
-    normal: Normal,
-    ids: Vec<usize>,
-}
-
 impl Normal {
     /// Of `size` columns, before any channel.
     pub fn zeros(size: usize) -> Self {
@@ -260,10 +254,12 @@ impl Design {
         let part = |(channel, whitening): (&Channel, &Whitening)| {
             let (from, ids) = places(&channel.ids, wanted);
             let columns = whitening.latents().condensed(&channel.gathered(&from));
-            Part { normal: Normal::of(&columns, whitening), ids }
+            (Normal::of(&columns, whitening), ids)
         };
-        let parts: Vec<Part> = self.channels.par_iter().zip(whitenings).map(part).collect();
-        sum(wanted.len(), &parts)
+        let parts: Vec<(Normal, Vec<usize>)> = self.channels.par_iter().zip(whitenings).map(part).collect();
+        let mut normal = Normal::zeros(wanted.len());
+        parts.iter().for_each(|(part, ids)| normal.add(part, ids));
+        normal
     }
 
     /// All columns and before them `count` sparse ones, which a channel may have, given what its blocks have in common.
@@ -329,13 +325,6 @@ impl CondensedDesign {
         parts.iter().zip(&self.channels).for_each(|(part, channel)| normal.add(part, &channel.ids));
         normal
     }
-}
-
-/// Normal equations of all channels, of so many columns.
-fn sum(size: usize, parts: &[Part]) -> Normal {
-    let mut normal = Normal::zeros(size);
-    parts.iter().for_each(|part| normal.add(&part.normal, &part.ids));
-    normal
 }
 
 /// Which of a channel's columns are wanted, by their place among `ids`, and the places of these among the wanted.

@@ -5,16 +5,16 @@
 //! Bᵀ C  →  C − Bᵀ A⁻¹ B, ln|A|
 //! ```
 //!
-//! Right-looking Cholesky: G. Golub, C. Van Loan, Matrix Computations (4th ed.), 4.2.9. nalgebra's factor goes column by
-//! column, at a quarter of the pace.
+//! Right-looking Cholesky: G. Golub, C. Van Loan, Matrix Computations (4th ed.), 4.2.9. nalgebra's factor is none of a part,
+//! and goes column by column.
 
 use nalgebra::DMatrix;
 
 /// Columns that are eliminated at a time.
 const WIDTH: usize = 48;
 
-/// What is left without the first `count` rows and columns, and ln of the determinant of their block; `None` where that is
-/// not positive definite.
+/// What is left of a symmetric matrix without the first `count` rows and columns, and ln of the determinant of their block;
+/// `None` where that is not positive definite.
 pub fn eliminated(mut matrix: DMatrix<f64>, count: usize) -> Option<(DMatrix<f64>, f64)> {
     let size = matrix.ncols();
     let mut log_determinant = 0.0;

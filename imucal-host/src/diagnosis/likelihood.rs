@@ -85,3 +85,71 @@ pub fn restricted(normal: &Normal) -> f64 {
     let explained = normal.score.dot(&factor.solve(&normal.score));
     normal.log_determinant + factor.ln_determinant() - n as f64 * prior.ln() + normal.energy - explained
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::{
+        super::{
+            design::{Channel, Design},
+            latent::{Latents, Shared},
+        },
+        *,
+    };
+
+    const BLOCKS: usize = 30;
+    const COURSE: f64 = 0.4;
+
+    fn time(block: usize) -> f64 {
+        2.5 * block as f64
+    }
+
+    /// Two axes with two columns each: blocks as far apart as knots, so that drifts are what their knots are.
+    fn design() -> Design {
+        let channel = |axis: usize| {
+            let x = DMatrix::from_fn(BLOCKS, 2, |block, at| ((block * (at + 2) + axis) as f64).cos());
+            let y = DVector::from_fn(BLOCKS, |block, _| ((block * block + 5 * axis) as f64).sin());
+            Channel { kind: SensorKind::Mag, axis, ids: vec![axis, 2], x, y }
+        };
+        Design { columns: Vec::new(), size: 3, channels: vec![channel(0), channel(1)] }
+    }
+
+    /// By its definition.
+    fn expected(scatter: f64, drifts: &[Process; 2]) -> f64 {
+        let sigma = DMatrix::from_fn(BLOCKS, BLOCKS, |a, b| {
+            let drift =
+                |drift: &Process| drift.sigma.powi(2) * (-(time(a) - time(b)).abs() / drift.time).exp();
+            let shared = if a < 9 && b < 9 { (scatter * COURSE).powi(2) } else { 0.0 };
+            let white = if a == b { 0.5 } else { 0.0 };
+            white + shared + drifts.iter().map(drift).sum::<f64>()
+        });
+        let factor = sigma.cholesky().unwrap();
+        let (mut normal, design) = (Normal::zeros(3), design());
+        for channel in &design.channels {
+            let (x, y) = (factor.solve(&channel.x), factor.solve(&channel.y));
+            let part = Normal {
+                information: channel.x.tr_mul(&x),
+                score: channel.x.tr_mul(&y),
+                energy: channel.y.dot(&y),
+                log_determinant: factor.ln_determinant(),
+            };
+            normal.add(&part, &channel.ids);
+        }
+        restricted(&normal)
+    }
+
+    #[test]
+    fn it_is_that_of_its_definition_in_whatever_order_noises_are_asked_for() {
+        let times: Vec<f64> = (0..BLOCKS).map(time).collect();
+        let shared = [Shared { blocks: 0..9, courses: vec![vec![COURSE; 9]] }];
+        let condensed = design().condensed(&|_| Latents::new(&times, vec![2.0; BLOCKS], &shared));
+        let likelihood = Likelihood::new(&condensed, SensorKind::Mag, &[0, 1, 2]);
+        let asked = [(0.3, 1.0), (2.0, 1.0), (0.3, 4.0), (0.3, 1.0), (2.0, 0.1), (2.0, 1.0)];
+        for (scatter, sigma) in asked {
+            let drifts = [Process { time: 8.0, sigma: 0.7 }, Process { time: 120.0, sigma }];
+            let (found, expected) = (likelihood.of(scatter, drifts), expected(scatter, &drifts));
+            assert!((found - expected).abs() < 1e-7, "{scatter} {sigma}: {found} {expected}");
+        }
+    }
+}

@@ -279,7 +279,7 @@ impl<'s> Linear<'s> {
     /// −ln of an effect's prior: one of the candidates, in one of its shapes or such as are as likely. What was taken out of
     /// the baseline is no surprise.
     pub fn surprise(&self, effect: &Effect) -> f64 {
-        if self.candidates.taken_out.iter().any(|term| std::ptr::eq(*term, effect)) {
+        if self.candidates.was_taken_out(effect) {
             return 0.0;
         }
         let at = self.candidates.effects.iter().position(|other| std::ptr::eq(*other, effect));

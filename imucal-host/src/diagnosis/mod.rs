@@ -23,7 +23,7 @@ mod gram;
 pub mod hand;
 pub mod latent;
 mod latest;
-mod likelihood;
+pub mod likelihood;
 pub mod linear;
 pub mod model;
 mod moves;

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! A. George, J. Liu, Computer Solution of Large Sparse Positive Definite Systems (1981), ch. 4. nalgebra's sparse
-//! factor lacks the envelope, and a dense one costs a hundred times more here.
+//! factor lacks the envelope, and a dense one would be zeros for the most part.
 
 /// A symmetric matrix of which each row is kept from its first entry to the diagonal.
 #[derive(Clone, Debug)]

@@ -32,7 +32,7 @@ use crate::recording::SensorKind;
 const RATIO: f64 = 1.5;
 const STEPS: i32 = 8;
 
-/// All columns, as white noise and drift weigh them, and before them the gimbals' offsets at so many nodes.
+/// All columns, as white noise weighs them, and before them the gimbals' offsets at so many nodes.
 pub struct Offsets {
     condensed: CondensedDesign,
     count: usize,
