@@ -18,7 +18,7 @@ use crate::{
         pose,
     },
     recording::{Recording, Triple, unit::STANDARD_GRAVITY},
-    simulator::truth::EARTH_RATE,
+    simulator::place::EARTH_RATE,
 };
 
 /// How far into a still stretch a motion reaches, s; to its middle where that is nearer.

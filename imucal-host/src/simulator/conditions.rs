@@ -1,7 +1,7 @@
 //! What a recording is made under: where, how noisy, how exactly the gimbals stand.
 
 use super::{
-    truth::Place,
+    place::Place,
     unit::{DriftKind, UnitUnderTest},
 };
 use crate::recording::SensorKind;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{gimbal::base, truth::Place};
+use super::{gimbal::base, place::Place};
 use crate::effect::Machine;
 
 /// What the last row was asked for, and what it was answered.

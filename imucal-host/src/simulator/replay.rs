@@ -16,8 +16,9 @@ use rayon::prelude::*;
 
 use super::{
     gimbal::{Pose, direction, pose},
+    place::Place,
     recent::Recent,
-    truth::{Motion, Place, Recorded, at_pose, on_rig},
+    truth::{Motion, Recorded, at_pose, on_rig},
 };
 use crate::{
     effect::{Machine, Swing, Truth},

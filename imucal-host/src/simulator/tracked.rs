@@ -17,9 +17,10 @@ use rayon::prelude::*;
 
 use super::{
     gimbal::{Pose, direction},
+    place::Place,
     recent::Recent,
     replay::nearest,
-    truth::{Motion, Place, Recorded, at_pose},
+    truth::{Motion, Recorded, at_pose},
 };
 use crate::{
     effect::{Machine, Swing, Truth},

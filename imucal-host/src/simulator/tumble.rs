@@ -12,8 +12,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, UnitSphere};
 
 use super::{
+    place::Place,
     recent::Recent,
-    truth::{Motion, Place, in_the_open},
+    truth::{Motion, in_the_open},
 };
 use crate::{
     effect::{Machine, Truth},

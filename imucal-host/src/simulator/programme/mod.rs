@@ -4,8 +4,8 @@ use crate::{recording::manifest::Axis, simulator::SimulationError};
 
 use super::{
     climate::Climate,
+    place::Place,
     random::{Purpose, Random},
-    truth::Place,
 };
 
 mod full;

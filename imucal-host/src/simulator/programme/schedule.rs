@@ -9,9 +9,10 @@ use crate::{
         climate::Climate,
         course::Course,
         gimbal::direction,
+        place::Place,
         random::{Purpose, Random},
         recent::Recent,
-        truth::{Motion, Place, on_rig},
+        truth::{Motion, on_rig},
     },
 };
 

@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 use super::*;
 use crate::{
     effect::{Act, CATALOGUE, Role, Stage, find},
-    simulator::truth::EARTH_RATE,
+    simulator::place::EARTH_RATE,
 };
 use SensorKind::{Acc, Mag};
 
