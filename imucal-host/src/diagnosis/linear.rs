@@ -305,7 +305,7 @@ impl<'s> Linear<'s> {
 
     /// All columns and the gimbals' offsets, as white noise weighs them.
     pub fn offsets(&self, noise: &Noise) -> Arc<Option<Offsets>> {
-        self.offsets.get(white(noise), || self.offset(noise))
+        self.offsets.get(white(noise), || self.condensed_offsets(noise))
     }
 
     /// Scores of all columns but the baseline's, with the baseline projected out, and those columns.

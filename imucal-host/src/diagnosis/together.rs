@@ -67,7 +67,7 @@ impl Linear<'_> {
 
     /// The gimbals' offsets at nodes beside all columns, by a noise's white one; `None` where no rig guides the sensor, or
     /// nothing but a gyroscope was recorded.
-    pub fn offset(&self, noise: &Noise) -> Option<Offsets> {
+    pub fn condensed_offsets(&self, noise: &Noise) -> Option<Offsets> {
         let turned = self.scene.turned.of(self.scene);
         if turned.is_empty() || self.scene.kinds == [SensorKind::Gyr] {
             return None;
@@ -179,6 +179,18 @@ mod tests {
             ],
         );
         assert_eq!(h, expected);
+    }
+
+    #[test]
+    fn the_greatest_value_is_found_up_and_down_and_no_further_than_it_may_be_looked_for() {
+        let peak_at = |peak: i32| likeliest(&|step| Some(-f64::from((step - peak).pow(2))));
+        for peak in -STEPS..=STEPS {
+            assert_eq!(peak_at(peak), Some(0.0), "{peak}");
+        }
+        assert_eq!(peak_at(STEPS + 3), Some(-9.0));
+        // What cannot be computed is no greater than what can.
+        assert_eq!(likeliest(&|step| (step == 0).then_some(7.0)), Some(7.0));
+        assert_eq!(likeliest(&|step| (step != 0).then_some(7.0)), None);
     }
 
     #[test]

@@ -332,6 +332,29 @@ mod tests {
     }
 
     #[test]
+    fn a_pose_that_is_kept_is_that_of_the_rig_whatever_is_done_to_it() {
+        type Alter = fn(&mut Machine);
+        let alters: [Alter; 6] = [
+            |_| (),
+            |machine| machine.heading += 0.3,
+            |machine| machine.tilt[1] -= 0.02,
+            |machine| machine.gimbals[1].angle += 0.01,
+            |machine| machine.wobble[0] = Swing::still(0.02),
+            |machine| machine.skew[1] = 0.03,
+        ];
+        let replay = replayed(|t| 0.4 * t * t);
+        let mut recent = Recent::default();
+        // On a row, and between two.
+        for (alter, time) in alters.iter().flat_map(|alter| [(alter, 4.0), (alter, 4.003)]) {
+            let row = nearest(&replay.time, time);
+            let mut machine = replay.machine(row, time - replay.time[row]);
+            alter(&mut machine);
+            let expected = on_rig(time, &machine, &replay.place, 25.0, &mut Recent::default());
+            assert_eq!(replay.truth_among(time, alter, &mut recent), expected, "{machine:?}");
+        }
+    }
+
+    #[test]
     fn noisy_readings_of_a_rig_that_stands_still_are_no_movement() {
         let time: Vec<f64> = (0..600).map(|k| 0.01 * f64::from(k)).collect();
         let angle = |k: usize| if k < 300 { 0.0 } else { 0.2 * (time[k] - 3.0) };
