@@ -113,6 +113,7 @@ pub fn never_moved(model: AccModel) -> AccResult {
 fn refused(refusal: Refusal, fit: Option<FitSummary>, model: AccModel) -> AccResult {
     AccResult {
         outcome: SensorOutcome {
+            suspicions: Vec::new(),
             kind: SensorKind::Acc,
             model: model.name(),
             verdict: Err(Refused { advice: advice(&refusal, model), refusal }),
@@ -161,6 +162,7 @@ fn with_form<const P: usize>(
         Err(refusal) => refuse(refusal, Some(summary)),
         Ok(()) => AccResult {
             outcome: SensorOutcome {
+                suspicions: Vec::new(),
                 kind: SensorKind::Acc,
                 model: model.name(),
                 verdict: Ok(()),

@@ -162,6 +162,7 @@ pub fn without_accelerometer(refusal: Refusal) -> SensorOutcome {
                   at rest; see the accelerometer's reason"
             .into();
     SensorOutcome {
+        suspicions: Vec::new(),
         kind: SensorKind::Gyr,
         model: MODEL,
         verdict: Err(Refused { refusal, advice }),
@@ -193,6 +194,7 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
     let summary = summarise(input, &turns, &known, (&solver, search));
     match judge(&solver, &summary) {
         Ok(()) => SensorOutcome {
+            suspicions: Vec::new(),
             kind: SensorKind::Gyr,
             model: MODEL,
             verdict: Ok(()),
@@ -248,6 +250,7 @@ fn refuse(refusal: Refusal, fit: Option<FitSummary>) -> SensorOutcome {
         _ => "check the recording for clipping and wrong units",
     };
     SensorOutcome {
+        suspicions: Vec::new(),
         kind: SensorKind::Gyr,
         model: MODEL,
         verdict: Err(Refused { refusal, advice: advice.into() }),

@@ -102,6 +102,7 @@ fn outcome(name: &'static str, sensor: &Triple, observations: &Observations) -> 
     let summary = summarise(&fit, sensor, observations);
     match judge(&fit, &summary) {
         Ok(()) => SensorOutcome {
+            suspicions: Vec::new(),
             kind: SensorKind::Gyr,
             model: name,
             verdict: Ok(()),
@@ -140,7 +141,7 @@ fn refused(model: &'static str, refusal: Refusal, fit: Option<FitSummary>) -> Se
         _ => "check the recording for clipping and wrong units",
     };
     let verdict = Err(Refused { refusal, advice: advice.into() });
-    SensorOutcome { kind: SensorKind::Gyr, model, verdict, fit, evidence: None }
+    SensorOutcome { suspicions: Vec::new(), kind: SensorKind::Gyr, model, verdict, fit, evidence: None }
 }
 
 /// Of a fit to motions whose errors are independent, and of the bias's drift: that from one motion to the next is a

@@ -40,7 +40,7 @@ fn outcome(
     evidence: Option<Evidence>,
 ) -> SensorOutcome {
     let verdict = verdict.map_err(|refusal| Refused { advice: advice(&refusal), refusal });
-    SensorOutcome { kind: SensorKind::Mag, model: MODEL, verdict, fit, evidence }
+    SensorOutcome { suspicions: Vec::new(), kind: SensorKind::Mag, model: MODEL, verdict, fit, evidence }
 }
 
 /// Fits from the start that ends lower: an algebraic ellipsoid can be far off on a small part of the sphere.

@@ -154,6 +154,7 @@ fn outcome(
     note(&mut summary, samples, found, field.is_some());
     match verdict {
         Ok(()) => SensorOutcome {
+            suspicions: Vec::new(),
             kind: SensorKind::Mag,
             model: name,
             verdict: Ok(()),
@@ -223,5 +224,5 @@ fn refused(model: &'static str, refusal: Refusal, fit: Option<FitSummary>) -> Se
         _ => "check the recording for clipping, for iron that moved, and for a reference that lost its body",
     };
     let verdict = Err(Refused { refusal, advice: advice.into() });
-    SensorOutcome { kind: SensorKind::Mag, model, verdict, fit, evidence: None }
+    SensorOutcome { suspicions: Vec::new(), kind: SensorKind::Mag, model, verdict, fit, evidence: None }
 }

@@ -36,10 +36,12 @@ pub mod rows;
 pub mod search;
 pub mod segmentation;
 pub mod serial;
+pub mod suspicion;
 
 pub use acc::AccModel;
 pub use outcome::{Calibration, FitSummary, Refused, SegmentationReport, SensorOutcome};
 use segmentation::Cut;
+pub use suspicion::{Follows, Status, Suspicion};
 
 /// What to calibrate, and how.
 #[derive(Clone, Debug)]
@@ -109,14 +111,14 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
     calibration
 }
 
-/// Calibrated specific force and nominal magnetometer output at each rest; none without an accepted accelerometer.
+/// Calibrated specific force and nominal magnetometer output at each rest; none where the accelerometer is refused.
 fn rest_pairs(
     recording: &Recording,
     usable: &[bool],
     calibration: &Calibration,
 ) -> Vec<(Vector3<f64>, Vector3<f64>)> {
-    let accepted = calibration.sensor(SensorKind::Acc).and_then(SensorOutcome::accepted);
-    let (Some(fit), Some(segmentation)) = (accepted, &calibration.segmentation) else { return Vec::new() };
+    let passed = calibration.sensor(SensorKind::Acc).and_then(SensorOutcome::passed);
+    let (Some(fit), Some(segmentation)) = (passed, &calibration.segmentation) else { return Vec::new() };
     let (Some(acc), Some(mag)) = (&recording.acc, &recording.mag) else { return Vec::new() };
     let mean = |values: &[Vector3<f64>], rows: &std::ops::Range<usize>| {
         let mut moments = Moments::default();
@@ -238,7 +240,7 @@ fn inertial(
     }
     let usable = self::usable(integrity, SensorKind::Gyr, recording.rows());
     compare_gyr(calibration, &|until| {
-        let (gyr, acc) = (wanted?, acc_outcome.accepted()?);
+        let (gyr, acc) = (wanted?, acc_outcome.passed()?);
         let shared = GyrShared { recording, gyr, usable: &usable, interval };
         shared.before(until.unwrap_or(usize::MAX), chosen, &acc.triad, &result.used)
     });
@@ -304,7 +306,7 @@ impl GyrShared<'_> {
         let used: Vec<usize> = used.iter().copied().filter(|k| *k < count).collect();
         let whole = self.input(cut, acc, &used);
         let input = gyr::GyrInput { rows: &cut.rows[..count], rests: &cut.rests[..count], ..whole };
-        gyr::calibrate(&input).accepted().map(|fit| fit.triad)
+        gyr::calibrate(&input).passed().map(|fit| fit.triad)
     }
 
     fn outcome(

@@ -6,7 +6,12 @@ use imucal_core::{
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{
-    alignment::Alignment, compare::Comparison, gyr_rig_fit::MotionFit, rig_fit::RigFit, search::Search,
+    alignment::Alignment,
+    compare::Comparison,
+    gyr_rig_fit::MotionFit,
+    rig_fit::RigFit,
+    search::Search,
+    suspicion::{Status, Suspicion},
 };
 use crate::{
     observe::{motion::MotionData, pose::Poses, turn::TurnData},
@@ -39,8 +44,10 @@ pub struct SensorOutcome {
     pub kind: SensorKind,
     /// Model's name: T9, T6, K9, G12, E9.
     pub model: &'static str,
-    /// Accepted, or refused with the reason.
+    /// Whether the fit keeps its limits, or the reason why not. See [`Self::status`].
     pub verdict: Result<(), Refused>,
+    /// What speaks against a fit that keeps its limits: its residual is not the noise.
+    pub suspicions: Vec<Suspicion>,
     /// The fit, where there was enough to try one; of a refused sensor it is for information only.
     pub fit: Option<FitSummary>,
     /// What the fit was made of.
@@ -271,9 +278,23 @@ impl Calibration {
 }
 
 impl SensorOutcome {
+    /// Accepted, suspect or refused.
+    pub fn status(&self) -> Status {
+        match &self.verdict {
+            Err(_) => Status::Refused,
+            Ok(()) if self.suspicions.is_empty() => Status::Accepted,
+            Ok(()) => Status::Suspect,
+        }
+    }
+
     /// The fit of an accepted sensor.
     pub fn accepted(&self) -> Option<&FitSummary> {
-        self.verdict.is_ok().then_some(self.fit.as_ref()).flatten()
+        (self.status() == Status::Accepted).then_some(self.fit.as_ref()).flatten()
+    }
+
+    /// The fit of an accepted or suspect sensor.
+    pub fn passed(&self) -> Option<&FitSummary> {
+        (self.status() != Status::Refused).then_some(self.fit.as_ref()).flatten()
     }
 }
 

@@ -71,7 +71,7 @@ fn tells_tilt(fit: &RigFit) -> bool {
 
 /// The base's tilt as the accelerometer has it, and its standard errors, rad.
 fn tilt(calibration: &Calibration) -> Option<([f64; 2], [f64; 2])> {
-    calibration.sensor(SensorKind::Acc)?.accepted()?.rig.as_ref()?.tilt
+    calibration.sensor(SensorKind::Acc)?.passed()?.rig.as_ref()?.tilt
 }
 
 /// The base's tilt; `None` where it is none or hardly told: an error of its own would pass for one of the field.
@@ -197,6 +197,7 @@ fn outcome(kind: SensorKind, rung: &Rung, poses: &Poses, sensor: &Triple, norm: 
     };
     match judge(&rung.fit, &summary, &coverage, norm) {
         Ok(()) => SensorOutcome {
+            suspicions: Vec::new(),
             kind,
             model: rung.name,
             verdict: Ok(()),
@@ -227,6 +228,7 @@ fn refused(
         _ => "check the recording for motion during poses, clipping and wrong units",
     };
     SensorOutcome {
+        suspicions: Vec::new(),
         kind,
         model,
         verdict: Err(Refused { refusal, advice: advice.into() }),

@@ -7,7 +7,7 @@ use imucal_core::record::Date;
 
 use super::{Ending, output, progress::Progress, read, warn};
 use crate::{
-    calibrate::{AccModel, Calibration, Options, calibrate, gyr, gyr_rig, ladder, mag},
+    calibrate::{AccModel, Calibration, Options, Status, calibrate, gyr, gyr_rig, ladder, mag},
     observe::pose,
     recording::{Recording, SensorKind},
     report,
@@ -37,6 +37,9 @@ pub(super) struct Arguments {
     /// Fit every model of the ladders, score each on what is left out, and say which to use
     #[arg(long)]
     compare: bool,
+    /// Write sensors as well that are suspect: their fit keeps its limits, but its residual is not the noise
+    #[arg(long)]
+    accept_suspect: bool,
 }
 
 /// A model named on the command line.
@@ -99,7 +102,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     drop(progress);
     print(arguments, &calibration)?;
     write(arguments, &calibration)?;
-    Ok(ending(&calibration, &named))
+    Ok(ending(arguments, &calibration, &named))
 }
 
 /// The files asked for; `--json -` is none.
@@ -179,11 +182,18 @@ fn check_named(recording: &Recording, named: &[SensorKind]) -> anyhow::Result<()
     }
 }
 
-/// 0 once something was accepted and nothing named was refused.
-fn ending(calibration: &Calibration, named: &[SensorKind]) -> Ending {
-    let accepted = |kind: SensorKind| calibration.sensor(kind).is_some_and(|outcome| outcome.verdict.is_ok());
-    let any = SensorKind::ALL.into_iter().any(accepted);
-    if any && named.iter().all(|kind| accepted(*kind)) { Ending::Done } else { Ending::Refused }
+/// 0 once something was accepted, nothing named was refused, and nothing is suspect that was not asked for.
+fn ending(arguments: &Arguments, calibration: &Calibration, named: &[SensorKind]) -> Ending {
+    let written = |status: Status| match status {
+        Status::Accepted => true,
+        Status::Suspect => arguments.accept_suspect,
+        Status::Refused => false,
+    };
+    let has = |kind: SensorKind| calibration.sensor(kind).is_some_and(|outcome| written(outcome.status()));
+    let any = SensorKind::ALL.into_iter().any(has);
+    let suspect = calibration.sensors.iter().any(|outcome| outcome.status() == Status::Suspect);
+    let done = any && named.iter().all(|kind| has(*kind)) && (arguments.accept_suspect || !suspect);
+    if done { Ending::Done } else { Ending::Refused }
 }
 
 fn print(arguments: &Arguments, calibration: &Calibration) -> anyhow::Result<()> {
@@ -198,7 +208,8 @@ fn print(arguments: &Arguments, calibration: &Calibration) -> anyhow::Result<()>
 }
 
 fn write(arguments: &Arguments, calibration: &Calibration) -> anyhow::Result<()> {
-    let stored = StoredCalibration::of(calibration, today());
+    let of = if arguments.accept_suspect { StoredCalibration::with_suspects } else { StoredCalibration::of };
+    let stored = of(calibration, today());
     let nothing = SensorKind::ALL.into_iter().all(|kind| stored.triad(kind).is_none());
     for path in arguments.out.iter().chain(&arguments.record).filter(|_| nothing) {
         warn(&format!("{}: not written, since no sensor was accepted", path.display()));

@@ -76,7 +76,7 @@ impl FitEquivalence {
 /// Fits an accepted sensor again, on the device's path and by the reference; `None` where there is nothing to fit
 /// or the reference does not settle.
 pub fn compare(recording: &Recording, outcome: &SensorOutcome) -> Option<FitEquivalence> {
-    let summary = outcome.accepted()?;
+    let summary = outcome.passed()?;
     match outcome.evidence.as_ref()? {
         Evidence::Shell { points, norm, diagonal: false, triad, std } => {
             shell(outcome.kind, points, *norm, (triad, std), UPPER_TRIANGULAR)

@@ -50,17 +50,18 @@ fn sensor(outcome: &SensorOutcome) -> Value {
         Some(fit) => fit_value(outcome.kind, fit),
         None => json!({}),
     };
-    let (status, reason, detail, advice) = match &outcome.verdict {
-        Ok(()) => ("accepted", None, None, None),
-        Err(refused) => (
-            "refused",
-            Some(refused.refusal.reason()),
-            Some(refused.refusal.to_string()),
-            Some(refused.advice.as_str()),
-        ),
+    let (reason, detail, advice) = match &outcome.verdict {
+        Ok(()) => (None, None, None),
+        Err(refused) => {
+            (Some(refused.refusal.reason()), Some(refused.refusal.to_string()), Some(refused.advice.as_str()))
+        }
     };
     if let Some(fields) = value.as_object_mut() {
-        fields.insert("status".into(), json!(status));
+        let follows: Vec<&str> = outcome.suspicions.iter().map(|found| found.follows.name()).collect();
+        let suspicions: Vec<&str> = outcome.suspicions.iter().map(|found| found.detail.as_str()).collect();
+        fields.insert("status".into(), json!(outcome.status().name()));
+        fields.insert("follows".into(), json!(follows));
+        fields.insert("suspicions".into(), json!(suspicions));
         fields.insert("reason".into(), json!(reason));
         fields.insert("detail".into(), json!(detail));
         fields.insert("advice".into(), json!(advice));

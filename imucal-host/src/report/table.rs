@@ -97,7 +97,8 @@ fn write_segmentation(text: &mut String, segmentation: &SegmentationReport) -> f
 fn write_sensor(text: &mut String, outcome: &SensorOutcome) -> fmt::Result {
     let name = words(outcome.kind);
     match &outcome.verdict {
-        Ok(()) => writeln!(text, "{name} ({}): accepted", outcome.model)?,
+        Ok(()) if outcome.suspicions.is_empty() => writeln!(text, "{name} ({}): accepted", outcome.model)?,
+        Ok(()) => write_suspicions(text, name, outcome)?,
         Err(refused) => {
             writeln!(text, "{name} ({}): REFUSED, {}", outcome.model, refused.refusal.reason())?;
             writeln!(text, "  because: {}", refused.refusal)?;
@@ -109,6 +110,17 @@ fn write_sensor(text: &mut String, outcome: &SensorOutcome) -> fmt::Result {
         writeln!(text, "  for information only, the refused fit:")?;
     }
     write_fit(text, outcome.kind, fit)
+}
+
+fn write_suspicions(text: &mut String, name: &str, outcome: &SensorOutcome) -> fmt::Result {
+    writeln!(text, "{name} ({}): SUSPECT, the residual is not the sensor's noise", outcome.model)?;
+    for found in &outcome.suspicions {
+        writeln!(text, "  follows {}: {}", found.follows.name(), found.detail)?;
+    }
+    writeln!(
+        text,
+        "  to do:   run `imucal diagnose` on the recording to find the cause; --accept-suspect writes it"
+    )
 }
 
 fn write_fit(text: &mut String, kind: SensorKind, fit: &FitSummary) -> fmt::Result {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub mod record_form;
 
 use crate::{
-    calibrate::{Calibration, FitSummary},
+    calibrate::{Calibration, FitSummary, SensorOutcome},
     recording::{AtomicFile, SensorKind, Unit},
 };
 
@@ -204,9 +204,22 @@ pub enum SaveError {
 impl StoredCalibration {
     /// The accepted sensors of a calibration.
     pub fn of(calibration: &Calibration, date: record::Date) -> Self {
+        Self::of_those(calibration, date, SensorOutcome::accepted)
+    }
+
+    /// The accepted and the suspect sensors of a calibration.
+    pub fn with_suspects(calibration: &Calibration, date: record::Date) -> Self {
+        Self::of_those(calibration, date, SensorOutcome::passed)
+    }
+
+    fn of_those(
+        calibration: &Calibration,
+        date: record::Date,
+        fit: impl Fn(&SensorOutcome) -> Option<&FitSummary>,
+    ) -> Self {
         let triad = |kind| {
             let outcome = calibration.sensor(kind)?;
-            Some(StoredTriad::of(outcome.model, outcome.accepted()?))
+            Some(StoredTriad::of(outcome.model, fit(outcome)?))
         };
         Self {
             format: FORMAT.into(),
