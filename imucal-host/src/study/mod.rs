@@ -2,4 +2,5 @@
 
 pub mod coverage;
 pub mod recovery;
+pub mod trust;
 pub mod units;
