@@ -2,13 +2,17 @@
 //! fit that was accepted, parameter by parameter.
 
 use std::path::PathBuf;
+use std::sync::LazyLock;
 
+use imucal_core::corrector::{Compensator, Corrector};
 use imucal_core::record::{Date, TriadRecord};
+use imucal_core::temperature::TemperatureTerms;
 use imucal_host::calibrate::{Calibration, Options, calibrate};
-use imucal_host::equivalence::{SampleEquivalence, fits, samples};
+use imucal_host::equivalence::samples::{self, Samples};
+use imucal_host::equivalence::{SampleEquivalence, fits};
 use imucal_host::recording::{Recording, SensorKind, Triple, Unit};
 use imucal_host::simulator::{Programme, Simulation, UnitKind};
-use imucal_host::store::{StoredCalibration, StoredTriad};
+use imucal_host::store::{StoredCalibration, StoredTemperature, StoredTriad};
 use imucal_tests::{data, simulated};
 use rayon::prelude::*;
 
@@ -77,8 +81,15 @@ fn compare(recording: &Recording) -> (usize, usize) {
         let own = StoredCalibration::of(&calibration, Date::from_days(20_000));
         let triad = own.triad(kind).cloned().unwrap_or_else(|| plausible(triple, kind));
         let stored = with(own, kind, triad.clone());
-        let result = samples::compare(kind, triple, &triad, &on_device(&stored, kind));
-        assert!(result.samples > 0 && result.passes(), "{}: {result:?}", recording.name);
+        let replayed = Samples::of(recording, kind).expect("recorded");
+        let record = on_device(&stored, kind);
+        let result = samples::compare(replayed, &triad, &record);
+        assert!(result.passes(), "{}: {result:?}", recording.name);
+        let mut wrong = record.clone();
+        wrong.gain.as_flattened_mut().iter_mut().for_each(|entry| *entry *= 1.0 + 1e-6);
+        let core = Corrector::<f32>::from(&wrong);
+        let result = samples::compare_by(replayed, &triad, &record, |raw, _| core.apply(raw));
+        assert!(!result.passes(), "{}: a gain wrong by a millionth passes: {result:?}", recording.name);
         sensors += 1;
     }
     let accepted = calibration.sensors.iter().filter(|outcome| outcome.accepted().is_some());
@@ -142,38 +153,136 @@ fn recordings_of_a_rig_are_corrected_and_fitted_alike_by_the_rig_s_models() {
     }
 }
 
-/// The comparison of the device's corrections after something has gone wrong on the way to it.
-fn faulty(kind: SensorKind, fault: impl Fn(&mut StoredTriad, &SampleEquivalence)) -> SampleEquivalence {
-    let recording = simulated::small();
-    let stored = StoredCalibration::of(&calibrated(&recording), Date::from_days(20_000));
-    let (triple, triad) = (recording.sensor(kind).expect("recorded"), stored.triad(kind).expect("accepted"));
-    let sound = samples::compare(kind, triple, triad, &on_device(&stored, kind));
-    assert!(sound.passes(), "{sound:?}");
-    let mut wrong = triad.clone();
-    fault(&mut wrong, &sound);
-    samples::compare(kind, triple, triad, &on_device(&with(stored.clone(), kind, wrong), kind))
+/// Terms of temperature such as a sensor might have: of the raw unit and 1 per kelvin.
+fn warm(triple: &Triple) -> StoredTemperature {
+    let drift = |per_kelvin: f64| per_kelvin * triple.nominal.per_unit;
+    StoredTemperature {
+        reference: 22.5,
+        bias_slope: [drift(1.3e-3), drift(-0.7e-3), drift(0.9e-3)],
+        scale_slope: [1.1e-4, -0.6e-4, 0.8e-4],
+    }
+}
+
+/// The small recording with a course of temperature, and its calibration with terms of it.
+static HEATED: LazyLock<(Recording, StoredCalibration)> = LazyLock::new(heated);
+
+fn heated() -> (Recording, StoredCalibration) {
+    let mut recording = simulated::small();
+    let mut stored = StoredCalibration::of(&calibrated(&recording), Date::from_days(20_000));
+    let reading = |row: usize| if row.is_multiple_of(7) { f64::NAN } else { 20.0 + 1e-3 * row as f64 };
+    recording.temperature = Some((0..recording.rows()).map(reading).collect());
+    for kind in SensorKind::ALL {
+        let triad = stored.triad(kind).cloned().expect("accepted");
+        let temperature = Some(warm(recording.sensor(kind).expect("recorded")));
+        stored = with(stored, kind, StoredTriad { temperature, ..triad });
+    }
+    (recording, stored)
+}
+
+/// The comparison with a core that computes by other figures than the record's: by what has become of them.
+fn faulty(kind: SensorKind, fault: impl Fn(&mut TriadRecord)) -> SampleEquivalence {
+    let (recording, stored) = &*HEATED;
+    let record = on_device(stored, kind);
+    let mut wrong = record.clone();
+    fault(&mut wrong);
+    let mut core = Compensator::<f32>::new(Corrector::from(&wrong));
+    let replayed = Samples::of(recording, kind).expect("recorded");
+    let triad = stored.triad(kind).expect("accepted");
+    samples::compare_by(replayed, triad, &record, |raw, temperature| core.apply_at(raw, temperature))
 }
 
 #[test]
-fn a_gain_wrong_by_a_ten_thousandth_fails_the_comparison() {
+fn a_sound_core_passes_with_temperature_and_without() {
+    for kind in SensorKind::ALL {
+        let sound = faulty(kind, |_| ());
+        assert!(sound.passes(), "{kind}: {sound:?}");
+        assert_eq!((sound.warm, sound.samples), (sound.samples - sound.samples.div_ceil(7), sound.samples));
+        let cold = faulty(kind, |record| record.temperature = None);
+        assert!(!cold.passes() && cold.record_is_nearest, "{kind}: {cold:?}");
+    }
+}
+
+#[test]
+fn a_gain_wrong_by_a_millionth_fails_the_comparison() {
     for kind in SensorKind::ALL {
         for axis in 0..3 {
-            let result = faulty(kind, |triad, _| triad.gain[axis][axis] *= 1.0 + 1e-4);
-            assert!(!result.passes(), "{kind} {axis}: {result:?}");
+            for millionth in [1e-6, -1e-6] {
+                let result = faulty(kind, |triad| triad.gain[axis][axis] *= 1.0 + millionth);
+                assert!(!result.passes() && result.record_is_nearest, "{kind} {axis}: {result:?}");
+            }
         }
     }
 }
 
 #[test]
-fn a_bias_wrong_by_twenty_millionths_of_full_scale_fails_the_comparison() {
+fn a_bias_wrong_by_a_millionth_of_full_scale_fails_the_comparison() {
     for kind in SensorKind::ALL {
         for axis in 0..3 {
-            let result = faulty(kind, |triad, sound| {
-                triad.bias[axis] += 20e-6 * sound.full_scale / triad.gain[axis][axis];
+            let full_scale = faulty(kind, |_| ()).full_scale;
+            let result = faulty(kind, |triad| {
+                triad.bias[axis] += (1e-6 * full_scale) as f32 / triad.gain[axis][axis];
             });
             assert!(!result.passes(), "{kind} {axis}: {result:?}");
         }
     }
+}
+
+#[test]
+fn a_temperature_term_wrong_by_a_hundredth_fails_the_comparison() {
+    type Fault = fn(&mut TemperatureTerms<f32>, usize);
+    let faults: [(&str, Fault); 3] = [
+        ("reference", |terms, _| terms.reference += 0.05),
+        ("bias", |terms, axis| terms.bias_slope[axis] *= 1.01),
+        ("scale", |terms, axis| terms.scale_slope[axis] *= 1.01),
+    ];
+    for kind in SensorKind::ALL {
+        for (name, fault) in faults {
+            for axis in 0..3 {
+                let result = faulty(kind, |triad| fault(triad.temperature.as_mut().expect("terms"), axis));
+                assert!(!result.passes(), "{kind} {name} {axis}: {result:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_record_that_is_one_ulp_from_what_was_stored_fails_the_comparison() {
+    type Fault = fn(&mut TriadRecord) -> &mut f32;
+    let faults: [Fault; 5] = [
+        |triad| &mut triad.gain[0][1],
+        |triad| &mut triad.bias[2],
+        |triad| &mut triad.temperature.as_mut().expect("terms").reference,
+        |triad| &mut triad.temperature.as_mut().expect("terms").bias_slope[0],
+        |triad| &mut triad.temperature.as_mut().expect("terms").scale_slope[1],
+    ];
+    let (recording, stored) = &*HEATED;
+    for kind in SensorKind::ALL {
+        let (replayed, triad) =
+            (Samples::of(recording, kind).expect("recorded"), stored.triad(kind).expect("accepted"));
+        for (number, fault) in faults.into_iter().enumerate() {
+            let mut record = on_device(stored, kind);
+            let figure = fault(&mut record);
+            *figure = figure.next_up();
+            let result = samples::compare(replayed, triad, &record);
+            assert!(!result.passes() && result.of_bound <= samples::LIMIT, "{kind} {number}: {result:?}");
+        }
+        let forgotten = TriadRecord { temperature: None, ..on_device(stored, kind) };
+        assert!(!samples::compare(replayed, triad, &forgotten).passes(), "{kind}");
+    }
+}
+
+#[test]
+fn a_sensor_without_a_sample_fails_the_comparison() {
+    let (mut recording, stored) = HEATED.clone();
+    let gyr = recording.gyr.as_mut().expect("recorded");
+    gyr.values.iter_mut().for_each(|value| value.y = f64::NAN);
+    let replayed = Samples::of(&recording, SensorKind::Gyr).expect("recorded");
+    let result = samples::compare(
+        replayed,
+        stored.triad(SensorKind::Gyr).expect("accepted"),
+        &on_device(&stored, SensorKind::Gyr),
+    );
+    assert!(result.samples == 0 && !result.passes(), "{result:?}");
 }
 
 #[test]

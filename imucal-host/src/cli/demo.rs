@@ -15,7 +15,10 @@ use crate::{
     calibrate::{Calibration, Options, calibrate},
     diagnosis::{self, diagnose},
     effect,
-    equivalence::{FitEquivalence, SampleEquivalence, fits, samples},
+    equivalence::{
+        FitEquivalence, SampleEquivalence, fits,
+        samples::{self, Samples},
+    },
     recording::SensorKind,
     report::{self, table::words},
     simulator::{Programme, Simulation},
@@ -68,9 +71,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let device = stored.to_record(out)?;
     let mut equal = true;
     for kind in SensorKind::ALL {
-        let compared = recording.sensor(kind).zip(stored.triad(kind)).zip(device.triad(kind.into()));
-        let result =
-            compared.map(|((triple, stored), record)| samples::compare(kind, triple, stored, record));
+        let compared = Samples::of(&recording, kind).zip(stored.triad(kind)).zip(device.triad(kind.into()));
+        let result = compared.map(|((samples, stored), record)| samples::compare(samples, stored, record));
         result.iter().try_for_each(print_samples)?;
         equal &= result.is_some_and(|samples| samples.passes());
     }

@@ -13,7 +13,8 @@ use crate::{
     equivalence::{
         FitEquivalence, SampleEquivalence,
         board::{self, BoardSamples},
-        fits, samples,
+        fits,
+        samples::{self, Samples},
     },
     recording::{Recording, SensorKind},
     report::table::words,
@@ -55,8 +56,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let samples: Vec<SampleEquivalence> = SensorKind::ALL
         .into_iter()
         .filter_map(|kind| {
-            let (triple, triad) = (recording.sensor(kind)?, stored.triad(kind)?);
-            Some(samples::compare(kind, triple, triad, record.triad(kind.into())?))
+            let triad = stored.triad(kind)?;
+            Some(samples::compare(Samples::of(&recording, kind)?, triad, record.triad(kind.into())?))
         })
         .collect();
     progress.stage("fitting again, by the core and by the reference");
@@ -142,16 +143,20 @@ fn options(stored: &StoredCalibration) -> Options {
 
 fn print_samples(s: &SampleEquivalence) -> anyhow::Result<()> {
     say!(
-        "{}: {} samples: f32 core against f64 reference: max {:.3e} {unit}, rms {:.3e} {unit}, max {:.0} ulp; {:.2e} of \
-         full scale ({:.4} {unit}), limit {:.0e}: {}",
+        "{}: {} samples, {} of them corrected for temperature: f32 core against f64 reference: max {:.3e} {unit}, rms \
+         {:.3e} {unit}, max {:.0} ulp; {:.2e} of full scale ({:.4} {unit}); {:.2} times the bound of its roundings, \
+         limit {}{}: {}",
         words(s.kind),
         s.samples,
+        s.warm,
         s.max,
         s.rms,
         s.max_ulp,
         s.max / s.full_scale,
         s.full_scale,
+        s.of_bound,
         samples::LIMIT,
+        if s.record_is_nearest { "" } else { "; the record holds OTHER FIGURES than were stored" },
         if s.passes() { "ok" } else { "FAILED" },
         unit = s.unit,
     );

@@ -32,7 +32,8 @@ impl BoardSamples {
     }
 }
 
-/// Replays every sensor that the record holds through a device that uses this record.
+/// Replays every sensor that the record holds through a device that uses this record, at the recording's temperatures
+/// where it has terms of them.
 ///
 /// # Errors
 /// [`DeviceError`].
@@ -46,25 +47,32 @@ pub fn samples(
         let (Some(triple), Some(triad)) = (recording.sensor(kind), record.triad(kind.into())) else {
             continue;
         };
-        let raw: Vec<Vector3<f32>> =
-            triple.raw_samples().filter(|sample| sample.iter().all(|x| x.is_finite())).collect();
-        let corrector = Corrector::<f32>::from(triad);
-        let answers = session.correct(kind.into(), f32::NAN, &raw)?;
-        all.push(compare(kind, &corrector, &raw, &answers));
+        let warmth = |row: usize| match (&recording.temperature, &triad.temperature) {
+            (Some(all), Some(_)) => all.get(row).map_or(f32::NAN, |temperature| *temperature as f32),
+            _ => f32::NAN,
+        };
+        let measured =
+            triple.raw_samples().enumerate().filter(|(_, sample)| sample.iter().all(|x| x.is_finite()));
+        let (raw, temperature): (Vec<Vector3<f32>>, Vec<f32>) =
+            measured.map(|(row, sample)| (sample, warmth(row))).unzip();
+        let answers = session.correct_at(kind, &raw, &temperature)?;
+        all.push(compare(kind, &Corrector::from(triad), (&raw, &temperature), &answers));
     }
     Ok(all)
 }
 
-/// Compares a device's answers with a corrector's.
+/// Compares a device's answers with a corrector's, for raw samples with the temperature of each, °C or NaN.
 pub fn compare(
     kind: SensorKind,
     corrector: &Corrector<f32>,
-    raw: &[Vector3<f32>],
+    (raw, temperature): (&[Vector3<f32>], &[f32]),
     answers: &[Vector3<f32>],
 ) -> BoardSamples {
     let bits = |v: &Vector3<f32>| v.map(f32::to_bits);
-    let differs = |(raw, answer): (&Vector3<f32>, &Vector3<f32>)| bits(&corrector.apply(raw)) != bits(answer);
-    let pairs = || raw.iter().zip(answers);
+    let differs = |((raw, temperature), answer): ((&Vector3<f32>, &f32), &Vector3<f32>)| {
+        bits(&corrector.apply_at(raw, *temperature)) != bits(answer)
+    };
+    let pairs = || raw.iter().zip(temperature).zip(answers);
     let missing = raw.len().abs_diff(answers.len());
     BoardSamples {
         kind,
@@ -107,20 +115,29 @@ pub fn fits(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use imucal_core::triad::Triad;
+    use imucal_core::{temperature::TemperatureTerms, triad::Triad};
     use nalgebra::Matrix3;
 
     #[test]
     fn one_ulp_of_one_axis_of_one_sample_is_found() {
         let gain = Matrix3::new(1.01f32, 0.02, 0.03, 0.0, 0.99, 0.01, 0.0, 0.0, 1.02);
-        let corrector = Corrector::new(Triad { gain, bias: Vector3::new(0.1, 0.2, 0.3) }, None);
+        let terms = TemperatureTerms { reference: 20.0, bias_slope: [0.1; 3], scale_slope: [1e-3; 3] };
+        let corrector = Corrector::new(Triad { gain, bias: Vector3::new(0.1, 0.2, 0.3) }, Some(terms));
         let raw: Vec<_> = (0..100).map(|k| Vector3::new(k as f32, 0.5 * k as f32, 9.8)).collect();
-        let mut answers: Vec<_> = raw.iter().map(|sample| corrector.apply(sample)).collect();
-        assert!(compare(SensorKind::Acc, &corrector, &raw, &answers).passes());
+        let warmth: Vec<_> =
+            (0..100).map(|k| if k % 3 == 0 { f32::NAN } else { 0.4 * k as f32 + 0.1 }).collect();
+        let mut answers: Vec<_> =
+            raw.iter().zip(&warmth).map(|(raw, t)| corrector.apply_at(raw, *t)).collect();
+        let compare =
+            |answers: &[Vector3<f32>]| compare(SensorKind::Acc, &corrector, (&raw, &warmth), answers);
+        assert!(compare(&answers).passes());
+        // Of the 34 without a reading none differs.
+        let cold: Vec<_> = raw.iter().map(|raw| corrector.apply(raw)).collect();
+        assert_eq!(compare(&cold).different, 66);
         answers[57].y = answers[57].y.next_up();
-        let found = compare(SensorKind::Acc, &corrector, &raw, &answers);
+        let found = compare(&answers);
         assert_eq!((found.different, found.first, found.passes()), (1, Some(57), false));
         answers.truncate(57);
-        assert_eq!(compare(SensorKind::Acc, &corrector, &raw, &answers).first, Some(57));
+        assert_eq!(compare(&answers).first, Some(57));
     }
 }

@@ -8,6 +8,7 @@ pub mod board;
 pub mod fits;
 mod known_attitudes;
 pub mod reference;
+pub mod rounding;
 pub mod samples;
 
 pub use fits::{FitEquivalence, ParameterDifference};

@@ -6,7 +6,10 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use crate::observe::{motion::MotionData, turn::BiasPath};
+use crate::{
+    observe::{motion::MotionData, turn::BiasPath},
+    store::StoredTriad,
+};
 
 /// Rounds of Gauss–Newton at the most.
 const ROUNDS: usize = 60;
@@ -17,6 +20,16 @@ const HALVINGS: usize = 30;
 pub fn correct(gain: &[[f64; 3]; 3], bias: &[f64; 3], raw: [f64; 3]) -> [f64; 3] {
     let d = [raw[0] - bias[0], raw[1] - bias[1], raw[2] - bias[2]];
     [0, 1, 2].map(|i| gain[i][0] * d[0] + gain[i][1] * d[1] + gain[i][2] * d[2])
+}
+
+/// The same at a temperature, `(1 + s Δ) ∘ gain · (raw − bias − β Δ)`; Δ is zero where there is no reading.
+pub fn correct_at(figures: &StoredTriad, raw: [f64; 3], temperature: f64) -> [f64; 3] {
+    let terms = figures.temperature.filter(|_| temperature.is_finite());
+    let Some(terms) = terms else { return correct(&figures.gain, &figures.bias, raw) };
+    let change = temperature - terms.reference;
+    let bias = [0, 1, 2].map(|axis| figures.bias[axis] + terms.bias_slope[axis] * change);
+    let value = correct(&figures.gain, &bias, raw);
+    [0, 1, 2].map(|axis| value[axis] * (1.0 + terms.scale_slope[axis] * change))
 }
 
 /// Distance of `m` outside the shell |A(m − b)| = norm, to first order, less `excess`.

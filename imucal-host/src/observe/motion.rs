@@ -17,6 +17,8 @@ use crate::{noise::Span, recording::Recording};
 
 /// A block lasts about this long, s: five samples at 100 Hz.
 const BLOCK: f64 = 0.05;
+/// Samples of a block at the most: what is faster than that is tapped or shaken, of which two orders say less.
+const MOST_SAMPLES: f64 = 10.0;
 /// A motion across a gap longer than this many usual intervals is not known.
 const GAP: f64 = 5.0;
 /// A quaternion whose length is further from one is none.
@@ -217,7 +219,7 @@ impl MotionInput<'_> {
             return Err(TurnGap::Jump { row });
         }
         let [start, end] = ends.map(quaternion);
-        let size = (BLOCK / self.interval).round().clamp(1.0, 20.0) as u16;
+        let size = (BLOCK / self.interval).round().clamp(1.0, MOST_SAMPLES) as u16;
         let mut data = MotionData {
             span: self.time[rows.start]..self.time[rows.end - 1],
             rows: rows.clone(),

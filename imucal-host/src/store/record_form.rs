@@ -109,7 +109,8 @@ impl StoredTriad {
         })
     }
 
-    fn from_record(record: &TriadRecord) -> Self {
+    /// What a record's triad holds, exactly.
+    pub fn from_record(record: &TriadRecord) -> Self {
         let quality = &record.quality;
         Self {
             model: record.model.as_str().into(),
