@@ -19,7 +19,7 @@ pub enum ApplyError {
     /// It was made for another sensor.
     #[error(
         "{recording}: recorded with serial `{connected}`, but the calibration was made for `{recorded}`; use the \
-         calibration of this sensor, or --force"
+         calibration of this sensor, or --other-serial"
     )]
     WrongSensor {
         /// The recording.
@@ -54,8 +54,8 @@ pub enum ApplyError {
     },
 }
 
-/// Whether a calibration belongs to a recording; a warning where nobody can tell. `force` turns the refusal of
-/// another serial into a warning.
+/// Whether a calibration belongs to a recording; a warning where nobody can tell. `other_serial` turns the
+/// refusal of another serial into a warning.
 ///
 /// # Errors
 /// [`ApplyError`] for another serial, another unit, or nothing in common.
@@ -63,7 +63,7 @@ pub fn check(
     recording: &Recording,
     stored: &StoredCalibration,
     record: &CalibrationRecord,
-    force: bool,
+    other_serial: bool,
 ) -> Result<Option<String>, ApplyError> {
     let serial = recording.manifest.sensor.serial.as_deref().unwrap_or_default();
     let warning = match record.made_for(serial) {
@@ -73,7 +73,9 @@ pub fn check(
              [sensor] before calibrating",
             recording.name
         )),
-        Err(wrong) if force => Some(format!("{}: {wrong}; taken all the same by --force", recording.name)),
+        Err(wrong) if other_serial => {
+            Some(format!("{}: {wrong}; taken all the same by --other-serial", recording.name))
+        }
         Err(wrong) => {
             return Err(ApplyError::WrongSensor {
                 recording: recording.name.clone(),

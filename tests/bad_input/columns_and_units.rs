@@ -26,6 +26,29 @@ fn a_misspelt_column_is_told_from_an_unknown_one() {
 }
 
 #[test]
+fn all_columns_are_named_at_once_with_what_they_probably_are() {
+    let mut bad = Bad::new();
+    for (column, name) in
+        ["timestamp", "ax", "ay", "az", "gyro_x (deg/s)", "wy", "wz"].into_iter().enumerate()
+    {
+        bad.line(1)[column] = name.into();
+    }
+    bad.rows.iter_mut().for_each(|row| drop(row.remove(MAG + 1)));
+    bad.line(1).push("temp_c".into());
+    bad.rows[1..].iter_mut().for_each(|row| row.push("20".into()));
+    let told = [
+        "small.csv, line 1",
+        "`timestamp` for `t`, `ax` for `acc_x`, `ay` for `acc_y`, `az` for `acc_z`",
+        "`gyro_x (deg/s)` for `gyr_x`, `wy` for `gyr_y`, `wz` for `gyr_z`, `temp_c` for `temp`",
+        "column `mag_y` is missing",
+        "[units]",
+    ];
+    bad.calibrate().with(2).telling(&told);
+    let semicolons = bad.text().replace(',', ";");
+    bad.calibrate_bytes("small.csv", semicolons.as_bytes()).with(2).telling(&told).telling(&["semicolons"]);
+}
+
+#[test]
 fn a_column_twice_is_refused() {
     let mut bad = Bad::new();
     bad.line(1)[MAG] = "acc_x".into();

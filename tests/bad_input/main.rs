@@ -16,6 +16,8 @@ mod motions;
 mod mutations;
 mod rigs;
 mod samples;
+#[cfg(unix)]
+mod sizes;
 mod times;
 
 /// A small recording as text, to be spoilt.

@@ -9,19 +9,22 @@ fn the_calibration_of_another_serial_is_refused_with_both_named() {
     let folder = Folder::with_calibration();
     folder.replace("small.toml", "SIM-0001", "SIM-0002");
     let refused = folder.run(APPLY).with(1);
-    refused.telling(&["refused", "small.csv", "`SIM-0001`", "`SIM-0002`", "--force"]);
+    refused.telling(&["refused", "small.csv", "`SIM-0001`", "`SIM-0002`", "--other-serial"]);
     assert!(!folder.path("out.csv").exists());
     folder.run("verify small.csv --calibration cal.toml").with(1).telling(&["`SIM-0001`", "`SIM-0002`"]);
 }
 
 #[test]
-fn force_applies_the_calibration_of_another_serial_with_a_warning() {
+fn the_calibration_of_another_serial_is_applied_with_a_warning_on_request() {
     let folder = Folder::with_calibration();
     folder.replace("small.toml", "SIM-0001", "SIM-0002");
-    let forced = folder.run(&format!("{APPLY} --force")).with(0);
-    forced.telling(&["warning", "small.csv", "SIM-0001", "SIM-0002", "--force"]);
+    let forced = folder.run(&format!("{APPLY} --other-serial")).with(0);
+    forced.telling(&["warning", "small.csv", "SIM-0001", "SIM-0002", "--other-serial"]);
     assert!(folder.path("out.csv").exists());
-    folder.run("verify small.csv --calibration cal.bin --force").with(0).telling(&["warning", "SIM-0002"]);
+    folder
+        .run("verify small.csv --calibration cal.bin --other-serial")
+        .with(0)
+        .telling(&["warning", "SIM-0002"]);
 }
 
 #[test]
@@ -45,7 +48,7 @@ fn a_recording_in_another_unit_is_refused() {
     // The corrected recording is in m/s², the calibration takes counts.
     for line in [
         "apply out.csv --calibration cal.bin --out twice.csv",
-        "apply out.csv --calibration cal.bin --out twice.csv --force",
+        "apply out.csv --calibration cal.bin --out twice.csv --other-serial",
         "verify out.csv --calibration cal.toml",
     ] {
         folder.run(line).with(1).telling(&["refused", "out.csv", "acc is in m/s^2", "takes counts"]);

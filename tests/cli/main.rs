@@ -12,8 +12,11 @@ mod applying;
 mod end_to_end;
 mod exit_status;
 mod importing;
+#[cfg(unix)]
+mod interrupting;
 mod json_contract;
 mod outputs;
+mod overwriting;
 mod printing;
 mod trials;
 

@@ -117,13 +117,14 @@ fn a_dotted_name_keeps_its_dots_in_the_name_beside() {
 fn where_nothing_is_accepted_nothing_is_written_and_that_is_said() {
     let Some(path) = data::real("mpu6050-unobservable.csv.gz") else { return };
     let folder = Folder::new();
-    folder.write("cal.toml", "kept");
+    let former = "format = \"imucal-calibration/1\"\n";
+    folder.write("cal.toml", former);
     let mut arguments = folder.arguments("calibrate . --out cal.toml --record cal.bin --json cal.json");
     arguments[1] = path;
     let ended = imucal(&arguments).with(1);
     ended.telling(&["cal.toml: not written", "cal.bin: not written", "no sensor was accepted"]);
     assert_eq!(folder.names(), ["cal.json", "cal.toml"], "the JSON holds the reasons");
-    assert_eq!(folder.text("cal.toml"), "kept");
+    assert_eq!(folder.text("cal.toml"), former);
 }
 
 #[test]

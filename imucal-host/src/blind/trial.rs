@@ -24,7 +24,8 @@ use super::{
 };
 use crate::{
     diagnosis::Diagnosis,
-    recording::{AtomicFile, Recording},
+    file::{Limits, OutputError, OutputSet, ReadFault},
+    recording::Recording,
     simulator::SimulationError,
 };
 
@@ -35,6 +36,15 @@ pub enum TrialError {
     /// A file of the folder.
     #[error("{}: {cause}; check the folder", path.display())]
     File { path: PathBuf, cause: io::Error },
+    /// The file of the set cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// Files of a set, but not which one.
+    #[error(
+        "{}: found the file of a set without its set.json, expected both or none; choose another folder; nothing was changed",
+        path.display()
+    )]
+    Headless { path: PathBuf },
     /// The folder holds another set.
     #[error(
         "{}: found the set of nonce {found}, expected {expected}; choose another folder, or leave the nonce out to go on with it",
@@ -54,6 +64,11 @@ pub enum TrialError {
     #[error("{case}: {cause}")]
     Simulation { case: String, cause: SimulationError },
 }
+
+/// Labels' hashes.
+const SEALS: &str = "seals.jsonl";
+/// Finished trials.
+const ANSWERS: &str = "answers.jsonl";
 
 /// Which set a folder holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -93,6 +108,11 @@ impl Folder {
                 }
             };
         }
+        for name in [SEALS, ANSWERS] {
+            if path.join(name).exists() {
+                return Err(TrialError::Headless { path: path.join(name) });
+            }
+        }
         fs::create_dir_all(path).map_err(failed)?;
         let nonce = match nonce {
             Some(nonce) => nonce,
@@ -100,21 +120,19 @@ impl Folder {
         };
         let set = Set { format: "imucal-blind/1".to_owned(), nonce: nonce.hex() };
         let text = serde_json::to_string_pretty(&set).unwrap_or_default() + "\n";
-        AtomicFile::write_whole(&set_path, text.as_bytes()).map_err(failed)?;
+        let mut files = OutputSet::sparing_all_but(Vec::new());
+        files.add(&set_path, text.as_bytes())?;
+        files.commit()?;
         Ok(Self { path: path.to_owned(), nonce })
     }
 
     fn nonce_of(path: &Path) -> Result<Option<Nonce>, TrialError> {
         let path = path.join("set.json");
-        let text = match fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(cause) if cause.kind() == io::ErrorKind::NotFound => return Ok(None),
-            Err(cause) => return Err(TrialError::File { path, cause }),
-        };
+        let Some(text) = text_of(&path, Limits::read_small)? else { return Ok(None) };
         let nonce = serde_json::from_str::<Set>(&text).ok().and_then(|set| Nonce::parse(&set.nonce));
         match nonce {
             Some(nonce) => Ok(Some(nonce)),
-            None => Err(TrialError::Damaged { path, line: 1, found: text }),
+            None => Err(TrialError::Damaged { path, line: 1, found: text.chars().take(80).collect() }),
         }
     }
 
@@ -129,10 +147,10 @@ impl Folder {
     ///
     /// [`TrialError`], but for simulations.
     pub fn finished(&self) -> Result<Vec<Finished>, TrialError> {
-        let mut finished: Vec<Finished> = lines(&self.path.join("answers.jsonl"))?;
+        let mut finished: Vec<Finished> = lines(&self.path.join(ANSWERS))?;
         finished.sort_by(|a, b| a.case.cmp(&b.case));
         finished.dedup_by(|a, b| a.case == b.case);
-        let seals: Vec<Seal> = lines(&self.path.join("seals.jsonl"))?;
+        let seals: Vec<Seal> = lines(&self.path.join(SEALS))?;
         for trial in &finished {
             let Some(seal) = seals.iter().find(|seal| seal.case == trial.case) else {
                 return Err(TrialError::Unsealed { case: trial.case.clone() });
@@ -226,10 +244,7 @@ struct Writer {
 
 impl Writer {
     fn open(folder: &Path) -> Result<Self, TrialError> {
-        Ok(Self {
-            seals: Lines::open(folder.join("seals.jsonl"))?,
-            answers: Lines::open(folder.join("answers.jsonl"))?,
-        })
+        Ok(Self { seals: Lines::open(folder.join(SEALS))?, answers: Lines::open(folder.join(ANSWERS))? })
     }
 }
 
@@ -243,11 +258,8 @@ impl Lines {
     fn open(path: PathBuf) -> Result<Self, TrialError> {
         let open = || {
             // What an interruption left of a line is cut off.
-            let whole = match fs::read(&path) {
-                Ok(bytes) => bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1),
-                Err(cause) if cause.kind() == io::ErrorKind::NotFound => 0,
-                Err(cause) => return Err(cause),
-            };
+            let bytes = bytes_of(&path, Limits::read_large)?.unwrap_or_default();
+            let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
             let file = OpenOptions::new().create(true).append(true).open(&path)?;
             file.set_len(whole as u64)?;
             Ok(file)
@@ -266,13 +278,28 @@ impl Lines {
     }
 }
 
+type Reader = fn(&Limits, &Path) -> Result<Vec<u8>, ReadFault>;
+
+/// A file's bytes; `None` without the file.
+fn bytes_of(path: &Path, read: Reader) -> io::Result<Option<Vec<u8>>> {
+    match read(&Limits::default(), path) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(ReadFault::System(cause)) if cause.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(ReadFault::System(cause)) => Err(cause),
+        Err(fault) => Err(io::Error::other(format!("found {fault}, expected the file of a set"))),
+    }
+}
+
+/// A file's text; `None` without the file.
+fn text_of(path: &Path, read: Reader) -> Result<Option<String>, TrialError> {
+    let failed = |cause| TrialError::File { path: path.to_owned(), cause };
+    let bytes = bytes_of(path, read).map_err(failed)?;
+    bytes.map(|bytes| String::from_utf8(bytes).map_err(|cause| failed(io::Error::other(cause)))).transpose()
+}
+
 /// All whole lines of a file; none without the file.
 fn lines<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Vec<T>, TrialError> {
-    let text = match fs::read_to_string(path) {
-        Ok(text) => text,
-        Err(cause) if cause.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(cause) => return Err(TrialError::File { path: path.to_owned(), cause }),
-    };
+    let text = text_of(path, Limits::read_large)?.unwrap_or_default();
     let whole = text.rfind('\n').map_or("", |end| &text[..end]);
     let read = |(at, line): (usize, &str)| {
         serde_json::from_str(line).map_err(|cause| TrialError::Damaged {

@@ -49,7 +49,11 @@ impl Search {
     /// In words.
     pub fn note(&self) -> String {
         let (termination, rms) = self.direct;
-        let direct = format!("by {}, {:.2}° rms", termination.name(), rms.to_degrees());
+        let residual = |rms: f64| match rms.is_nan() {
+            true => "no residual".to_owned(),
+            false => format!("{:.2}° rms", rms.to_degrees()),
+        };
+        let direct = format!("by {}, {}", termination.name(), residual(rms));
         let Some(swarm) = &self.swarm else {
             return "found by Levenberg–Marquardt from the static bias".into();
         };
@@ -72,9 +76,9 @@ impl Search {
             if swarm.kept { "and Levenberg–Marquardt from its best is kept" } else { "and ended no lower" };
         format!(
             "Levenberg–Marquardt from the static bias stopped {direct}; a particle swarm {converged}, \
-             {} evaluations{bound}, {end}: {:.2}° rms",
+             {} evaluations{bound}, {end}: {}",
             swarm.evaluations,
-            swarm.rms.to_degrees()
+            residual(swarm.rms)
         )
     }
 }

@@ -9,8 +9,11 @@ use clap::Args;
 
 use super::{
     Ending, load,
-    output::{self, say},
-    read, refuse, warn,
+    output::say,
+    overwrite::{Overwrite, Planned, files_of},
+    read,
+    reading::Reading,
+    refuse, warn,
 };
 use crate::apply;
 
@@ -26,28 +29,33 @@ pub(super) struct Arguments {
     out: Option<PathBuf>,
     /// Apply a calibration made for another serial
     #[arg(long)]
-    force: bool,
+    other_serial: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let out = arguments.out.clone().unwrap_or_else(|| beside(&arguments.recording));
-    let mut inputs = output::files_of(&arguments.recording);
+    let mut inputs = files_of(&arguments.recording);
     inputs.push(arguments.calibration.clone());
-    output::check(&inputs, &output::files_of(&out))?;
-    let recording = read(&arguments.recording)?;
-    let stored = match load(&arguments.calibration)? {
+    let mut files = arguments.overwrite.plan(&inputs, &Planned::recording(&out))?;
+    let recording = read(&arguments.recording, arguments.reading)?;
+    let stored = match load(&arguments.calibration, arguments.reading)? {
         Ok(stored) => stored,
         Err(damaged) => return Ok(refuse(&damaged)),
     };
     let record = stored.to_record(&arguments.calibration)?;
-    let warning = match apply::check(&recording, &stored, &record, arguments.force) {
+    let warning = match apply::check(&recording, &stored, &record, arguments.other_serial) {
         Ok(warning) => warning,
         Err(refusal) => return Ok(refuse(&refusal)),
     };
     if let Some(warning) = warning {
         warn(&warning);
     }
-    apply::apply(&recording, &stored, &record).write(&out)?;
+    apply::apply(&recording, &stored, &record).write_into(&out, &mut files)?;
+    files.commit()?;
     say!("{}: {} rows corrected into {}", recording.name, recording.rows(), out.display());
     Ok(Ending::Done)
 }

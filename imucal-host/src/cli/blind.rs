@@ -1,9 +1,6 @@
 //! `imucal blind`
 
-use std::{
-    num::NonZeroUsize,
-    path::{Path, PathBuf},
-};
+use std::{num::NonZeroUsize, path::PathBuf};
 
 use anyhow::Context;
 use clap::Args;
@@ -11,6 +8,7 @@ use clap::Args;
 use super::{
     Ending,
     output::{self, say},
+    overwrite::{Overwrite, Planned},
     progress::Progress,
 };
 use crate::{
@@ -50,6 +48,8 @@ pub(super) struct Arguments {
     /// Only write the recording of this case, such as afflicted-0003, and its label into --out
     #[arg(long, value_name = "CASE", value_parser = case, requires = "nonce")]
     open: Option<Case>,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 fn nonce(text: &str) -> Result<Nonce, String> {
@@ -63,13 +63,18 @@ fn case(text: &str) -> Result<Case, String> {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if let (Some(case), Some(nonce)) = (arguments.open, arguments.nonce) {
-        return open(nonce, case, &arguments.out);
+        return open(nonce, case, arguments);
     }
     let folder = match &arguments.score {
         Some(path) => {
             anyhow::ensure!(
                 path.is_dir(),
                 "{}: found no folder, expected one of an earlier run",
+                path.display()
+            );
+            anyhow::ensure!(
+                path.join("set.json").is_file(),
+                "{}: found no set of trials, expected the folder of an earlier run",
                 path.display()
             );
             Folder::open(path, None)?
@@ -99,13 +104,18 @@ fn trials(arguments: &Arguments) -> anyhow::Result<Folder> {
 }
 
 /// Writes one case for a closer look.
-fn open(nonce: Nonce, case: Case, folder: &Path) -> anyhow::Result<Ending> {
-    let drawn = draw(&nonce, case)?;
+fn open(nonce: Nonce, case: Case, arguments: &Arguments) -> anyhow::Result<Ending> {
+    let folder = &arguments.out;
     std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
     let name = format!("{}.csv.gz", case.name());
-    drawn.simulation.record(&name)?.write(&folder.join(&name))?;
-    let label = folder.join(format!("{}.label.json", case.name()));
-    output::file(&label, &(serde_json::to_string_pretty(&drawn.label)? + "\n"))?;
-    say!("{}", folder.join(&name).display());
+    let (path, label) = (folder.join(&name), folder.join(format!("{}.label.json", case.name())));
+    let mut planned = Planned::recording(&path);
+    planned.push(Planned::new(&label));
+    let mut files = arguments.overwrite.plan(&[], &planned)?;
+    let drawn = draw(&nonce, case)?;
+    drawn.simulation.record(&name)?.write_into(&path, &mut files)?;
+    files.add(&label, (serde_json::to_string_pretty(&drawn.label)? + "\n").as_bytes())?;
+    files.commit()?;
+    say!("{}", path.display());
     Ok(Ending::Done)
 }

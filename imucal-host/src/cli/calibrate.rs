@@ -5,13 +5,21 @@ use std::{path::PathBuf, time::SystemTime};
 use clap::Args;
 use imucal_core::record::Date;
 
-use super::{Ending, output, progress::Progress, read, warn};
+use super::{
+    Ending, output,
+    overwrite::{Overwrite, Planned, files_of},
+    progress::Progress,
+    read,
+    reading::Reading,
+    warn,
+};
 use crate::{
     calibrate::{AccModel, Calibration, Options, Status, calibrate, gyr, gyr_rig, ladder, mag},
+    file::OutputSet,
     observe::pose,
     recording::{Recording, SensorKind},
     report,
-    store::StoredCalibration,
+    store::{StoredCalibration, form::Form},
 };
 
 #[derive(Args, Debug)]
@@ -40,6 +48,10 @@ pub(super) struct Arguments {
     /// Write sensors as well that are suspect: their fit keeps its limits, but its residual is not the noise
     #[arg(long)]
     accept_suspect: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 /// A model named on the command line.
@@ -93,22 +105,30 @@ fn multiple(text: &str) -> Result<f64, String> {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let named: Vec<SensorKind> = arguments.model.iter().map(|(kind, _)| *kind).collect();
     check_models(&named)?;
-    output::check(&output::files_of(&arguments.recording), &outputs(arguments))?;
-    let recording = read(&arguments.recording)?;
+    let files = arguments.overwrite.plan(&files_of(&arguments.recording), &outputs(arguments))?;
+    let recording = read(&arguments.recording, arguments.reading)?;
     check_named(&recording, &named)?;
     check_rig(&recording, &arguments.model)?;
     let progress = Progress::start();
     let calibration = calibrate(&recording, &options(arguments), &|stage| progress.stage(stage));
     drop(progress);
-    print(arguments, &calibration)?;
-    write(arguments, &calibration)?;
+    let json = serde_json::to_string_pretty(&report::json::calibration(&calibration))? + "\n";
+    print(arguments, &calibration, &json)?;
+    write(arguments, &calibration, &json, files)?;
     Ok(ending(arguments, &calibration, &named))
 }
 
-/// The files asked for; `--json -` is none.
-fn outputs(arguments: &Arguments) -> Vec<PathBuf> {
-    let json = arguments.json.iter().filter(|path| path.as_os_str() != "-");
-    arguments.out.iter().chain(&arguments.record).chain(json).cloned().collect()
+/// The files asked for.
+fn outputs(arguments: &Arguments) -> Vec<Planned> {
+    [(&arguments.out, Form::Toml), (&arguments.record, Form::Record), (&json_file(arguments), Form::Json)]
+        .into_iter()
+        .filter_map(|(path, form)| Some(Planned::calibration(path.as_ref()?, form)))
+        .collect()
+}
+
+/// The JSON's file; `--json -` is none.
+fn json_file(arguments: &Arguments) -> Option<PathBuf> {
+    arguments.json.clone().filter(|path| path.as_os_str() != "-")
 }
 
 fn options(arguments: &Arguments) -> Options {
@@ -172,14 +192,17 @@ fn check_models(named: &[SensorKind]) -> anyhow::Result<()> {
 }
 
 fn check_named(recording: &Recording, named: &[SensorKind]) -> anyhow::Result<()> {
-    match named.iter().find(|kind| recording.sensor(**kind).is_none()) {
-        Some(kind) => anyhow::bail!(
-            "{}: --model names {kind}, but the recording has no columns {}; leave it out of --model",
-            recording.name,
-            kind.columns().join(", ")
-        ),
-        None => Ok(()),
+    let missing: Vec<&SensorKind> = named.iter().filter(|kind| recording.sensor(**kind).is_none()).collect();
+    if missing.is_empty() {
+        return Ok(());
     }
+    let list = |words: Vec<String>| words.join(", ");
+    anyhow::bail!(
+        "{}: --model names {}, but the recording has no columns {}; leave it out of --model",
+        recording.name,
+        list(missing.iter().map(ToString::to_string).collect()),
+        list(missing.iter().map(|kind| kind.columns().join(", ")).collect())
+    )
 }
 
 /// 0 once something was accepted, nothing named was refused, and nothing is suspect that was not asked for.
@@ -196,34 +219,36 @@ fn ending(arguments: &Arguments, calibration: &Calibration, named: &[SensorKind]
     if done { Ending::Done } else { Ending::Refused }
 }
 
-fn print(arguments: &Arguments, calibration: &Calibration) -> anyhow::Result<()> {
-    if let Some(path) = &arguments.json {
-        let text = serde_json::to_string_pretty(&report::json::calibration(calibration))? + "\n";
-        if path.as_os_str() == "-" {
-            return output::text(&text);
-        }
-        output::file(path, &text)?;
+fn print(arguments: &Arguments, calibration: &Calibration, json: &str) -> anyhow::Result<()> {
+    match (&arguments.json, json_file(arguments)) {
+        (Some(_), None) => output::text(json),
+        _ => output::text(&report::table::table(calibration)),
     }
-    output::text(&report::table::table(calibration))
 }
 
-fn write(arguments: &Arguments, calibration: &Calibration) -> anyhow::Result<()> {
+/// Writes all files that were asked for, or none; those that hold sensors only where there is one.
+fn write(
+    arguments: &Arguments,
+    calibration: &Calibration,
+    json: &str,
+    mut files: OutputSet,
+) -> anyhow::Result<()> {
     let of = if arguments.accept_suspect { StoredCalibration::with_suspects } else { StoredCalibration::of };
     let stored = of(calibration, today());
     let nothing = SensorKind::ALL.into_iter().all(|kind| stored.triad(kind).is_none());
+    if let Some(path) = json_file(arguments) {
+        files.add(&path, json.as_bytes())?;
+    }
     for path in arguments.out.iter().chain(&arguments.record).filter(|_| nothing) {
         warn(&format!("{}: not written, since no sensor was accepted", path.display()));
     }
-    if nothing {
-        return Ok(());
+    if let Some(path) = arguments.out.as_ref().filter(|_| !nothing) {
+        stored.write_toml(path, &mut files)?;
     }
-    if let Some(path) = &arguments.out {
-        stored.save_toml(path)?;
+    if let Some(path) = arguments.record.as_ref().filter(|_| !nothing) {
+        stored.write_record(path, &mut files)?;
     }
-    if let Some(path) = &arguments.record {
-        stored.save_record(path)?;
-    }
-    Ok(())
+    Ok(files.commit()?)
 }
 
 /// Today, UTC; `SOURCE_DATE_EPOCH` overrides it, for outputs that must not depend on the day.

@@ -9,6 +9,7 @@ use super::{
     Ending,
     calibrate::today,
     output::{self, say},
+    overwrite::{Overwrite, Planned},
 };
 use crate::{
     apply::apply,
@@ -28,11 +29,25 @@ use crate::{
 /// The effect that nothing downstream is told of, and its size in multiples of its usual one.
 const WITHHELD: (&str, f64) = ("acc.scale_cubic", 3.0);
 
+/// What the demo writes, all of it at its end.
+const WRITTEN: [(&str, &str); 8] = [
+    ("rig.csv.gz", "the recording"),
+    ("rig.toml", "its manifest: units, site, sensor"),
+    ("calibration.toml", "the calibration for people"),
+    ("calibration.bin", "the record for the device"),
+    ("calibration.json", "everything, for programs"),
+    ("rig-calibrated.csv.gz", "the recording corrected through the core"),
+    ("rig-calibrated.toml", "its manifest"),
+    ("diagnosis.json", "the diagnosis, for programs"),
+];
+
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
     /// Folder for what the demo writes
     #[arg(long, value_name = "DIR", default_value = "imucal-demo")]
     out: PathBuf,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
@@ -43,6 +58,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             out.display()
         )
     })?;
+    // A folder with all of them holds an earlier demo, which the next one replaces.
+    let planned: Vec<Planned> = WRITTEN.iter().map(|(file, _)| Planned::new(out.join(file))).collect();
+    let earlier = WRITTEN.iter().all(|(file, _)| out.join(file).exists());
+    let mut files = arguments.overwrite.or(earlier).plan(&[], &planned)?;
     say!(
         "1. Record: a simulated MTx on a three-gimbal rig, in 24 attitudes, six of them twice; one effect is withheld."
     );
@@ -52,17 +71,17 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         simulation.add(effect, WITHHELD.1)?;
     }
     let recording = simulation.record("rig.csv.gz")?;
-    recording.write(&out.join("rig.csv.gz"))?;
+    recording.write_into(&out.join("rig.csv.gz"), &mut files)?;
 
     say!("\n2. Calibrate, and compare the models.\n");
     let options = Options { compare: true, ..Options::default() };
     let calibration = calibrate(&recording, &options, &|_| {});
     output::text(&report::table::table(&calibration))?;
     let stored = StoredCalibration::of(&calibration, today());
-    stored.save_toml(&out.join("calibration.toml"))?;
-    stored.save_record(&out.join("calibration.bin"))?;
+    stored.write_toml(&out.join("calibration.toml"), &mut files)?;
+    stored.write_record(&out.join("calibration.bin"), &mut files)?;
     let json = serde_json::to_string_pretty(&report::json::calibration(&calibration))? + "\n";
-    output::file(&out.join("calibration.json"), &json)?;
+    files.add(&out.join("calibration.json"), json.as_bytes())?;
 
     say!("\n3. Compare with the truth, which the calibration never saw.\n");
     let found = against_truth(&calibration, &simulation)?;
@@ -81,13 +100,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         fit.iter().try_for_each(print_fit)?;
         equal &= fit.is_some_and(|fit| fit.passes());
     }
-    apply(&recording, &stored, &device).write(&out.join("rig-calibrated.csv.gz"))?;
+    apply(&recording, &stored, &device).write_into(&out.join("rig-calibrated.csv.gz"), &mut files)?;
 
     say!("\n5. Diagnose: which effect was withheld, and how far does the gap close with it?\n");
     let diagnosis = diagnose(&recording, &diagnosis::Options::default(), &|_| {});
     output::text(&report::diagnosis::page(&diagnosis))?;
     let json = serde_json::to_string_pretty(&diagnosis)? + "\n";
-    output::file(&out.join("diagnosis.json"), &json)?;
+    files.add(&out.join("diagnosis.json"), json.as_bytes())?;
+    files.commit()?;
     let named = diagnosis.causes.iter().any(|cause| cause.effect == WITHHELD.0);
     say!(
         "{}",
@@ -99,16 +119,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     );
 
     say!("\nWritten to {}:", out.display());
-    for (file, what) in [
-        ("rig.csv.gz", "the recording"),
-        ("rig.toml", "its manifest: units, site, sensor"),
-        ("calibration.toml", "the calibration for people"),
-        ("calibration.bin", "the record for the device"),
-        ("calibration.json", "everything, for programs"),
-        ("rig-calibrated.csv.gz", "the recording corrected through the core"),
-        ("rig-calibrated.toml", "its manifest"),
-        ("diagnosis.json", "the diagnosis, for programs"),
-    ] {
+    for (file, what) in WRITTEN {
         say!("  {file:<24} {what}");
     }
     Ok(if found && equal && named { Ending::Done } else { Ending::Refused })

@@ -10,15 +10,18 @@ use imucal_core::{
 
 use super::{
     Ending, load,
-    output::{self, say},
-    read, refuse, warn,
+    output::say,
+    overwrite::{Overwrite, Planned, files_of},
+    read,
+    reading::Reading,
+    refuse, warn,
 };
 use crate::{
     apply,
     calibrate::{Options, calibrate},
     device::{Address, DeviceError, Session, fit::BoardFit},
-    recording::{AtomicFile, Recording, SensorKind},
-    report::table::words,
+    recording::{Recording, SensorKind},
+    report::{measure::rounded, table::words},
     store::StoredCalibration,
 };
 
@@ -60,6 +63,8 @@ struct Get {
     /// The record
     #[arg(long, value_name = "CAL.bin")]
     out: PathBuf,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 #[derive(Args, Debug)]
@@ -71,6 +76,8 @@ struct Put {
     /// Overwrite a record of another sensor or of a newer format
     #[arg(long)]
     replace: bool,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 #[derive(Args, Debug)]
@@ -84,7 +91,11 @@ struct Stream {
     out: PathBuf,
     /// Apply a calibration made for another serial
     #[arg(long)]
-    force: bool,
+    other_serial: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 #[derive(Args, Debug)]
@@ -99,11 +110,18 @@ struct Calibrate {
     /// Overwrite a record of another sensor or of a newer format
     #[arg(long)]
     replace: bool,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 impl Place {
     pub(super) fn open(&self) -> Result<Session, DeviceError> {
         Session::open(&self.device, self.flash.as_deref())
+    }
+
+    /// The files that the device itself is in.
+    fn files(&self) -> Vec<PathBuf> {
+        self.flash.iter().cloned().collect()
     }
 }
 
@@ -166,18 +184,18 @@ fn named(text: &str) -> &str {
 }
 
 fn get(arguments: &Get) -> anyhow::Result<Ending> {
-    output::check(&[], std::slice::from_ref(&arguments.out))?;
+    let mut files = arguments.overwrite.plan(&arguments.place.files(), &[Planned::new(&arguments.out)])?;
     let Some(bytes) = arguments.place.open()?.record()? else {
         return Ok(refuse(&"no record is stored on the device"));
     };
-    AtomicFile::write_whole(&arguments.out, &bytes)
-        .map_err(|cause| anyhow::anyhow!("{}: cannot be written: {cause}", arguments.out.display()))?;
+    files.add(&arguments.out, &bytes)?;
+    files.commit()?;
     say!("{} bytes into {}", bytes.len(), arguments.out.display());
     Ok(Ending::Done)
 }
 
 fn put(arguments: &Put) -> anyhow::Result<Ending> {
-    let stored = match load(&arguments.calibration)? {
+    let stored = match load(&arguments.calibration, arguments.reading)? {
         Ok(stored) => stored,
         Err(damaged) => return Ok(refuse(&damaged)),
     };
@@ -196,22 +214,24 @@ fn on_device(session: &mut Session) -> anyhow::Result<Option<record::Calibration
 }
 
 fn stream(arguments: &Stream) -> anyhow::Result<Ending> {
-    let files = output::files_of(&arguments.out);
-    output::check(&output::files_of(&arguments.recording), &files)?;
-    let recording = read(&arguments.recording)?;
+    let mut inputs = files_of(&arguments.recording);
+    inputs.extend(arguments.place.files());
+    let mut files = arguments.overwrite.plan(&inputs, &Planned::recording(&arguments.out))?;
+    let recording = read(&arguments.recording, arguments.reading)?;
     let mut session = arguments.place.open()?;
     let Some(record) = on_device(&mut session)? else {
         return Ok(refuse(&"no record is stored on the device; put one, or calibrate on board"));
     };
     let stored = StoredCalibration::from_record(&record);
-    match apply::check(&recording, &stored, &record, arguments.force) {
+    match apply::check(&recording, &stored, &record, arguments.other_serial) {
         Ok(warning) => warning.iter().for_each(|w| warn(w)),
         Err(refusal) => return Ok(refuse(&refusal)),
     }
     let corrected = apply::apply_by(&recording, &stored, |sensor, raw, temperature| {
         session.correct_at(sensor, raw, temperature)
     })?;
-    corrected.write(&arguments.out)?;
+    corrected.write_into(&arguments.out, &mut files)?;
+    files.commit()?;
     say!(
         "{}: {} rows corrected on the device into {}",
         recording.name,
@@ -222,7 +242,7 @@ fn stream(arguments: &Stream) -> anyhow::Result<Ending> {
 }
 
 fn fit(arguments: &Calibrate) -> anyhow::Result<Ending> {
-    let recording = read(&arguments.recording)?;
+    let recording = read(&arguments.recording, arguments.reading)?;
     let options = Options { rig_acc: None, rig_gyr: None, rig_mag: None, ..Options::default() };
     let calibration = calibrate(&recording, &options, &|_| {});
     let mut session = arguments.place.open()?;
@@ -251,21 +271,22 @@ fn print(
     report: &FitReport,
 ) -> anyhow::Result<bool> {
     say!(
-        "{}: {}: {} of {}: {} after {} iterations, condition {:.1}: {}",
+        "{}: {}: {} of {}: {} after {} iterations, condition {}: {}",
         recording.name,
         words(kind),
         report.model.name(),
         fit.observations.len(),
         report.termination.name(),
         report.iterations,
-        report.condition,
+        rounded(report.condition.into(), 1),
         report
             .refusal
             .map_or_else(|| "accepted".into(), |refusal| format!("{}: {refusal}", refusal.reason())),
     );
     for (k, value) in report.theta.iter().enumerate() {
-        let std = report.covariance.get(k * (k + 3) / 2).map_or(f32::NAN, |variance| variance.sqrt());
-        say!("  parameter {:>2}  {value:>14.8} ± {std:.1e}", k + 1);
+        let std = report.covariance.get(k * (k + 3) / 2).map(|variance| variance.sqrt());
+        let std = std.filter(|std| !std.is_nan()).map_or_else(|| "∞".into(), |std| format!("{std:.1e}"));
+        say!("  parameter {:>2}  {value:>14.8} ± {std}", k + 1);
     }
     let equal = fit.is_here(report);
     match equal {

@@ -5,10 +5,19 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 
-use super::{Ending, load, output, progress::Progress, read, refuse, simulate::unknown};
+use super::{
+    Ending, load, output,
+    overwrite::{Overwrite, Planned, files_of},
+    progress::Progress,
+    read,
+    reading::Reading,
+    refuse,
+    simulate::unknown,
+};
 use crate::{
     diagnosis::{Diagnosis, Options, Verdict, diagnose},
     effect::{self, CATALOGUE},
+    file::OutputSet,
     report,
 };
 
@@ -29,6 +38,10 @@ pub(super) struct Arguments {
     /// Say of every effect what it is, how large it usually is, what shows it and what it is mistaken for
     #[arg(long)]
     list: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 /// An id of the catalogue.
@@ -42,13 +55,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         output::text(&report::catalogue::catalogue())?;
         return Ok(Ending::Done);
     };
-    let outputs: Vec<PathBuf> =
-        arguments.json.iter().filter(|path| path.as_os_str() != "-").cloned().collect();
-    let mut inputs = output::files_of(path);
+    let json = arguments.json.iter().filter(|path| path.as_os_str() != "-");
+    let mut inputs = files_of(path);
     inputs.extend(arguments.model.clone());
-    output::check(&inputs, &outputs)?;
-    let recording = read(path)?;
-    let model = match arguments.model.as_deref().map(load).transpose()? {
+    let files = arguments.overwrite.plan(&inputs, &json.map(Planned::new).collect::<Vec<_>>())?;
+    let recording = read(path, arguments.reading)?;
+    let model = arguments.model.as_deref().map(|path| load(path, arguments.reading)).transpose()?;
+    let model = match model {
         Some(Err(damaged)) => return Ok(refuse(&damaged)),
         model => model.and_then(Result::ok),
     };
@@ -56,18 +69,19 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let progress = Progress::start();
     let diagnosis = diagnose(&recording, &options, &|stage| progress.stage(stage));
     drop(progress);
-    print(arguments, &diagnosis)?;
+    print(arguments, &diagnosis, files)?;
     Ok(if diagnosis.verdict == Verdict::NotTestable { Ending::Refused } else { Ending::Done })
 }
 
-fn print(arguments: &Arguments, diagnosis: &Diagnosis) -> anyhow::Result<()> {
+fn print(arguments: &Arguments, diagnosis: &Diagnosis, mut files: OutputSet) -> anyhow::Result<()> {
     if let Some(path) = &arguments.json {
         let text =
             serde_json::to_string_pretty(diagnosis).context("the diagnosis cannot be spelt as JSON")? + "\n";
         if path.as_os_str() == "-" {
             return output::text(&text);
         }
-        output::file(path, &text)?;
+        files.add(path, text.as_bytes())?;
+        files.commit()?;
     }
     output::text(&report::diagnosis::page(diagnosis))
 }

@@ -6,7 +6,9 @@ use clap::{Args, ValueEnum};
 
 use super::{
     Ending,
-    output::{self, say},
+    output::say,
+    overwrite::{Overwrite, Planned},
+    reading::Reading,
     warn,
 };
 use crate::recording::{Manifest, imu_tk};
@@ -34,19 +36,25 @@ pub(super) struct Arguments {
     /// The recording to write: .csv, .csv.gz or .parquet
     #[arg(long, value_name = "REC")]
     out: PathBuf,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let inputs = [arguments.acc.clone(), arguments.gyr.clone()];
-    output::check(&inputs, &output::files_of(&arguments.out))?;
-    let (manifest, warnings) = Manifest::read(&arguments.manifest)?;
+    let mut files = arguments.overwrite.plan(&inputs, &Planned::recording(&arguments.out))?;
+    let limits = arguments.reading.limits();
+    let (manifest, warnings) = Manifest::read_within(&arguments.manifest, &limits)?;
     let recording = match arguments.from {
-        Layout::ImuTk => imu_tk::read_pair(&arguments.acc, &arguments.gyr, manifest)?,
+        Layout::ImuTk => imu_tk::read_pair(&arguments.acc, &arguments.gyr, manifest, &limits)?,
     };
     for warning in warnings.iter().chain(&recording.warnings) {
         warn(warning);
     }
-    recording.write(&arguments.out)?;
+    recording.write_into(&arguments.out, &mut files)?;
+    files.commit()?;
     say!("{}: {} rows", arguments.out.display(), recording.rows());
     Ok(Ending::Done)
 }

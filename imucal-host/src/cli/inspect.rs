@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Ending, load, output::say};
+use super::{Ending, load, output::say, reading::Reading};
 use crate::{
     recording::SensorKind,
     report::{
-        measure::{measure, plain},
+        measure::{measure, percent, plain, rounded},
         table::words,
     },
     store::StoredTriad,
@@ -18,10 +18,12 @@ use crate::{
 pub(super) struct Arguments {
     /// The calibration: TOML or record
     calibration: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let stored = match load(&arguments.calibration)? {
+    let stored = match load(&arguments.calibration, arguments.reading)? {
         Ok(stored) => stored,
         Err(damaged) => {
             say!("{damaged}");
@@ -66,12 +68,12 @@ fn print_triad(kind: SensorKind, triad: &StoredTriad) -> anyhow::Result<()> {
     let unit = if kind == SensorKind::Gyr { "rad a turn".into() } else { triad.unit_out.to_string() };
     let held = triad.held_out_rms.map_or_else(|| "not known".into(), plain);
     say!(
-        "  {} observations, {} parameters; rms {} {unit}, held out {held}; condition {:.1}, coverage {:.0} %",
+        "  {} observations, {} parameters; rms {} {unit}, held out {held}; condition {}, coverage {}",
         triad.observations,
         triad.parameters,
         plain(triad.rms),
-        triad.condition,
-        100.0 * triad.coverage
+        rounded(triad.condition, 1),
+        percent(triad.coverage)
     );
     Ok(())
 }

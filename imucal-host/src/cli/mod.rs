@@ -1,10 +1,14 @@
 //! The program's commands. One file each; this one only reads the command line and says how it ended.
 
-use std::process::ExitCode;
+use std::{path::Path, process::ExitCode};
 
 use clap::{Parser, Subcommand};
 
-use crate::store::{LoadError, StoredCalibration};
+use self::reading::Reading;
+use crate::{
+    recording::Recording,
+    store::{LoadError, StoredCalibration},
+};
 
 mod apply;
 mod blind;
@@ -14,8 +18,11 @@ mod device;
 mod diagnose;
 mod import;
 mod inspect;
+mod interrupt;
 mod output;
+mod overwrite;
 mod progress;
+mod reading;
 mod simulate;
 mod study;
 mod verify;
@@ -65,7 +72,9 @@ enum Ending {
 
 /// Runs the program: 0 done, 1 refused or a check failed, 2 bad usage or unreadable input.
 pub fn run() -> ExitCode {
-    let result = match Cli::parse().command {
+    let command = Cli::parse().command;
+    interrupt::watch();
+    let result = match command {
         Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Apply(arguments) => apply::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
@@ -100,16 +109,16 @@ fn refuse(refusal: &dyn std::fmt::Display) -> Ending {
 }
 
 /// Loads a calibration; one that can be read but must not be used is the error within.
-fn load(path: &std::path::Path) -> anyhow::Result<Result<StoredCalibration, LoadError>> {
-    match StoredCalibration::load(path) {
+fn load(path: &Path, reading: Reading) -> anyhow::Result<Result<StoredCalibration, LoadError>> {
+    match StoredCalibration::load_within(path, &reading.limits()) {
         Err(damaged @ (LoadError::Record { .. } | LoadError::Unusable { .. })) => Ok(Err(damaged)),
         read => Ok(Ok(read?)),
     }
 }
 
 /// Reads a recording and tells of what was odd in it.
-fn read(path: &std::path::Path) -> anyhow::Result<crate::recording::Recording> {
-    let recording = crate::recording::Recording::read(path)?;
+fn read(path: &Path, reading: Reading) -> anyhow::Result<Recording> {
+    let recording = Recording::read_within(path, &reading.limits())?;
     for warning in &recording.warnings {
         warn(warning);
     }

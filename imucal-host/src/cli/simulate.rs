@@ -6,14 +6,19 @@ use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 
-use super::{Ending, output};
+use super::{
+    Ending,
+    output::{self, say},
+    overwrite::{Overwrite, Planned},
+};
 use crate::{
     blind::{
         case::{Omission, omission},
         seal::{Nonce, digest},
     },
     effect::{self, CATALOGUE, Effect},
-    recording::{AtomicFile, Manifest, manifest::Axis, spelling::nearest},
+    file::OutputSet,
+    recording::{Manifest, manifest::Axis, spelling::nearest},
     report,
     simulator::{
         Conditions, Programme, Simulation, UnitKind,
@@ -63,6 +68,8 @@ pub(super) struct Arguments {
     /// Draw seed and effects from a fresh nonce, write them into NAME.label.json and print only its SHA-256
     #[arg(long, conflicts_with_all = ["effects", "seed"])]
     sealed: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 fn unit(text: &str) -> Result<UnitKind, String> {
@@ -132,34 +139,37 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         doses: Vec::new(),
     };
     if arguments.sealed {
-        return sealed(simulation, out);
+        return sealed(simulation, out, arguments.overwrite);
     }
+    let mut files = arguments.overwrite.plan(&[], &Planned::recording(out))?;
     for (effect, size) in &arguments.effects {
         simulation.add(effect, *size)?;
     }
-    write(&simulation, out)?;
+    let done = write(&simulation, out, &mut files)?;
+    files.commit()?;
+    say!("{done}");
     for dose in &simulation.doses {
         let values = dose.effect.parameters.iter().zip(&dose.values);
         let values: Vec<String> =
             values.map(|(p, value)| format!("{} = {value:.4e} {}", p.name, p.unit)).collect();
-        println!("  {}: {}", dose.effect.id, values.join(", "));
+        say!("  {}: {}", dose.effect.id, values.join(", "));
     }
     Ok(Ending::Done)
 }
 
-fn write(simulation: &Simulation, out: &Path) -> anyhow::Result<()> {
+/// Adds the recording to a set of files; what is to be said of it.
+fn write(simulation: &Simulation, out: &Path, files: &mut OutputSet) -> anyhow::Result<String> {
     let name = out.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let recording = simulation.record(&name)?;
-    recording.write(out)?;
-    println!(
+    recording.write_into(out, files)?;
+    Ok(format!(
         "{}: {} rows, {:.0} s of the programme {}, unit {}",
         out.display(),
         recording.rows(),
         recording.rows() as f64 / simulation.rate,
         simulation.programme.name(),
         simulation.unit.name(),
-    );
-    Ok(())
+    ))
 }
 
 /// None, one, two or three effects in a quarter, nearly half, a fifth and a tenth of all cases, of any size from a third of
@@ -181,8 +191,11 @@ fn is_drawn(effect: &Effect) -> bool {
     !matches!(omission(effect), Some(Omission::Baseline | Omission::Convention))
 }
 
-fn sealed(mut simulation: Simulation, out: &Path) -> anyhow::Result<Ending> {
+fn sealed(mut simulation: Simulation, out: &Path, overwrite: Overwrite) -> anyhow::Result<Ending> {
     let label_path = label_beside(out)?;
+    let mut planned = Planned::recording(out);
+    planned.push(Planned::new(&label_path));
+    let mut files = overwrite.plan(&[], &planned)?;
     let nonce = Nonce::fresh().context("the system gave no random numbers")?;
     // Not the nonce itself, and one way: the recording says nothing of its label.
     simulation.seed = nonce.seed("imucal sealed seed");
@@ -205,10 +218,11 @@ fn sealed(mut simulation: Simulation, out: &Path) -> anyhow::Result<Ending> {
         "effects": effects,
     });
     let text = serde_json::to_string_pretty(&label)? + "\n";
-    write(&simulation, out)?;
-    AtomicFile::write_whole(&label_path, text.as_bytes())
-        .with_context(|| format!("{}: cannot be written; check the folder", label_path.display()))?;
-    println!("{}: SHA-256 {}", label_path.display(), digest(&text));
+    let done = write(&simulation, out, &mut files)?;
+    files.add(&label_path, text.as_bytes())?;
+    files.commit()?;
+    say!("{done}");
+    say!("{}: SHA-256 {}", label_path.display(), digest(&text));
     Ok(Ending::Done)
 }
 
@@ -254,7 +268,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("case.csv");
         let simulation = Simulation { programme: Programme::Sinusoids, rate: 10.0, ..Simulation::default() };
-        sealed(simulation, &out).unwrap();
+        sealed(simulation, &out, Overwrite::default()).unwrap();
         let label = std::fs::read_to_string(folder.path().join("case.label.json")).unwrap();
         let label: serde_json::Value = serde_json::from_str(&label).unwrap();
         assert_eq!(label["salt"].as_str().unwrap().len(), 64);

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use imucal_core::record::{self, CalibrationRecord};
 
-use super::{Ending, device::ending, load, output::say, progress::Progress, read, refuse, warn};
+use super::{
+    Ending, device::ending, load, output::say, progress::Progress, read, reading::Reading, refuse, warn,
+};
 use crate::{
     apply,
     calibrate::{AccModel, Options, calibrate, gyr_rig, ladder},
@@ -36,18 +38,20 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     flash: Option<PathBuf>,
     /// Compare although the calibration was made for another serial
-    #[arg(long)]
-    force: bool,
+    #[arg(long, alias = "force")]
+    other_serial: bool,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let recording = read(&arguments.recording)?;
-    let stored = match load(&arguments.calibration)? {
+    let recording = read(&arguments.recording, arguments.reading)?;
+    let stored = match load(&arguments.calibration, arguments.reading)? {
         Ok(stored) => stored,
         Err(damaged) => return Ok(refuse(&damaged)),
     };
     let record = stored.to_record(&arguments.calibration)?;
-    match apply::check(&recording, &stored, &record, arguments.force) {
+    match apply::check(&recording, &stored, &record, arguments.other_serial) {
         Ok(warning) => warning.iter().for_each(|w| warn(w)),
         Err(refusal) => return Ok(refuse(&refusal)),
     }

@@ -7,7 +7,10 @@ use std::{
     time::Duration,
 };
 
-use super::{Address, DeviceError, qemu::Qemu};
+use super::{
+    Address, DeviceError,
+    qemu::{self, Qemu},
+};
 
 /// A read gives up after this, so that whoever waits can look at the clock.
 const READ_PATIENCE: Duration = Duration::from_millis(50);
@@ -37,14 +40,18 @@ impl Line {
                 .and_then(prepare)
                 .map(|stream| Self::Tcp(stream, None))
                 .map_err(|cause| unreachable(cause, "check host, port and that something listens there")),
-            Address::Qemu(machine, image) => Qemu::start(*machine, image, flash)
-                .and_then(|(qemu, stream)| Ok(Self::Tcp(prepare(stream)?, Some(qemu))))
-                .map_err(|cause| {
-                    unreachable(
-                        cause,
-                        "build the image (see README, On the co-processor) and install qemu-system-arm",
-                    )
-                }),
+            Address::Qemu(machine, image) => {
+                qemu::check_flash(flash)
+                    .map_err(|cause| unreachable(cause, "choose another --flash; nothing was changed"))?;
+                Qemu::start(*machine, image, flash)
+                    .and_then(|(qemu, stream)| Ok(Self::Tcp(prepare(stream)?, Some(qemu))))
+                    .map_err(|cause| {
+                        unreachable(
+                            cause,
+                            "build the image (see README, On the co-processor) and install qemu-system-arm",
+                        )
+                    })
+            }
         }
     }
 

@@ -1,7 +1,7 @@
 //! QEMU in place of a board. To end it is to cut the device's power.
 
 use std::{
-    fs::OpenOptions,
+    fs::{self, OpenOptions},
     io::{self, ErrorKind},
     net::{TcpListener, TcpStream},
     path::Path,
@@ -16,6 +16,21 @@ use super::address::Machine;
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Memory that a file stands behind, bytes: all of the machine's PSRAM.
 const PSRAM: u64 = 16 << 20;
+
+/// The flash is written in place, so a file that is none must not be given for it.
+pub(super) fn check_flash(flash: Option<&Path>) -> io::Result<()> {
+    let Some((path, found)) = flash.and_then(|path| Some((path, fs::metadata(path).ok()?))) else {
+        return Ok(());
+    };
+    if found.is_file() && [0, PSRAM].contains(&found.len()) {
+        return Ok(());
+    }
+    let cause = format!(
+        "{}: found something else than the flash of an emulated device, expected a file of {PSRAM} bytes, or none",
+        path.display()
+    );
+    Err(io::Error::new(ErrorKind::AlreadyExists, cause))
+}
 
 /// A running QEMU; killed when dropped.
 pub(super) struct Qemu(Child);
@@ -82,5 +97,25 @@ impl Drop for Qemu {
         // It may have ended by itself; either way nothing is left to do.
         let _ = self.0.kill();
         let _ = self.0.wait();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_no_flash_is_not_taken_for_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        assert!(check_flash(None).is_ok() && check_flash(Some(&path)).is_ok());
+        fs::write(&path, "").unwrap();
+        assert!(check_flash(Some(&path)).is_ok());
+        fs::write(&path, "t,acc_x,acc_y,acc_z\n").unwrap();
+        let message = check_flash(Some(&path)).unwrap_err().to_string();
+        assert!(message.contains("run.csv: found something else than the flash"), "{message}");
+        assert!(check_flash(Some(folder.path())).is_err());
+        OpenOptions::new().write(true).open(&path).unwrap().set_len(PSRAM).unwrap();
+        assert!(check_flash(Some(&path)).is_ok());
     }
 }

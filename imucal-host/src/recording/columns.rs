@@ -1,14 +1,15 @@
 //! The columns of a recording: their names, and what a header makes of them.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
 
 use super::ExtraColumn;
+use super::column_guess::meant;
+use super::header_fault::{HeaderFault, MisspeltColumn, names_listed};
 use super::place::Places;
 use super::read_error::ReadError;
 use super::sensor_kind::SensorKind;
-use super::spelling;
 use super::warning::Warning;
 
 /// Number of columns the contract knows.
@@ -85,12 +86,38 @@ pub(crate) struct Table {
 }
 
 impl Layout {
-    /// Understands a header; blanks around names do not count.
+    /// Understands a header; blanks around names do not count. All that is wrong with it is said at once.
     pub(crate) fn new(header: &[&str], path: &Path) -> Result<Self, ReadError> {
-        let names: Vec<&str> = header.iter().map(|name| name.trim()).collect();
-        refuse_duplicates(&names, path)?;
+        let (names, mut faults) = separated(header);
+        let layout = Self::of(&names);
+        faults.extend(duplicates(&names));
+        let misspelt = layout.misspelt();
+        let mut present = layout.present;
+        for column in &misspelt {
+            NAMES
+                .iter()
+                .position(|name| *name == column.expected)
+                .into_iter()
+                .for_each(|slot| present[slot] = true);
+        }
+        if !misspelt.is_empty() {
+            faults.push(HeaderFault::Misspelt { columns: misspelt });
+        }
+        if !present[TIME] {
+            faults.push(HeaderFault::NoTime { found: names_listed(&names) });
+        }
+        faults.extend(incomplete(&present));
+        if faults.is_empty() {
+            Ok(layout)
+        } else {
+            Err(ReadError::Header { path: path.to_path_buf(), faults })
+        }
+    }
+
+    /// What names mean, each for itself.
+    fn of(names: &[&str]) -> Self {
         let mut layout = Self { targets: Vec::new(), extra: Vec::new(), present: [false; KNOWN] };
-        for name in &names {
+        for name in names {
             let slot = NAMES.iter().position(|known| known == name);
             layout.targets.push(slot.map_or(Target::Extra(layout.extra.len()), Target::Known));
             match slot {
@@ -98,12 +125,7 @@ impl Layout {
                 None => layout.extra.push((*name).to_owned()),
             }
         }
-        layout.refuse_misspelt(path)?;
-        if !layout.present[TIME] {
-            return Err(ReadError::NoTime { path: path.to_path_buf(), found: list(&names) });
-        }
-        layout.refuse_incomplete(path)?;
-        Ok(layout)
+        layout
     }
 
     /// A table with room for `rows` rows in the columns that are there.
@@ -124,103 +146,62 @@ impl Layout {
     }
 
     /// A misspelt column kept as an unknown one would lose a sensor in silence.
-    fn refuse_misspelt(&self, path: &Path) -> Result<(), ReadError> {
+    fn misspelt(&self) -> Vec<MisspeltColumn> {
         let absent: Vec<&'static str> =
             NAMES.iter().zip(self.present).filter(|(_, present)| !present).map(|(name, _)| *name).collect();
-        for found in &self.extra {
-            if let Some(expected) = meant(found, &absent) {
-                return Err(ReadError::MisspeltColumn {
-                    path: path.to_path_buf(),
-                    found: found.clone(),
-                    expected,
-                });
-            }
-        }
-        Ok(())
+        let guess = |found: &String| {
+            let (expected, unit) = meant(found, &absent)?;
+            Some(MisspeltColumn { found: found.clone(), expected, unit })
+        };
+        self.extra.iter().filter_map(guess).collect()
     }
 
-    fn refuse_incomplete(&self, path: &Path) -> Result<(), ReadError> {
-        for group in GROUPS {
-            let found: Vec<&str> =
-                group.clone().filter(|slot| self.present[*slot]).map(|slot| NAMES[slot]).collect();
-            let missing = group.clone().find(|slot| !self.present[*slot]);
-            if let (false, Some(missing)) = (found.is_empty(), missing) {
-                return Err(ReadError::IncompleteGroup {
-                    path: path.to_path_buf(),
-                    missing: NAMES[missing],
-                    found: list(&found),
-                    expected: list(&NAMES[group]),
-                });
-            }
-        }
-        Ok(())
+    /// Bytes that a row takes in memory, but for the text of unknown columns.
+    pub(crate) fn row_size(&self) -> usize {
+        let known = self.present.iter().filter(|present| **present).count();
+        known * size_of::<f64>() + self.extra.len() * size_of::<String>()
     }
 }
 
-fn refuse_duplicates(names: &[&str], path: &Path) -> Result<(), ReadError> {
-    let mut seen = HashSet::new();
-    match names.iter().find(|name| !seen.insert(**name)) {
-        Some(column) => {
-            Err(ReadError::DuplicateColumn { path: path.to_path_buf(), column: (*column).to_owned() })
+/// The names of a header, apart also where something else than a comma separates them.
+fn separated<'a>(header: &[&'a str]) -> (Vec<&'a str>, Vec<HeaderFault>) {
+    const SEPARATORS: [(char, &str); 4] =
+        [(';', "semicolons"), ('\t', "tabs"), ('|', "bars"), (' ', "blanks")];
+    if let [one] = header {
+        let one = one.trim();
+        if let Some((separator, found)) =
+            SEPARATORS.into_iter().find(|(separator, _)| one.contains(*separator))
+        {
+            let names = one.split(separator).map(str::trim).filter(|name| !name.is_empty());
+            return (names.collect(), vec![HeaderFault::Separator { found }]);
         }
-        None => Ok(()),
     }
+    (header.iter().map(|name| name.trim()).collect(), Vec::new())
 }
 
-fn list(names: &[&str]) -> String {
-    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
-}
-
-/// The absent column that an unknown name probably means.
-fn meant(name: &str, absent: &[&'static str]) -> Option<&'static str> {
-    let plain = plain(name);
-    if let Some(same) = absent.iter().find(|known| self::plain(known) == plain) {
-        return Some(same);
-    }
-    // In a short name two edits make anything of anything.
-    let near = |shortest: usize, edits| {
-        let long = absent.iter().copied().filter(move |known| known.len() >= shortest);
-        spelling::nearest(name, long, edits)
+/// Groups of which some columns are there and others are not.
+fn incomplete(present: &[bool; KNOWN]) -> Vec<HeaderFault> {
+    let names = |group: &Range<usize>, there: bool| -> Vec<&'static str> {
+        group.clone().filter(|slot| present[*slot] == there).map(|slot| NAMES[slot]).collect()
     };
-    near(4, 1).or_else(|| near(5, 2))
+    let fault = |group: Range<usize>| {
+        let (found, missing) = (names(&group, true), names(&group, false));
+        (!found.is_empty() && !missing.is_empty()).then(|| HeaderFault::Incomplete {
+            missing,
+            found: names_listed(&found),
+            expected: names_listed(&NAMES[group]),
+        })
+    };
+    GROUPS.into_iter().filter_map(fault).collect()
 }
 
-/// A name without case, separators and the long forms of its first word.
-fn plain(name: &str) -> String {
-    const LONG: [(&str, &str); 9] = [
-        ("accelerometer", "acc"),
-        ("acceleration", "acc"),
-        ("accel", "acc"),
-        ("gyroscope", "gyr"),
-        ("gyro", "gyr"),
-        ("magnetometer", "mag"),
-        ("magn", "mag"),
-        ("temperature", "temp"),
-        ("quat", "refq"),
-    ];
-    const WHOLE: [(&str, &str); 11] = [
-        ("time", "t"),
-        ("timestamp", "t"),
-        ("ax", "accx"),
-        ("ay", "accy"),
-        ("az", "accz"),
-        ("gx", "gyrx"),
-        ("gy", "gyry"),
-        ("gz", "gyrz"),
-        ("mx", "magx"),
-        ("my", "magy"),
-        ("mz", "magz"),
-    ];
-    let bare: String = name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
-    if let Some((_, short)) = WHOLE.iter().find(|(long, _)| *long == bare) {
-        return (*short).to_owned();
-    }
-    for (long, short) in LONG {
-        if let Some(rest) = bare.strip_prefix(long) {
-            return format!("{short}{rest}");
-        }
-    }
-    bare
+fn duplicates(names: &[&str]) -> Option<HeaderFault> {
+    let mut counts = HashMap::new();
+    names.iter().for_each(|name| *counts.entry(*name).or_insert(0) += 1);
+    let mut twice: Vec<&str> =
+        counts.into_iter().filter(|(_, count)| *count > 1).map(|(name, _)| name).collect();
+    twice.sort_unstable();
+    (!twice.is_empty()).then(|| HeaderFault::Duplicate { found: names_listed(&twice) })
 }
 
 #[cfg(test)]
@@ -248,22 +229,53 @@ mod tests {
 
     #[test]
     fn a_misspelt_column_names_the_expected_one() {
-        for (found, expected) in [
-            ("accx", "acc_x"),
-            ("Acc_X", "acc_x"),
-            ("gyro_x", "gyr_x"),
-            ("gyr-y", "gyr_y"),
-            ("ax", "acc_x"),
-            ("magnetometer_z", "mag_z"),
-            ("temperature", "temp"),
-            ("gimbal_outter", "gimbal_outer"),
-            ("Segment", "segment"),
-        ] {
+        for (found, expected) in
+            [("accx", "acc_x"), ("ax", "acc_x"), ("temperature", "temp"), ("temp_c", "temp")]
+        {
             let text = message(&format!("t,{found}"));
             assert!(text.contains("a.csv, line 1"), "{text}");
             assert!(text.contains(&format!("`{found}`, expected `{expected}`; rename")), "{text}");
         }
         assert!(message("Time,acc_x,acc_y,acc_z").contains("`Time`, expected `t`"));
+    }
+
+    #[test]
+    fn all_faults_of_a_header_are_said_at_once() {
+        let text = message("time,ax,ay,az,gyr_x,gyr_z,temp_c,mag_x,mag_x");
+        for part in [
+            "a.csv, line 1: ",
+            "`time` for `t`, `ax` for `acc_x`, `ay` for `acc_y`, `az` for `acc_z`, `temp_c` for `temp`; rename them so",
+            "below [units]",
+            "column `gyr_y` is missing",
+            "columns `mag_y`, `mag_z` are missing",
+            "the column `mag_x` twice",
+        ] {
+            assert!(text.contains(part), "`{part}` is missing in: {text}");
+        }
+        assert!(!text.contains("no column `t`") && !text.contains("`acc_x`, `acc_y` are missing"), "{text}");
+    }
+
+    #[test]
+    fn other_separators_are_said_with_the_names_between_them() {
+        for (header, separator) in
+            [("t;ax;ay;az", "semicolons"), ("t\tax\tay\taz", "tabs"), ("t  ax  ay  az", "blanks")]
+        {
+            let text = message(header);
+            assert!(
+                text.contains(&format!("found {separator} between the columns, expected commas")),
+                "{text}"
+            );
+            assert!(text.contains("`ax` for `acc_x`") && !text.contains("no column `t`"), "{text}");
+        }
+        assert!(message("t;acc_x;acc_y;acc_z").ends_with("write numbers with a decimal point"));
+    }
+
+    #[test]
+    fn a_foreign_header_is_not_repeated_at_length() {
+        let long = "n".repeat(5000);
+        let names: Vec<String> = (0..500).map(|index| format!("{index}{long}")).collect();
+        let text = message(&names.join(","));
+        assert!(text.len() < 3000 && text.contains("and 476 more"), "{text}");
     }
 
     #[test]
@@ -290,8 +302,8 @@ mod tests {
 
     #[test]
     fn a_header_without_time_lists_what_it_has() {
-        let text = message("stamp;acc_x;acc_y");
-        assert!(text.contains("no column `t` among `stamp;acc_x;acc_y`"), "{text}");
+        let text = message("stamp,acc_x,acc_y,acc_z");
+        assert!(text.contains("no column `t` among `stamp`, `acc_x`, `acc_y`, `acc_z`"), "{text}");
         assert!(text.contains("separate columns by commas"), "{text}");
     }
 }

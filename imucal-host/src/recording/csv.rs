@@ -2,28 +2,44 @@
 
 use std::path::Path;
 
-use ::csv::{ByteRecord, ReaderBuilder};
-
 use super::columns::{Layout, Table, Target};
-use super::content::Content;
+use super::csv_rows::Rows;
 use super::number::{self, NotANumber};
 use super::place::{Place, Places};
 use super::read_error::ReadError;
 use super::warning::Warning;
+use crate::file::Limits;
+use crate::file::limits::Size;
 
 /// Reads the samples of a CSV file in file units.
-pub(crate) fn read(path: &Path) -> Result<Table, ReadError> {
-    let content = Content::read(path)?;
-    CsvReader::new(path, &content)?.read()
+pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Table, ReadError> {
+    let mut rows = Rows::open(path, limits)?;
+    table(path, &mut rows, limits).map_err(|error| {
+        // Of a damaged stream nothing that is wrong in its text says more.
+        let damage = if error.is_limit() { None } else { rows.text.damage() };
+        damage.unwrap_or(error)
+    })
+}
+
+fn table(path: &Path, rows: &mut Rows<'_>, limits: &Limits) -> Result<Table, ReadError> {
+    let blank = |rows: &Rows<'_>| rows.fields().all(|field| field.trim_ascii().is_empty()) && rows.len() == 1;
+    if !rows.advance()? || (blank(rows) && !rows.advance()?) {
+        return Err(ReadError::Empty { path: path.to_path_buf() });
+    }
+    let names: Result<Vec<&str>, _> = rows.fields().map(std::str::from_utf8).collect();
+    let names = names.map_err(|_| ReadError::NotUtf8 { path: path.to_path_buf(), line: rows.line })?;
+    let layout = Layout::new(&names, path)?;
+    let names: Vec<String> = names.iter().map(|name| name.trim().to_owned()).collect();
+    CsvReader { path, layout, names, limit: limits.size, taken: 0 }.read(rows)
 }
 
 struct CsvReader<'a> {
     path: &'a Path,
-    text: &'a [u8],
-    truncated: bool,
-    rows: ::csv::Reader<&'a [u8]>,
     layout: Layout,
     names: Vec<String>,
+    /// Bytes that the samples may take in memory, and those they take.
+    limit: u64,
+    taken: u64,
 }
 
 /// What is wrong with a field, before the place is known.
@@ -32,40 +48,28 @@ struct BadField {
     problem: NotANumber,
 }
 
-impl<'a> CsvReader<'a> {
-    fn new(path: &'a Path, content: &'a Content) -> Result<Self, ReadError> {
-        let text = content.text();
-        // The header is a row like any other, so that the reader does not keep a copy of it.
-        let mut rows = ReaderBuilder::new().flexible(true).has_headers(false).from_reader(text);
-        let mut record = ByteRecord::new();
-        rows.read_byte_record(&mut record).map_err(|cause| damaged(path, &cause))?;
-        let names: Result<Vec<&str>, _> = record.iter().map(std::str::from_utf8).collect();
-        let names = names.map_err(|_| ReadError::NotUtf8 { path: path.to_path_buf(), line: 1 })?;
-        let layout = Layout::new(&names, path)?;
-        let names = names.iter().map(|name| name.trim().to_owned()).collect();
-        Ok(Self { path, text, truncated: content.truncated, rows, layout, names })
-    }
-
-    fn read(mut self) -> Result<Table, ReadError> {
+impl CsvReader<'_> {
+    fn read(mut self, rows: &mut Rows<'_>) -> Result<Table, ReadError> {
         // A guess that is a little high; it spares the growing columns their copies.
-        let guess = self.text.len() / (self.names.len() * 7).max(1);
+        let row = (self.layout.row_size() + size_of::<u64>()) as u64;
+        let guess =
+            (rows.text.expected / (self.names.len() * 7).max(1) as u64).min(self.limit / row) as usize;
         let mut table = self.layout.table(guess, Places::Lines(Vec::new()));
         let mut lines = Vec::with_capacity(guess);
-        let mut record = ByteRecord::new();
-        while self.rows.read_byte_record(&mut record).map_err(|cause| damaged(self.path, &cause))? {
-            let line = self.line_of(&record);
-            let last = self.is_cut_line(&record);
-            if last && self.drop_cut_line(&record, line, &mut table) {
+        while rows.advance()? {
+            let last = rows.cut;
+            if last && self.drop_cut_line(rows, &mut table) {
                 break;
             }
-            if record.len() != self.names.len() {
-                return Err(self.field_count(&record, line));
+            if rows.len() != self.names.len() {
+                return Err(self.field_count(rows));
             }
-            self.check_text(&record, line)?;
-            self.push(&record, &mut table).map_err(|bad| self.bad_field(&record, line, &bad))?;
-            lines.push(line);
+            self.check_text(rows)?;
+            self.push(rows, &mut table).map_err(|bad| self.bad_field(rows, &bad))?;
+            lines.push(rows.line);
+            self.take(rows)?;
         }
-        if self.truncated {
+        if rows.text.truncated {
             table
                 .warnings
                 .push(Warning::TruncatedStream { path: self.path.to_path_buf(), rows: lines.len() });
@@ -74,8 +78,23 @@ impl<'a> CsvReader<'a> {
         Ok(table)
     }
 
-    fn push(&self, record: &ByteRecord, table: &mut Table) -> Result<(), BadField> {
-        for (column, (field, target)) in record.iter().zip(&self.layout.targets).enumerate() {
+    /// Counts what a row takes in memory, its line included.
+    fn take(&mut self, rows: &Rows<'_>) -> Result<(), ReadError> {
+        let text = |(field, target): (&[u8], &Target)| match target {
+            Target::Extra(_) => field.len(),
+            Target::Known(_) => 0,
+        };
+        let texts: usize = rows.fields().zip(&self.layout.targets).map(text).sum();
+        self.taken += (self.layout.row_size() + size_of::<u64>() + texts) as u64;
+        if self.taken > self.limit {
+            let path = self.path.to_path_buf();
+            return Err(ReadError::TooManySamples { path, limit: Size(self.limit) });
+        }
+        Ok(())
+    }
+
+    fn push(&self, rows: &Rows<'_>, table: &mut Table) -> Result<(), BadField> {
+        for (column, (field, target)) in rows.fields().zip(&self.layout.targets).enumerate() {
             match *target {
                 Target::Known(slot) => {
                     let value = number::parse(field).map_err(|problem| BadField { column, problem })?;
@@ -90,55 +109,34 @@ impl<'a> CsvReader<'a> {
     }
 
     /// Unknown columns are kept as they are, so they have to be text.
-    fn check_text(&self, record: &ByteRecord, line: u64) -> Result<(), ReadError> {
+    fn check_text(&self, rows: &Rows<'_>) -> Result<(), ReadError> {
         let foreign = |(field, target): (&[u8], &Target)| {
             matches!(target, Target::Extra(_)) && std::str::from_utf8(field).is_err()
         };
-        match record.iter().zip(&self.layout.targets).any(foreign) {
-            true => Err(ReadError::NotUtf8 { path: self.path.to_path_buf(), line }),
+        match rows.fields().zip(&self.layout.targets).any(foreign) {
+            true => Err(ReadError::NotUtf8 { path: self.path.to_path_buf(), line: rows.line }),
             false => Ok(()),
         }
     }
 
-    /// Line of a record; its position is where the one before ended, ahead of blank lines.
-    fn line_of(&self, record: &ByteRecord) -> u64 {
-        let Some(position) = record.position() else {
-            return 0;
-        };
-        let rest = self.text.get(position.byte() as usize..).unwrap_or_default();
-        let blank = rest.iter().take_while(|byte| matches!(byte, b'\n' | b'\r'));
-        position.line() + blank.filter(|byte| **byte == b'\n').count() as u64
-    }
-
-    /// Whether this is the last line and has no line end. A stray quote swallows lines; that is no cut.
-    fn is_cut_line(&self, record: &ByteRecord) -> bool {
-        if self.text.last().is_none_or(|byte| matches!(byte, b'\n' | b'\r')) {
-            return false;
-        }
-        if self.rows.position().byte() < self.text.len() as u64 {
-            return false;
-        }
-        let start = record.position().map_or(0, |position| position.byte() as usize);
-        !self.text.get(start..).unwrap_or_default().trim_ascii().contains(&b'\n')
-    }
-
     /// Notes what became of a cut line; true if it is to be dropped.
-    fn drop_cut_line(&self, record: &ByteRecord, line: u64, table: &mut Table) -> bool {
-        let last = record.len().saturating_sub(1);
-        let field = record.get(last).unwrap_or_default();
-        let whole = record.len() == self.names.len() && self.is_whole(last, field);
+    fn drop_cut_line(&self, rows: &Rows<'_>, table: &mut Table) -> bool {
+        let last = rows.len().saturating_sub(1);
+        let field = rows.field(last);
+        let whole = rows.len() == self.names.len() && self.is_whole(last, field);
+        let truncated = rows.text.truncated;
         let path = self.path.to_path_buf();
-        let place = Place::Line(line);
-        if record.len() > self.names.len() {
+        let place = Place::Line(rows.line);
+        if rows.len() > self.names.len() {
             return false;
         }
-        table.warnings.push(if whole && !self.truncated {
+        table.warnings.push(if whole && !truncated {
             let found = String::from_utf8_lossy(field).into_owned();
             Warning::UnterminatedLine { path, place, column: self.names[last].clone(), found }
         } else {
             Warning::TruncatedLine { path, place, found: last, expected: self.names.len() }
         });
-        !whole || self.truncated
+        !whole || truncated
     }
 
     fn is_whole(&self, column: usize, field: &[u8]) -> bool {
@@ -148,30 +146,26 @@ impl<'a> CsvReader<'a> {
         }
     }
 
-    fn field_count(&self, record: &ByteRecord, line: u64) -> ReadError {
+    fn field_count(&self, rows: &Rows<'_>) -> ReadError {
         ReadError::FieldCount {
             path: self.path.to_path_buf(),
-            place: Place::Line(line),
-            found: record.len(),
+            place: Place::Line(rows.line),
+            found: rows.len(),
             expected: self.names.len(),
         }
     }
 
-    fn bad_field(&self, record: &ByteRecord, line: u64, bad: &BadField) -> ReadError {
+    fn bad_field(&self, rows: &Rows<'_>, bad: &BadField) -> ReadError {
         let path = self.path.to_path_buf();
-        let place = Place::Line(line);
+        let place = Place::Line(rows.line);
         let column = self.names[bad.column].clone();
-        let text = String::from_utf8_lossy(record.get(bad.column).unwrap_or_default());
+        let text = String::from_utf8_lossy(rows.field(bad.column));
         let found: String = text.chars().take(40).collect();
         match bad.problem {
             NotANumber::Unparsable => ReadError::NotANumber { path, place, column, found },
             NotANumber::Infinite => ReadError::Infinite { path, place, column, found },
         }
     }
-}
-
-fn damaged(path: &Path, cause: &::csv::Error) -> ReadError {
-    ReadError::Damaged { path: path.to_path_buf(), found: cause.to_string(), expected: "rows of CSV" }
 }
 
 #[cfg(test)]

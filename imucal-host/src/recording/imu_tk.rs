@@ -1,6 +1,5 @@
 //! Import of imu_tk's text files: one line a sample, `t x y z` between blanks, a file a sensor.
 
-use std::fs;
 use std::path::Path;
 
 use super::Recording;
@@ -11,7 +10,10 @@ use super::number::{self, NotANumber};
 use super::place::{Place, Places};
 use super::read_error::ReadError;
 use super::sensor_kind::SensorKind;
+use super::text::Text;
 use super::triple::median;
+use crate::file::Limits;
+use crate::file::limits::Size;
 
 const NAMES: [&str; 4] = ["t", "x", "y", "z"];
 
@@ -23,12 +25,17 @@ const NAMES: [&str; 4] = ["t", "x", "y", "z"];
 ///
 /// [`ReadError`]; besides those of a recording, when the files differ in their number of rows or a
 /// sample's times differ by more than half the median interval.
-pub fn read_pair(acc: &Path, gyr: &Path, manifest: Manifest) -> Result<Recording, ReadError> {
+pub fn read_pair(
+    acc: &Path,
+    gyr: &Path,
+    manifest: Manifest,
+    limits: &Limits,
+) -> Result<Recording, ReadError> {
     manifest.check().map_err(|fault| ReadError::Manifest { path: acc.to_path_buf(), line: 1, fault })?;
     let header = [["t"].as_slice(), &SensorKind::Acc.columns(), &SensorKind::Gyr.columns()].concat();
     let mut table = Layout::new(&header, acc)?.table(0, Places::Rows);
-    let acc_file = TextFile::read(acc)?;
-    let gyr_file = TextFile::read(gyr)?;
+    let acc_file = TextFile::read(acc, limits)?;
+    let gyr_file = TextFile::read(gyr, limits)?;
     compare_times(acc, &acc_file, gyr, &gyr_file, manifest.units.t.per_si())?;
     place_axes(&mut table, SensorKind::Acc, &acc_file);
     place_axes(&mut table, SensorKind::Gyr, &gyr_file);
@@ -50,20 +57,36 @@ struct TextFile {
 }
 
 impl TextFile {
-    fn read(path: &Path) -> Result<Self, ReadError> {
-        let bytes = fs::read(path)
-            .map_err(|cause| ReadError::Unreadable { path: path.to_path_buf(), found: cause.to_string() })?;
+    fn read(path: &Path, limits: &Limits) -> Result<Self, ReadError> {
+        let mut text = Text::open(path, limits)?;
         let mut file = Self { columns: Default::default(), lines: Vec::new() };
-        for (line, text) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
-            let text = text.trim_ascii();
-            if !text.is_empty() && !text.starts_with(b"#") && !text.starts_with(b"%") {
-                file.push(path, line, text)?;
+        let mut line = Vec::new();
+        for number in 1.. {
+            if !text.line_into(&mut line, number, limits)? {
+                break;
             }
+            let fields = line.trim_ascii();
+            if !fields.is_empty() && !fields.starts_with(b"#") && !fields.starts_with(b"%") {
+                file.push(path, number, fields)?;
+                file.refuse_too_many(path, limits)?;
+            }
+        }
+        if text.truncated {
+            let (path, found) = (path.to_path_buf(), "it ends early".to_owned());
+            return Err(ReadError::Damaged { path, found, expected: "an intact gzip stream" });
         }
         if file.lines.is_empty() {
             return Err(ReadError::Empty { path: path.to_path_buf() });
         }
         Ok(file)
+    }
+
+    fn refuse_too_many(&self, path: &Path, limits: &Limits) -> Result<(), ReadError> {
+        let row = size_of::<[f64; 4]>() + size_of::<u64>();
+        if (self.lines.len() * row) as u64 <= limits.size {
+            return Ok(());
+        }
+        Err(ReadError::TooManySamples { path: path.to_path_buf(), limit: Size(limits.size) })
     }
 
     fn push(&mut self, path: &Path, line: u64, text: &[u8]) -> Result<(), ReadError> {
@@ -128,6 +151,8 @@ fn compare_times(
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::super::fixture::assert_says;
     use super::super::manifest::Counts;
     use super::super::unit::Unit;
@@ -145,7 +170,8 @@ mod tests {
         let paths = ["xsens_acc.mat", "xsens_gyro.mat"].map(|name| folder.path().join(name));
         fs::write(&paths[0], acc).unwrap();
         fs::write(&paths[1], gyr).unwrap();
-        read_pair(&paths[0], &paths[1], manifest()).map_err(|error| error.to_string())
+        let limits = Limits { size: 1 << 12, columns: 4 };
+        read_pair(&paths[0], &paths[1], manifest(), &limits).map_err(|error| error.to_string())
     }
 
     const ACC: &str = "  2.9840e-02  3.3183000e+04 32768\t36836\r\n\n0.039840 33183 32768 36836\n";
@@ -177,5 +203,17 @@ mod tests {
         assert_says(&pair("", "").unwrap_err(), &["xsens_acc.mat", "empty"]);
         let backwards = pair("1 0 0 0\n0.5 0 0 0\n", "1 0 0 0\n0.5 0 0 0\n").unwrap_err();
         assert!(backwards.contains("line 2"), "{backwards}");
+    }
+
+    #[test]
+    fn lines_and_files_beyond_the_limits_are_refused() {
+        let zeros = "0".repeat(300);
+        assert_says(
+            &pair(&format!("1 0 0 0\n{zeros}"), "").unwrap_err(),
+            &["line 2", "longer than 256 bytes"],
+        );
+        assert_says(&pair(&"#\n".repeat(3000), "").unwrap_err(), &["more than 4 KiB", "--max-size"]);
+        let many: String = (0..200).map(|row| format!("{row} 0 0 0\n")).collect();
+        assert_says(&pair(&many, "").unwrap_err(), &["samples that take more than 4 KiB", "--max-size"]);
     }
 }

@@ -1,6 +1,5 @@
 //! The manifest: what the samples of a recording are.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +13,7 @@ use super::sensor_kind::SensorKind;
 use super::triple::{Nominal, Triple};
 use super::unit::{AngleUnit, TemperatureUnit, TimeUnit, Unit};
 use super::warning::Warning;
+use crate::file::{Limits, ReadFault};
 
 pub use super::rig::{Axis, Rig, RigKind};
 pub use super::site::Site;
@@ -200,14 +200,41 @@ impl Manifest {
     ///
     /// [`ReadError::ManifestMissing`] and the other manifest errors of [`ReadError`].
     pub fn read(path: &Path) -> Result<(Self, Vec<Warning>), ReadError> {
-        let text = fs::read_to_string(path).map_err(|cause| match cause.kind() {
-            io::ErrorKind::NotFound => ReadError::ManifestMissing {
-                path: path.to_path_buf(),
-                recording: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-            },
-            _ => ReadError::Unreadable { path: path.to_path_buf(), found: cause.to_string() },
+        Self::read_within(path, &Limits::default())
+    }
+
+    /// As [`Manifest::read`], with limits other than the default.
+    ///
+    /// # Errors
+    ///
+    /// As [`Manifest::read`].
+    pub fn read_within(path: &Path, limits: &Limits) -> Result<(Self, Vec<Warning>), ReadError> {
+        let bytes = limits.read_small(path).map_err(|fault| match fault {
+            ReadFault::System(cause) if cause.kind() == io::ErrorKind::NotFound => {
+                ReadError::ManifestMissing {
+                    path: path.to_path_buf(),
+                    recording: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+                }
+            }
+            fault => ReadError::of(path, fault),
+        })?;
+        let text = String::from_utf8(bytes).map_err(|cause| ReadError::NotUtf8 {
+            path: path.to_path_buf(),
+            line: KeyMap::line_at(
+                &String::from_utf8_lossy(cause.as_bytes()),
+                cause.utf8_error().valid_up_to(),
+            ) as u64,
         })?;
         Self::parse(&text, path)
+    }
+
+    /// Whether a file is a manifest, of any version and whatever else is in it.
+    #[must_use]
+    pub fn is_manifest(path: &Path) -> bool {
+        let text = Limits::default().read_small(path).ok().and_then(|bytes| String::from_utf8(bytes).ok());
+        let table = text.and_then(|text| text.parse::<toml::Table>().ok());
+        let format = table.as_ref().and_then(|table| table.get("format")?.as_str());
+        format.is_some_and(|format| format.starts_with("imucal-recording/"))
     }
 
     /// Understands a manifest's text; `path` is for messages only.

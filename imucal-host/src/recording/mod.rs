@@ -7,16 +7,17 @@ use std::path::{Path, PathBuf};
 
 mod absurd;
 mod assembly;
-pub mod atomic_file;
+mod column_guess;
 mod columns;
-mod content;
 mod csv;
+mod csv_rows;
 mod csv_writer;
 mod file_units;
 #[cfg(test)]
 mod fixture;
 mod format;
 pub mod gravity;
+pub mod header_fault;
 pub mod imu_tk;
 pub mod integrity;
 mod interval;
@@ -34,6 +35,7 @@ mod sensor_kind;
 mod site;
 pub(crate) mod spelling;
 mod stuck;
+mod text;
 mod triple;
 pub mod unit;
 mod unit_check;
@@ -41,7 +43,6 @@ mod warning;
 mod write;
 mod write_error;
 
-pub use self::atomic_file::AtomicFile;
 pub use self::manifest::Manifest;
 pub use self::place::Place;
 pub use self::read_error::ReadError;
@@ -52,6 +53,7 @@ pub use self::warning::Warning;
 pub use self::write_error::WriteError;
 
 use self::format::Format;
+use crate::file::{Limits, OutputSet};
 
 /// A recording of an inertial measurement unit. All columns that are there have as many rows as `time`.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,6 +125,15 @@ impl Recording {
     /// [`ReadError`], when a file is missing, damaged or not what the contract says, or when its
     /// samples are clearly in another unit than its manifest tells.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
+        Self::read_within(path, &Limits::default())
+    }
+
+    /// As [`Recording::read`], with limits other than the default.
+    ///
+    /// # Errors
+    ///
+    /// As [`Recording::read`].
+    pub fn read_within(path: &Path, limits: &Limits) -> Result<Self, ReadError> {
         let format =
             Format::of(path).map_err(|found| ReadError::UnknownFormat { path: path.to_path_buf(), found })?;
         if !path.exists() {
@@ -130,11 +141,11 @@ impl Recording {
             return Err(ReadError::Unreadable { path: path.to_path_buf(), found });
         }
         let manifest_path = Manifest::path_beside(path).unwrap_or_else(|| path.with_extension("toml"));
-        let (manifest, warnings) = Manifest::read(&manifest_path)?;
+        let (manifest, warnings) = Manifest::read_within(&manifest_path, limits)?;
         let mut table = match format {
-            Format::Csv | Format::CsvGz => csv::read(path)?,
+            Format::Csv | Format::CsvGz => csv::read(path, limits)?,
             #[cfg(feature = "parquet")]
-            Format::Parquet => parquet::read(path)?,
+            Format::Parquet => parquet::read(path, limits)?,
             #[cfg(not(feature = "parquet"))]
             Format::Parquet => {
                 return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() });
@@ -152,13 +163,24 @@ impl Recording {
     }
 
     /// Writes the samples, in the units of the manifest, as the ending of `path` says, and the manifest
-    /// beside them. Both files appear whole or not at all.
+    /// beside them, over former files of these names. Both files are replaced, or none.
     ///
     /// # Errors
     ///
     /// [`WriteError`], when the recording contradicts itself or the system refuses.
     pub fn write(&self, path: &Path) -> Result<(), WriteError> {
-        write::write(self, path)
+        let mut files = OutputSet::default();
+        self.write_into(path, &mut files)?;
+        Ok(files.commit()?)
+    }
+
+    /// As [`Recording::write`], but as part of a set of files that is to be committed.
+    ///
+    /// # Errors
+    ///
+    /// As [`Recording::write`].
+    pub fn write_into(&self, path: &Path, files: &mut OutputSet) -> Result<(), WriteError> {
+        write::write(self, path, files)
     }
 
     /// Number of rows.

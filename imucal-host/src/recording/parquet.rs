@@ -1,5 +1,6 @@
 //! Samples as Parquet: the columns of the CSV, numbers as doubles, unknown columns as text.
 
+use std::cell::Cell;
 use std::fs::File;
 use std::io;
 use std::path::Path;
@@ -9,6 +10,7 @@ use ::parquet::basic::{Compression, ConvertedType, Repetition, Type as Physical}
 use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use ::parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType};
 use ::parquet::errors::ParquetError;
+use ::parquet::file::metadata::ParquetMetaData;
 use ::parquet::file::properties::WriterProperties;
 use ::parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 use ::parquet::file::writer::SerializedFileWriter;
@@ -17,22 +19,29 @@ use ::parquet::schema::types::{ColumnDescriptor, Type};
 use super::columns::{KNOWN, Layout, NAMES, Table, Target};
 use super::place::Places;
 use super::read_error::ReadError;
+use crate::file::Limits;
+use crate::file::limits::Size;
 
 /// Reads the samples of a Parquet file in file units; columns may be doubles, floats or integers.
-pub(crate) fn read(path: &Path) -> Result<Table, ReadError> {
+pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Table, ReadError> {
     let file = File::open(path)
         .map_err(|cause| ReadError::Unreadable { path: path.to_path_buf(), found: cause.to_string() })?;
     let damaged = |cause: ParquetError| damaged(path, &cause);
     let reader = SerializedFileReader::new(file).map_err(damaged)?;
+    refuse_too_long(path, reader.metadata(), limits)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
     let layout = Layout::new(&names.iter().map(String::as_str).collect::<Vec<_>>(), path)?;
-    let rows = reader.metadata().file_metadata().num_rows();
-    let mut table = layout.table(usize::try_from(rows).unwrap_or(0), Places::Rows);
+    let rows: u64 = reader.metadata().row_groups().iter().map(|group| group.num_rows().max(0) as u64).sum();
+    let memory = Memory { path, limit: limits.size, taken: Cell::new(0) };
+    memory.take(rows.saturating_mul(layout.row_size() as u64));
+    memory.check()?;
+    let mut table = layout.table(rows as usize, Places::Rows);
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group).map_err(damaged)?;
         for (at, target) in layout.targets.iter().enumerate() {
-            let column = ColumnOfGroup { path, at, group: group.as_ref(), descriptor: &schema.column(at) };
+            let descriptor = &schema.column(at);
+            let column = ColumnOfGroup { path, at, group: group.as_ref(), descriptor, memory: &memory };
             match *target {
                 Target::Known(slot) => column.append_numbers(&mut table.columns[slot])?,
                 Target::Extra(extra) => column.append_texts(&mut table.extra[extra].values)?,
@@ -65,12 +74,49 @@ fn refuse_infinite(path: &Path, table: &Table) -> Result<(), ReadError> {
     Ok(())
 }
 
+/// What the file says of itself, before anything is made of it.
+fn refuse_too_long(path: &Path, found: &ParquetMetaData, limits: &Limits) -> Result<(), ReadError> {
+    if found.file_metadata().schema_descr().num_columns() > limits.columns {
+        let (path, limit) = (path.to_path_buf(), limits.columns);
+        return Err(ReadError::TooManyColumns { path, line: 1, limit });
+    }
+    let sizes = found.row_groups().iter().flat_map(|group| group.columns());
+    let size = sizes.fold(0u64, |sum, column| sum.saturating_add(column.uncompressed_size().max(0) as u64));
+    if size > limits.size {
+        return Err(ReadError::TooLong { path: path.to_path_buf(), limit: Size(limits.size) });
+    }
+    Ok(())
+}
+
+/// Bytes that the samples take in memory, against those they may take.
+struct Memory<'a> {
+    path: &'a Path,
+    limit: u64,
+    taken: Cell<u64>,
+}
+
+impl Memory<'_> {
+    /// Counts so many more; whether they are allowed.
+    fn take(&self, bytes: u64) -> bool {
+        self.taken.set(self.taken.get().saturating_add(bytes));
+        self.taken.get() <= self.limit
+    }
+
+    fn check(&self) -> Result<(), ReadError> {
+        if self.take(0) {
+            return Ok(());
+        }
+        Err(ReadError::TooManySamples { path: self.path.to_path_buf(), limit: Size(self.limit) })
+    }
+}
+
 /// One column of one row group.
 struct ColumnOfGroup<'a> {
     path: &'a Path,
     at: usize,
     group: &'a dyn RowGroupReader,
     descriptor: &'a ColumnDescriptor,
+    memory: &'a Memory<'a>,
 }
 
 impl ColumnOfGroup<'_> {
@@ -97,7 +143,13 @@ impl ColumnOfGroup<'_> {
             ColumnReader::FloatColumnReader(column) => self.append(column, out, |v| v.to_string(), none),
             ColumnReader::DoubleColumnReader(column) => self.append(column, out, |v| v.to_string(), none),
             ColumnReader::ByteArrayColumnReader(column) => {
-                self.append(column, out, |v| String::from_utf8_lossy(v.data()).into_owned(), none)
+                // A dictionary may repeat a long text in few bytes.
+                let text = |v: ByteArray| match self.memory.take(v.len() as u64) {
+                    true => String::from_utf8_lossy(v.data()).into_owned(),
+                    false => String::new(),
+                };
+                self.append(column, out, text, none)?;
+                self.memory.check()
             }
             _ => Err(self.type_error()),
         }
@@ -207,6 +259,7 @@ fn field(name: &str, physical: Physical, converted: ConvertedType) -> Result<Arc
 mod tests {
     use ::parquet::data_type::{FloatType, Int64Type};
 
+    use super::super::Recording;
     use super::super::fixture::{Fixture, assert_says};
     use super::*;
 
@@ -275,5 +328,26 @@ mod tests {
             &message,
             &["run.parquet, column `temp`", "BYTE_ARRAY", "expected floating-point", "f64"],
         );
+    }
+
+    #[test]
+    fn more_than_the_limits_allow_is_refused_before_it_is_read() {
+        let fixture = Fixture::new("run.parquet", "", foreign());
+        let error = |limits| Recording::read_within(&fixture.path, &limits).unwrap_err().to_string();
+        assert_says(
+            &error(Limits { columns: 3, ..Limits::default() }),
+            &["more than 3 columns", "--max-columns"],
+        );
+        let layout = Layout::new(&["t", "note"], Path::new("a")).unwrap();
+        let mut table = layout.table(0, Places::Rows);
+        table.columns[0] = (0..300).map(f64::from).collect();
+        table.extra[0].values = vec!["long ".repeat(300); 300];
+        let mut bytes = Vec::new();
+        write(&table, 300, &mut bytes).unwrap();
+        assert!(bytes.len() < 1 << 16, "the dictionary keeps one text: {}", bytes.len());
+        let fixture = Fixture::new("run.parquet", "", bytes);
+        let limits = Limits { size: 1 << 16, ..Limits::default() };
+        let message = Recording::read_within(&fixture.path, &limits).unwrap_err().to_string();
+        assert_says(&message, &["run.parquet", "samples that take more than 64 KiB", "--max-size"]);
     }
 }

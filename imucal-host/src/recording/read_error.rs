@@ -1,12 +1,14 @@
 //! Why a recording could not be read.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use super::header_fault::HeaderFault;
 use super::manifest_check::ManifestFault;
 use super::place::Place;
 use super::sensor_kind::SensorKind;
 use super::unit::{TimeUnit, Unit};
 use super::warning::Warning;
+use crate::file::limits::{ReadFault, Size};
 
 /// A failure to read a recording; its text names the file, the place, what was found, what was
 /// expected and what to do.
@@ -44,26 +46,29 @@ pub enum ReadError {
     )]
     NotUtf8 { path: PathBuf, line: u64 },
 
-    /// No `t`.
+    /// The columns are not those of a recording.
+    #[error("{path}, line 1: {}", joined(.faults))]
+    Header { path: PathBuf, faults: Vec<HeaderFault> },
+    /// More columns than a recording has.
     #[error(
-        "{path}, line 1: found no column `t` among {found}, expected the sample time in a column named `t`; rename the time column, and separate columns by commas"
+        "{path}, line {line}: found more than {limit} columns, expected at most as many; check that the file is a recording, and raise the limit with --max-columns if it is"
     )]
-    NoTime { path: PathBuf, found: String },
-    /// Some, but not all columns that belong together.
+    TooManyColumns { path: PathBuf, line: u64, limit: usize },
+    /// A line longer than one of a recording.
     #[error(
-        "{path}, line 1: column `{missing}` is missing, found {found}, expected all of {expected} or none; add the column (empty where not measured) or remove the others"
+        "{path}, line {line}: found a line longer than {limit}, expected at most that; check that the file is a recording, and raise the limit with --max-columns if it is"
     )]
-    IncompleteGroup { path: PathBuf, missing: &'static str, found: String, expected: String },
-    /// A name next to one of the contract's.
+    LineTooLong { path: PathBuf, line: u64, limit: Size },
+    /// A text longer than that of a recording.
     #[error(
-        "{path}, line 1: found the column `{found}`, expected `{expected}`; rename it so, or to something less like it if it is another quantity"
+        "{path}: found more than {limit} of it, expected at most that; check that the file is what it should be, and raise the limit with --max-size if it is"
     )]
-    MisspeltColumn { path: PathBuf, found: String, expected: &'static str },
-    /// A name twice.
+    TooLong { path: PathBuf, limit: Size },
+    /// Samples that take more memory than those of a recording.
     #[error(
-        "{path}, line 1: found the column `{column}` twice, expected each name once; remove or rename one"
+        "{path}: found samples that take more than {limit} of memory, expected at most that; split the recording, or raise the limit with --max-size"
     )]
-    DuplicateColumn { path: PathBuf, column: String },
+    TooManySamples { path: PathBuf, limit: Size },
     /// Too many or too few fields.
     #[error(
         "{path}, {place}: found {found} fields, expected {expected} as in the header; correct or remove the line"
@@ -158,4 +163,30 @@ pub enum ReadError {
         "{path}, column `{column}`: found samples that look like `{found}` beside the other axes in `{expected}` (then the length is steady at {median_norm:.3} m/s², and else it is not); convert the column to `{expected}`"
     )]
     MixedUnits { path: PathBuf, column: &'static str, found: Unit, expected: Unit, median_norm: f64 },
+}
+
+impl ReadError {
+    /// What became of reading the file at `path`.
+    pub(crate) fn of(path: &Path, fault: ReadFault) -> Self {
+        let path = path.to_path_buf();
+        match fault {
+            ReadFault::System(cause) => Self::Unreadable { path, found: cause.to_string() },
+            ReadFault::TooLarge { limit } => Self::TooLong { path, limit: Size(limit) },
+        }
+    }
+
+    /// Whether a limit ended the reading: more of the file is not to be read then.
+    pub(crate) fn is_limit(&self) -> bool {
+        matches!(
+            self,
+            Self::TooManyColumns { .. }
+                | Self::LineTooLong { .. }
+                | Self::TooLong { .. }
+                | Self::TooManySamples { .. }
+        )
+    }
+}
+
+fn joined(faults: &[HeaderFault]) -> String {
+    faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("; also, ")
 }

@@ -1,43 +1,36 @@
-//! Writing a recording: back to file units, beside the target, renamed.
+//! Writing a recording: back to file units, into the files of a set.
 
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
 use super::Recording;
-use super::atomic_file::AtomicFile;
 use super::columns::{GIMBAL, NAMES, REFERENCE, SEGMENT, TEMPERATURE, TIME, Table};
 use super::file_units::table_of;
 use super::format::Format;
 use super::manifest::Manifest;
 use super::sensor_kind::SensorKind;
 use super::write_error::WriteError;
+use crate::file::{Output, OutputError, OutputSet};
 
 /// Writes the samples to `path` and the manifest beside it.
-pub(crate) fn write(recording: &Recording, path: &Path) -> Result<(), WriteError> {
+pub(crate) fn write(recording: &Recording, path: &Path, files: &mut OutputSet) -> Result<(), WriteError> {
     let format =
         Format::of(path).map_err(|found| WriteError::UnknownFormat { path: path.to_path_buf(), found })?;
-    let unwritable =
-        |cause: io::Error| WriteError::Unwritable { path: path.to_path_buf(), found: cause.to_string() };
     check(recording, path)?;
     let table = table_of(recording);
     check_table(&table, path)?;
     let manifest_path = Manifest::path_beside(path)
-        .ok_or_else(|| unwritable(io::Error::other("the name has no ending of a recording")))?;
-    let manifest = recording.manifest.to_toml().map_err(|error| unwritable(io::Error::other(error)))?;
+        .ok_or_else(|| failed(path, io::Error::other("the name has no ending of a recording")))?;
+    let manifest = recording.manifest.to_toml().map_err(|error| failed(path, io::Error::other(error)))?;
+    write_samples(format, &table, recording.rows(), path, files.create(path)?)?;
+    Ok(files.add(&manifest_path, manifest.as_bytes())?)
+}
 
-    // Both files are whole before either takes its place.
-    let mut manifest_file = AtomicFile::create(&manifest_path).map_err(unwritable)?;
-    manifest_file.write_all(manifest.as_bytes()).map_err(unwritable)?;
-    let mut file = AtomicFile::create(path).map_err(unwritable)?;
-    write_samples(format, &table, recording.rows(), path, &mut file)?;
-    if path.is_dir() {
-        return Err(unwritable(io::Error::other("a directory of that name is there")));
-    }
-    manifest_file.commit().map_err(unwritable)?;
-    file.commit().map_err(unwritable)
+fn failed(path: &Path, cause: io::Error) -> WriteError {
+    OutputError::System { path: path.to_path_buf(), cause }.into()
 }
 
 fn write_samples(
@@ -45,10 +38,9 @@ fn write_samples(
     table: &Table,
     rows: usize,
     path: &Path,
-    file: &mut AtomicFile,
+    file: &mut Output,
 ) -> Result<(), WriteError> {
-    let unwritable =
-        |cause: io::Error| WriteError::Unwritable { path: path.to_path_buf(), found: cause.to_string() };
+    let unwritable = |cause: io::Error| failed(path, cause);
     match format {
         Format::Csv => super::csv_writer::write(table, rows, file).map_err(unwritable),
         Format::CsvGz => {
@@ -205,10 +197,10 @@ mod tests {
     fn a_place_that_cannot_be_written_is_named_and_nothing_is_left() {
         let folder = tempfile::tempdir().unwrap();
         let missing = full().write(&folder.path().join("none/run.csv")).unwrap_err().to_string();
-        assert_says(&missing, &["none/run.csv", "cannot be written", "check the directory"]);
+        assert_says(&missing, &["none/run.csv", "cannot be written", "check the folder"]);
         fs::create_dir(folder.path().join("run.csv")).unwrap();
         let taken = full().write(&folder.path().join("run.csv")).unwrap_err().to_string();
-        assert_says(&taken, &["run.csv", "a directory of that name"]);
+        assert_says(&taken, &["run.csv", "a folder of this name"]);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         let ending = full().write(&folder.path().join("run.txt")).unwrap_err().to_string();
         assert_says(&ending, &["run.txt", "`.txt`", "expected .csv", "give the file such a name"]);

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::manifest_check::ManifestFault;
+use crate::file::OutputError;
 
 /// A failure to write a recording; its text names the file, what was found, what was expected and
 /// what to do. Nothing half-written is left.
@@ -10,11 +11,9 @@ use super::manifest_check::ManifestFault;
 #[non_exhaustive]
 #[allow(missing_docs)] // The fields are those of each message.
 pub enum WriteError {
-    /// The system refuses.
-    #[error(
-        "{path}: cannot be written ({found}), expected a writable place with room; check the directory, its permissions and the disk; nothing was changed"
-    )]
-    Unwritable { path: PathBuf, found: String },
+    /// A file cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// The name says no format there is a writer for.
     #[error(
         "{path}: found the ending `{found}`, expected .csv, .csv.gz or .parquet; give the file such a name"

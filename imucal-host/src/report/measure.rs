@@ -1,7 +1,13 @@
-//! A value with its standard error, in the digits that the error leaves.
+//! A value with its standard error, in the digits that the error leaves; in words where there is no value.
+
+/// Stands for a figure that is no number.
+const NOT_KNOWN: &str = "not known";
 
 /// `value ± std`, with two digits of the error; without an error, the value alone.
 pub fn measure(value: f64, std: f64) -> String {
+    if value.is_nan() {
+        return NOT_KNOWN.into();
+    }
     if !std.is_finite() {
         return format!("{} ± ∞", plain(value));
     }
@@ -24,6 +30,9 @@ pub fn measure(value: f64, std: f64) -> String {
 
 /// A value without an error, in four digits.
 pub fn plain(value: f64) -> String {
+    if value.is_nan() {
+        return NOT_KNOWN.into();
+    }
     if value == 0.0 {
         return "0".into();
     }
@@ -34,6 +43,29 @@ pub fn plain(value: f64) -> String {
     } else {
         format!("{value:.3e}")
     }
+}
+
+/// An angle (rad) in degrees, with so many decimals.
+pub fn degrees(angle: f64, decimals: usize) -> String {
+    if angle.is_nan() { NOT_KNOWN.into() } else { format!("{:.decimals$}°", angle.to_degrees()) }
+}
+
+/// An angle and its standard error (rad) in degrees.
+pub fn measured_degrees(angle: f64, std: f64) -> String {
+    if angle.is_nan() {
+        return NOT_KNOWN.into();
+    }
+    format!("{}°", measure(angle.to_degrees(), std.to_degrees()))
+}
+
+/// A value with so many decimals.
+pub fn rounded(value: f64, decimals: usize) -> String {
+    if value.is_nan() { NOT_KNOWN.into() } else { format!("{value:.decimals$}") }
+}
+
+/// A share in whole percent.
+pub fn percent(share: f64) -> String {
+    if share.is_nan() { NOT_KNOWN.into() } else { format!("{:.0} %", 100.0 * share) }
 }
 
 #[cfg(test)]
@@ -47,5 +79,26 @@ mod tests {
         assert_eq!(measure(0.0, 0.0), "0");
         assert_eq!(measure(1.25, f64::INFINITY), "1.250 ± ∞");
         assert_eq!(measure(123_456.0, 2_300.0), "(1.235 ± 0.023)e5");
+    }
+
+    #[test]
+    fn what_is_no_number_is_said_in_words() {
+        let nan = f64::NAN;
+        for text in [
+            plain(nan),
+            measure(nan, 1.0),
+            measure(nan, nan),
+            degrees(nan, 2),
+            measured_degrees(nan, nan),
+            rounded(nan, 1),
+            percent(nan),
+        ] {
+            assert_eq!(text, "not known");
+        }
+        assert_eq!(measured_degrees(0.5, nan), "28.65 ± ∞°");
+        assert_eq!(
+            (degrees(0.5, 2), rounded(17.31, 1), percent(0.5)),
+            ("28.65°".into(), "17.3".into(), "50 %".into())
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use super::measure::{measure, plain};
+use super::measure::{degrees, measure, measured_degrees, percent, plain, rounded};
 use crate::{
     calibrate::{
         Calibration, FitSummary, SegmentationReport, SensorOutcome, compare::Comparison, outcome::RigFindings,
@@ -144,9 +144,9 @@ fn write_fit(text: &mut String, kind: SensorKind, fit: &FitSummary) -> fmt::Resu
     )?;
     writeln!(
         text,
-        "  condition {:.1}, coverage {:.0} %, {} iterations to {}",
-        fit.condition,
-        100.0 * fit.coverage,
+        "  condition {}, coverage {}, {} iterations to {}",
+        rounded(fit.condition, 1),
+        percent(fit.coverage),
         fit.iterations,
         fit.termination.name()
     )?;
@@ -155,8 +155,8 @@ fn write_fit(text: &mut String, kind: SensorKind, fit: &FitSummary) -> fmt::Resu
 
 fn rms_text(kind: SensorKind, fit: &FitSummary, rms: f64) -> String {
     match kind {
-        SensorKind::Gyr if fit.rig.is_some() => format!("{:.3}° a motion", rms.to_degrees()),
-        SensorKind::Gyr => format!("{:.3}° a turn", rms.to_degrees()),
+        SensorKind::Gyr if fit.rig.is_some() => format!("{} a motion", degrees(rms, 3)),
+        SensorKind::Gyr => format!("{} a turn", degrees(rms, 3)),
         _ => format!("{} {}", plain(rms), fit.unit_out),
     }
 }
@@ -180,21 +180,24 @@ fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {
     if let Some(wander) = fit.bias_wander.filter(|w| w.interpolated) {
         writeln!(
             text,
-            "  the bias wanders by {:.3} °/s rms from rest to rest: interpolated between neighbouring rests",
-            wander.spread.norm().to_degrees() / 3f64.sqrt()
+            "  the bias wanders by {} °/s rms from rest to rest: interpolated between neighbouring rests",
+            rounded(wander.spread.norm().to_degrees() / 3f64.sqrt(), 3)
         )?;
     }
     if let Some(alignment) = &fit.alignment {
         let std = alignment.covariance.diagonal().map(f64::sqrt);
-        let degrees = |k: usize| measure(alignment.phi[k].to_degrees(), std[k].to_degrees());
+        let by = |k: usize| measured_degrees(alignment.phi[k], std[k]);
+        let held = alignment.held_out_rms.map_or_else(
+            || "too few rests to hold any out".into(),
+            |rms| format!("held out within {}", degrees(rms, 2)),
+        );
         writeln!(
             text,
-            "  turned into the accelerometer's axes by {}°, {}°, {}°; dip {}°, held out within {:.2}°",
-            degrees(0),
-            degrees(1),
-            degrees(2),
-            measure(alignment.dip.0.to_degrees(), alignment.dip.1.to_degrees()),
-            alignment.held_out_rms.unwrap_or(f64::NAN).to_degrees()
+            "  turned into the accelerometer's axes by {}, {}, {}; dip {}, {held}",
+            by(0),
+            by(1),
+            by(2),
+            measured_degrees(alignment.dip.0, alignment.dip.1)
         )?;
     }
     if let Some(rig) = &fit.rig {
@@ -211,8 +214,8 @@ fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {
 
 fn write_rig(text: &mut String, rig: &RigFindings) -> fmt::Result {
     if let Some((tilt, std)) = rig.tilt {
-        let degrees = |k: usize| measure(tilt[k].to_degrees(), std[k].to_degrees());
-        writeln!(text, "  of the rig: base tilted by {}° about x and {}° about y", degrees(0), degrees(1))?;
+        let about = |k: usize| measured_degrees(tilt[k], std[k]);
+        writeln!(text, "  of the rig: base tilted by {} about x and {} about y", about(0), about(1))?;
     }
     for (name, (source, std)) in ["outer", "middle"].into_iter().zip(rig.sources.iter().flatten()) {
         let parts: Vec<String> = (0..3).map(|k| measure(source[k], std[k])).collect();

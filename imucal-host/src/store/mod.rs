@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use imucal_core::record::{self, DecodeError, EncodeError};
 use serde::{Deserialize, Serialize};
 
+pub mod form;
 pub mod record_form;
 
 use crate::{
     calibrate::{Calibration, FitSummary, SensorOutcome},
-    recording::{AtomicFile, SensorKind, Unit},
+    file::{Limits, OutputError, OutputSet, ReadFault, limits::Size},
+    recording::{SensorKind, Unit},
 };
 
 /// What the first line of the TOML says.
@@ -115,6 +117,17 @@ pub enum LoadError {
         /// Why.
         cause: std::io::Error,
     },
+    /// The file is longer than any calibration.
+    #[error(
+        "{path}: found more than {limit}, expected a calibration; give the file that `imucal calibrate` wrote with \
+         --out or --record"
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// What a calibration may come to.
+        limit: Size,
+    },
     /// The TOML is not a calibration.
     #[error(
         "{path}: found a calibration that cannot be understood ({reason}), expected what `imucal calibrate --out` \
@@ -170,13 +183,8 @@ pub enum LoadError {
 #[derive(Debug, thiserror::Error)]
 pub enum SaveError {
     /// The file cannot be written.
-    #[error("{path}: cannot be written: {cause}; check the folder and its permissions; nothing was changed")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        cause: std::io::Error,
-    },
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// A field does not fit the record.
     #[error(
         "{path}: {field} `{text}` is longer than the record's {limit} bytes; shorten it in the recording's TOML"
@@ -249,7 +257,18 @@ impl StoredCalibration {
     /// # Errors
     /// [`LoadError`] names the file and what is wrong with it.
     pub fn load(path: &Path) -> Result<Self, LoadError> {
-        let bytes = std::fs::read(path).map_err(|cause| LoadError::Io { path: path.into(), cause })?;
+        Self::load_within(path, &Limits::default())
+    }
+
+    /// As [`StoredCalibration::load`], with limits other than the default.
+    ///
+    /// # Errors
+    /// As [`StoredCalibration::load`].
+    pub fn load_within(path: &Path, limits: &Limits) -> Result<Self, LoadError> {
+        let bytes = limits.read_small(path).map_err(|fault| match fault {
+            ReadFault::System(cause) => LoadError::Io { path: path.into(), cause },
+            ReadFault::TooLarge { limit } => LoadError::TooLarge { path: path.into(), limit: Size(limit) },
+        })?;
         if is_toml(path, &bytes) {
             Self::from_toml(path, &bytes)
         } else {
@@ -266,7 +285,7 @@ impl StoredCalibration {
         let text = std::str::from_utf8(bytes).map_err(|e| wrong(e.to_string()))?;
         let explain = |e: toml::de::Error| wrong(explained(text, &e));
         // The format first: what another one lacks is beside the point.
-        let Head { format } = toml::from_str(text).map_err(explain)?;
+        let form::Head { format } = toml::from_str(text).map_err(explain)?;
         if format != FORMAT {
             return Err(LoadError::Format { path: path.into(), found: format });
         }
@@ -279,44 +298,33 @@ impl StoredCalibration {
         Ok(stored)
     }
 
-    /// Writes the TOML, whole or not at all.
+    /// Adds the TOML to a set of files.
     ///
     /// # Errors
     /// [`SaveError`] names the file and why it cannot be written.
-    pub fn save_toml(&self, path: &Path) -> Result<(), SaveError> {
+    pub fn write_toml(&self, path: &Path, files: &mut OutputSet) -> Result<(), SaveError> {
         // Serialising plain numbers and text into a string cannot fail.
         let text = toml::to_string(self).unwrap_or_default();
-        write_whole(path, text.as_bytes())
+        Ok(files.add(path, text.as_bytes())?)
     }
 
-    /// Writes the record, whole or not at all.
+    /// Adds the record to a set of files.
     ///
     /// # Errors
     /// [`SaveError`] names the file and why it cannot be written.
-    pub fn save_record(&self, path: &Path) -> Result<(), SaveError> {
+    pub fn write_record(&self, path: &Path, files: &mut OutputSet) -> Result<(), SaveError> {
         let record = self.to_record(path)?;
         let mut buffer = [0; record::MAX_LEN];
         let bytes = record::encode(&record, &mut buffer)
             .map_err(|cause| SaveError::Encode { path: path.into(), cause })?;
-        write_whole(path, bytes)
+        Ok(files.add(path, bytes)?)
     }
-}
-
-/// What every version of the TOML begins with.
-#[derive(Deserialize)]
-struct Head {
-    #[serde(default)]
-    format: String,
 }
 
 /// Line and reason, without a drawing of the line.
 fn explained(text: &str, error: &toml::de::Error) -> String {
     let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
     format!("line {}: {}", before.matches('\n').count() + 1, error.message().trim().replace('\n', ", "))
-}
-
-fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), SaveError> {
-    AtomicFile::write_whole(path, bytes).map_err(|cause| SaveError::File { path: path.into(), cause })
 }
 
 /// A file is TOML by its name, or because it is text.
