@@ -159,7 +159,7 @@ impl Held {
 fn misread(outcome: &SensorOutcome) -> Option<String> {
     let refused = outcome.verdict.as_ref().err()?;
     match refused.refusal {
-        Refusal::Implausible { what: Quantity::Axes, value, .. } if value == 0.0 => None,
+        Refusal::Implausible { what: Quantity::Axes, value: 0.0, .. } => None,
         Refusal::Implausible { what: Quantity::Axes | Quantity::Gain, .. } => Some(refused.advice.clone()),
         _ => None,
     }
