@@ -33,6 +33,7 @@ fn empty(recording: &Recording) -> Calibration {
         segmentation: None,
         comparisons: Vec::new(),
         warnings: Vec::new(),
+        read_warnings: Vec::new(),
     }
 }
 

@@ -140,6 +140,8 @@ pub enum Quantity {
     AxisRatio,
     /// Rms residual as a share of the norm.
     Residual,
+    /// Order and sign of the axes, as the code of a signed permutation: 8 · order + signs; 0 is as it ought to be.
+    Axes,
 }
 
 impl Refusal {
@@ -201,6 +203,9 @@ impl fmt::Display for Refusal {
                 100.0 * value,
                 100.0 * limit
             ),
+            Self::Implausible { what: Quantity::Axes, value, .. } => {
+                write!(f, "the axes are in another order or of another sign (code {value:.0}, 0 expected)")
+            }
             Self::NotFinite => write!(f, "a figure is infinite or NaN"),
         }
     }

@@ -1,6 +1,6 @@
 //! Columns that are missing, misspelt or in another unit.
 
-use super::{ACC, ALL, Bad, MAG, assert_as_clean};
+use super::{ACC, ALL, Bad, MAG, TIME, assert_as_clean};
 
 #[test]
 fn a_missing_axis_is_named_with_its_neighbours() {
@@ -153,5 +153,29 @@ fn a_recording_without_any_sensor_has_nothing_to_calibrate() {
         "no sensor columns",
         "acc_x",
         "nothing can be calibrated",
+    ]);
+}
+
+#[test]
+fn nanoseconds_declared_microseconds_are_refused() {
+    let mut bad = Bad::new();
+    // Seconds since 1970, as a logger stamps them.
+    bad.map(TIME, |t| ((1.75e9 + t) * 1e9).round());
+    bad.manifest("t = \"s\"", "t = \"us\"");
+    bad.calibrate().with(2).telling(&["small.csv, column `t`", "t = \"ns\""]);
+    bad.manifest("t = \"us\"", "t = \"ns\"");
+    bad.calibrate().with(0);
+    assert_as_clean(&bad, &ALL);
+}
+
+#[test]
+fn a_gain_that_a_wrong_range_explains_is_remarked() {
+    let mut bad = Bad::new();
+    // Half of the counts a radian per second really gives: the sensor's full scale is twice what was assumed.
+    bad.manifest("per_unit = 4778.0", "per_unit = 2480.0");
+    bad.calibrate().with(0).printing(&[
+        "gyr: its gain is 0.5",
+        "one over two: another full scale",
+        "[counts]",
     ]);
 }

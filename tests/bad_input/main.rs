@@ -9,6 +9,7 @@ use imucal_tests::simulated;
 use serde_json::Value;
 use tempfile::TempDir;
 
+mod axes;
 mod columns_and_units;
 mod containers;
 mod manifests;

@@ -77,6 +77,7 @@ const CONTRACT: [&str; 53] = [
     ".recording: text",
     ".remarks: list",
     ".remarks[]: text",
+    ".warnings: list",
     ".verdict: text",
     ".where: list",
 ];

@@ -16,12 +16,14 @@ use crate::{
 pub mod acc;
 pub mod alignment;
 pub mod compare;
+pub mod gain_remark;
 pub mod gyr;
 pub mod gyr_ladder;
 pub mod gyr_motions;
 pub mod gyr_path;
 pub mod gyr_rig;
 pub mod gyr_rig_fit;
+pub mod handedness;
 pub mod ladder;
 pub mod lag;
 pub mod mag;
@@ -37,6 +39,7 @@ pub mod search;
 pub mod segmentation;
 pub mod serial;
 pub mod suspicion;
+pub mod turn_sense;
 
 pub use acc::AccModel;
 pub use outcome::{Calibration, FitSummary, Refused, SegmentationReport, SensorOutcome};
@@ -88,6 +91,7 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         segmentation: None,
         comparisons: Vec::new(),
         warnings: Vec::new(),
+        read_warnings: recording.warnings.iter().map(ToString::to_string).collect(),
     };
     integrity_warnings(&integrity, &mut calibration.warnings);
     inertial(recording, &integrity, options, progress, &mut calibration);
@@ -108,6 +112,8 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         });
         calibration.sensors.push(outcome);
     }
+    progress("checking the order and signs of the axes");
+    handedness::check(recording, &mut calibration);
     calibration
 }
 

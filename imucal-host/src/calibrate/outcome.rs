@@ -1,7 +1,11 @@
 //! What a calibration came to: for each sensor a fit with its figures, accepted or refused with a reason.
 
 use imucal_core::{
-    accept::Refusal, model::rig::ReferencePose, observation::ShellPoint, solver::Termination, triad::Triad,
+    accept::{Quantity, Refusal},
+    model::rig::ReferencePose,
+    observation::ShellPoint,
+    solver::Termination,
+    triad::Triad,
 };
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -14,6 +18,7 @@ use super::{
     suspicion::{Status, Suspicion},
 };
 use crate::{
+    effect::axis_swap,
     observe::{motion::MotionData, pose::Poses, turn::TurnData},
     recording::{Nominal, SensorKind, Unit},
 };
@@ -35,6 +40,8 @@ pub struct Calibration {
     pub comparisons: Vec<Comparison>,
     /// What the user should know besides.
     pub warnings: Vec<String>,
+    /// What was noticed when the recording was read.
+    pub read_warnings: Vec<String>,
 }
 
 /// One sensor's outcome.
@@ -285,6 +292,21 @@ impl SensorOutcome {
             Ok(()) if self.suspicions.is_empty() => Status::Accepted,
             Ok(()) => Status::Suspect,
         }
+    }
+
+    /// Why the sensor was refused, with the figures that led to it.
+    pub fn detail(&self) -> Option<String> {
+        let refused = self.verdict.as_ref().err()?;
+        Some(match refused.refusal {
+            Refusal::Implausible { what: Quantity::Axes, value, .. } if value > 0.0 => {
+                let columns = axis_swap::columns(self.kind, value as usize);
+                format!("{}.axis_swap, code {value:.0}, would explain the recording: {columns}", self.kind)
+            }
+            Refusal::Implausible { what: Quantity::Axes, .. } => {
+                "it is calibrated against another sensor whose axes are negated or in another order".into()
+            }
+            refusal => refusal.to_string(),
+        })
     }
 
     /// The fit of an accepted sensor.

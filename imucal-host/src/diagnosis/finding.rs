@@ -34,6 +34,9 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// Why there is no better answer, where there is none; else what a reader should know besides.
     pub remarks: Vec<String>,
+    /// What was noticed when the recording was read.
+    #[serde(default)]
+    pub warnings: Vec<String>,
     /// How large the gap is, channel by channel.
     pub gap: Vec<Gap>,
     /// Where it lies, the largest share first.

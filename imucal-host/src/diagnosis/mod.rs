@@ -155,6 +155,7 @@ fn untestable(recording: &Recording, why: String) -> Diagnosis {
         recording: recording.name.clone(),
         verdict: Verdict::NotTestable,
         remarks: vec![why],
+        warnings: recording.warnings.iter().map(ToString::to_string).collect(),
         gap: Vec::new(),
         places: Vec::new(),
         causes: Vec::new(),

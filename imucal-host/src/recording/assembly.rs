@@ -46,6 +46,7 @@ pub(crate) fn assemble(path: &Path, manifest: Manifest, mut table: Table) -> Res
         warnings: table.warnings,
         manifest,
     };
+    keep_assumed(&mut recording);
     note_extra(&mut recording);
     interval::check(&mut recording)?;
     unit_check::check(&mut recording)?;
@@ -135,6 +136,27 @@ fn segments(path: &Path, table: &Table) -> Result<Option<Vec<Option<i64>>>, Read
     Ok((!column.is_empty()).then(|| column.iter().map(label).collect()))
 }
 
+/// A unit that is left out is assumed only where there is a column in it.
+fn keep_assumed(recording: &mut Recording) {
+    let measured: Vec<&str> = [
+        ("t", true),
+        ("acc", recording.acc.is_some()),
+        ("gyr", recording.gyr.is_some()),
+        ("mag", recording.mag.is_some()),
+        ("gimbal", recording.gimbal.is_some()),
+    ]
+    .into_iter()
+    .filter_map(|(key, there)| there.then_some(key))
+    .collect();
+    recording.warnings.retain_mut(|warning| match warning {
+        Warning::UnitsAssumed { assumed, .. } => {
+            assumed.retain(|(key, _)| measured.contains(key));
+            !assumed.is_empty()
+        }
+        _ => true,
+    });
+}
+
 fn note_extra(recording: &mut Recording) {
     for column in &recording.extra {
         recording
@@ -201,6 +223,21 @@ mod tests {
     #[test]
     fn a_file_without_sensors_is_warned_about() {
         assert_says(&csv("t,temp\n0,20\n1,20\n").warnings()[0], &["no sensor columns", "acc_x"]);
+    }
+
+    #[test]
+    fn units_that_are_left_out_are_said_to_be_assumed_where_they_matter() {
+        let samples = "t,acc_x,acc_y,acc_z,mag_x,mag_y,mag_z\n0,0,0,9.8,40,0,0\n0.01,0,0,9.8,40,0,0\n";
+        let assumed = |sections: &str| -> Vec<String> {
+            let warnings = Fixture::new("run.csv", sections, samples).read().warnings;
+            warnings.iter().map(ToString::to_string).filter(|text| text.contains("leaves out")).collect()
+        };
+        assert_says(&assumed("")[0], &["run.toml", "t = \"s\", acc = \"m/s^2\", mag = \"uT\""]);
+        assert_says(
+            &assumed("[units]\nt = \"s\"\nacc = \"m/s^2\"\n")[0],
+            &["leaves out mag = \"uT\", which is"],
+        );
+        assert!(assumed("[units]\nt = \"s\"\nacc = \"m/s^2\"\nmag = \"uT\"\n").is_empty());
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use tempfile::TempDir;
 
-use super::Recording;
+use super::{Recording, Warning};
 
 /// A manifest with nothing but its format.
 pub(crate) const BARE: &str = "format = \"imucal-recording/1\"\n";
@@ -35,9 +35,10 @@ impl Fixture {
         Recording::read(&self.path).unwrap_err().to_string()
     }
 
-    /// The texts of the warnings of a reading.
+    /// The texts of the warnings of a reading, but for the units that most of these recordings leave out.
     pub(crate) fn warnings(&self) -> Vec<String> {
-        self.read().warnings.iter().map(ToString::to_string).collect()
+        let told = |warning: &&Warning| !matches!(warning, Warning::UnitsAssumed { .. });
+        self.read().warnings.iter().filter(told).map(ToString::to_string).collect()
     }
 }
 

@@ -85,6 +85,18 @@ impl Default for Units {
 }
 
 impl Units {
+    /// Keys that are not given, with the units that stand for them; `temp` has no other.
+    fn without(&self, given: impl Fn(&str) -> bool) -> Vec<(&'static str, String)> {
+        let all = [
+            ("t", self.t.to_string()),
+            ("acc", self.acc.to_string()),
+            ("gyr", self.gyr.to_string()),
+            ("mag", self.mag.to_string()),
+            ("gimbal", self.gimbal.to_string()),
+        ];
+        all.into_iter().filter(|(key, _)| !given(key)).collect()
+    }
+
     /// Unit of a sensor's columns.
     #[must_use]
     pub fn of(&self, kind: SensorKind) -> Unit {
@@ -257,6 +269,10 @@ impl Manifest {
             fault,
         })?;
         let mut warnings = keys.unknown(path);
+        let assumed = manifest.units.without(|key| keys.has("units", key));
+        if !assumed.is_empty() {
+            warnings.push(Warning::UnitsAssumed { path: path.to_path_buf(), assumed });
+        }
         if let Some(found) = manifest.site.gravity.filter(|g| !(9.76..=9.84).contains(g)) {
             let line = keys.line_of("site", "gravity");
             warnings.push(Warning::GravityUnusual { path: path.to_path_buf(), line, found });

@@ -36,6 +36,13 @@ impl<'a> KeyMap<'a> {
         1 + before.filter(|byte| **byte == b'\n').count()
     }
 
+    /// Whether a section has a key.
+    pub(crate) fn has(&self, section: &str, key: &str) -> bool {
+        let sections = self.table.get_ref().iter().filter(|(name, _)| name.get_ref() == section);
+        let mut tables = sections.filter_map(|(_, value)| value.get_ref().as_table());
+        tables.any(|table| table.iter().any(|(name, _)| name.get_ref() == key))
+    }
+
     /// Line of a key, or of its section, or the first line.
     pub(crate) fn line_of(&self, section: &str, key: &str) -> usize {
         let top = self.table.get_ref();

@@ -47,6 +47,7 @@ pub use self::manifest::Manifest;
 pub use self::place::Place;
 pub use self::read_error::ReadError;
 pub use self::sensor_kind::SensorKind;
+pub use self::site::LEAST_DIP;
 pub use self::triple::{Nominal, Triple, median};
 pub use self::unit::Unit;
 pub use self::warning::Warning;

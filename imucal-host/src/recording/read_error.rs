@@ -152,9 +152,9 @@ pub enum ReadError {
     },
     /// The times cannot be in the unit the manifest says, or in none.
     #[error(
-        "{path}, column `t`: the median interval is {found:e} s when read as `{unit}`, expected 1e-5 to 2 s; {remedy}"
+        "{path}, column `t`: the median interval is {found:e} s when read as `{unit}`, {lasting:.3} s in all, expected 2.5e-5 to 0.2 s and some minutes (up to 2 s without a gyroscope); {remedy}"
     )]
-    IntervalImplausible { path: PathBuf, unit: TimeUnit, found: f64, remedy: String },
+    IntervalImplausible { path: PathBuf, unit: TimeUnit, found: f64, lasting: f64, remedy: String },
     /// A key of the manifest that was not understood may be the cause.
     #[error("{error}. First look at the manifest: {warning}")]
     Misled { error: Box<ReadError>, warning: Box<Warning> },

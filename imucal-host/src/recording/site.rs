@@ -4,6 +4,11 @@ use serde::{Deserialize, Serialize};
 
 use super::gravity::normal_gravity;
 
+/// A field less steep than this, rad (10°), may point either way indoors.
+pub const LEAST_DIP: f64 = 0.175;
+/// The magnetic equator lies within this latitude, degrees, and a field beyond it is steep.
+const HEMISPHERE: f64 = 20.0;
+
 /// Where it was recorded.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Site {
@@ -31,6 +36,16 @@ impl Site {
         })
     }
 
+    /// Whether Earth's field points down here: by the field, else by the hemisphere; `None` where neither tells it, near
+    /// the magnetic equator too.
+    #[must_use]
+    pub fn field_points_down(&self) -> Option<bool> {
+        if let Some([north, east, down]) = self.field_ned_ut {
+            return (down.abs() > LEAST_DIP.tan() * north.hypot(east)).then_some(down > 0.0);
+        }
+        self.latitude_deg.filter(|latitude| latitude.abs() > HEMISPHERE).map(|latitude| latitude > 0.0)
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         *self == Self::default()
     }
@@ -39,6 +54,22 @@ impl Site {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_field_points_down_in_the_north_and_nowhere_for_sure_at_the_equator() {
+        let at = |latitude_deg| Site { latitude_deg, ..Site::default() }.field_points_down();
+        assert_eq!(
+            [at(Some(52.0)), at(Some(-33.0)), at(Some(8.0)), at(None)],
+            [Some(true), Some(false), None, None]
+        );
+        // The field is known better than the hemisphere.
+        let field = |down| Site {
+            latitude_deg: Some(52.0),
+            field_ned_ut: Some([25.0, 0.0, down]),
+            ..Site::default()
+        };
+        assert_eq!([field(-40.0), field(1.0)].map(|site| site.field_points_down()), [Some(false), None]);
+    }
 
     #[test]
     fn gravity_is_as_given_or_normal_or_unknown() {

@@ -131,12 +131,21 @@ pub enum TimeUnit {
     Millisecond,
     /// `us`
     Microsecond,
+    /// `ns`
+    Nanosecond,
 }
 
-const TIMES: [(TimeUnit, &str); 3] =
-    [(TimeUnit::Second, "s"), (TimeUnit::Millisecond, "ms"), (TimeUnit::Microsecond, "us")];
+const TIMES: [(TimeUnit, &str); 4] = [
+    (TimeUnit::Second, "s"),
+    (TimeUnit::Millisecond, "ms"),
+    (TimeUnit::Microsecond, "us"),
+    (TimeUnit::Nanosecond, "ns"),
+];
 
 impl TimeUnit {
+    /// Every unit, the longest first.
+    pub const ALL: [Self; 4] = [Self::Second, Self::Millisecond, Self::Microsecond, Self::Nanosecond];
+
     /// How many of this unit make a second.
     #[must_use]
     pub fn per_si(self) -> f64 {
@@ -144,6 +153,7 @@ impl TimeUnit {
             Self::Second => 1.0,
             Self::Millisecond => 1e3,
             Self::Microsecond => 1e6,
+            Self::Nanosecond => 1e9,
         }
     }
 }
@@ -211,6 +221,12 @@ macro_rules! spelt_as_text {
 }
 
 spelt_as_text!(Unit, NAMES; TimeUnit, TIMES; AngleUnit, ANGLES; TemperatureUnit, TEMPERATURES);
+
+impl fmt::Display for AngleUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(name_of(&ANGLES, *self))
+    }
+}
 
 impl fmt::Display for TimeUnit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

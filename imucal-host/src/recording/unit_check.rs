@@ -10,6 +10,9 @@ use super::triple::Triple;
 use super::unit::Unit;
 use super::warning::Warning;
 
+/// Gyroscopes for hand or vehicle end at 4000 °/s, rad/s.
+const FASTEST: f64 = 70.0;
+
 /// Bounds of a sensor's median length on the SI side.
 struct Usual {
     /// Outside of it the samples are doubted.
@@ -43,9 +46,9 @@ pub(crate) fn check(recording: &mut Recording) -> Result<(), ReadError> {
         if kind == SensorKind::Acc {
             check_axes(recording, triple)?;
         }
-        if let Some(warning) = check_size(recording, kind, triple)? {
-            recording.warnings.push(warning);
-        }
+        let fast = (kind == SensorKind::Gyr).then(|| check_rate(recording, triple)).flatten();
+        let size = check_size(recording, kind, triple)?;
+        recording.warnings.extend(size.or(fast));
     }
     Ok(())
 }
@@ -86,6 +89,27 @@ fn check_size(
             },
         })),
     }
+}
+
+/// A gyroscope is at rest for most of a calibration, and its fastest rates show the unit.
+fn check_rate(recording: &Recording, triple: &Triple) -> Option<Warning> {
+    let mut rates: Vec<f64> =
+        triple.values.iter().map(|rate| rate.norm()).filter(|rate| rate.is_finite()).collect();
+    rates.sort_unstable_by(f64::total_cmp);
+    let found = *rates.get(rates.len().saturating_sub(1 + rates.len() / 200))?;
+    (found > FASTEST).then(|| Warning::RateUnusual {
+        path: recording.path.clone(),
+        unit: triple.unit,
+        found,
+        remedy: match triple.unit {
+            Unit::RadianPerSecond if found.to_radians() < FASTEST => {
+                "the samples look like `deg/s`: write gyr = \"deg/s\" below [units] in the manifest"
+                    .to_owned()
+            }
+            Unit::Counts => "check gyr of [counts] in the manifest".to_owned(),
+            _ => "check gyr of [units] in the manifest".to_owned(),
+        },
+    })
 }
 
 fn within(value: f64, (low, high): (f64, f64)) -> bool {
@@ -239,6 +263,18 @@ mod tests {
     fn degrees_called_radians_are_refused_when_they_are_beyond_any_gyroscope() {
         let message = fixture("gyr = \"rad/s\"", &attitudes("gyr", [400.0; 3], 3)).error();
         assert_says(&message, &["sensor gyr", "read as `rad/s`", "look like `deg/s`"]);
+    }
+
+    #[test]
+    fn a_hand_s_turns_in_degrees_called_radians_are_warned_about() {
+        // At rest but for one row in twenty, as in a calibration.
+        let rows = (0..400).fold("t,gyr_x,gyr_y,gyr_z\n".to_owned(), |text, k| {
+            let rate = if k % 20 == 0 { 120.0 } else { 0.4 };
+            text + &format!("{},{rate},0.1,0.2\n", f64::from(k) * 0.01)
+        });
+        let warnings = fixture("gyr = \"rad/s\"", &rows).warnings();
+        assert_says(&warnings[0], &["sensor gyr", "120 rad/s", "look like `deg/s`", "gyr = \"deg/s\""]);
+        assert!(fixture("gyr = \"deg/s\"", &rows).warnings().is_empty());
     }
 
     #[test]

@@ -92,7 +92,7 @@ pub enum Warning {
     },
     /// The samples' interval is unusual, which a wrong unit of `t` causes.
     #[error(
-        "{path}, column `t`: the median interval is {found:e} s when read as `{unit}`, expected 1e-5 to 2 s; check t of [units] in the manifest"
+        "{path}, column `t`: the median interval is {found:e} s when read as `{unit}`, expected 2.5e-5 to 2 s; check t of [units] in the manifest"
     )]
     IntervalUnusual {
         /// Samples file.
@@ -101,6 +101,32 @@ pub enum Warning {
         unit: TimeUnit,
         /// Median interval, s.
         found: f64,
+    },
+    /// A gyroscope faster than any, which a wrong unit causes.
+    #[error(
+        "{path}, sensor gyr: one sample in two hundred is faster than {found:.0} rad/s when read as `{unit}`, expected below 70 rad/s (4000 °/s); {remedy}"
+    )]
+    RateUnusual {
+        /// Samples file.
+        path: PathBuf,
+        /// The gyroscope's unit.
+        unit: Unit,
+        /// The rate, rad/s.
+        found: f64,
+        /// What to look at.
+        remedy: String,
+    },
+    /// Units that the manifest leaves out.
+    #[error(
+        "{path}: [units] leaves out {}, which {} taken as said here; write the units the file is in",
+        units(.assumed),
+        if .assumed.len() == 1 { "is" } else { "are" }
+    )]
+    UnitsAssumed {
+        /// Manifest.
+        path: PathBuf,
+        /// Each key with the unit that is taken for it.
+        assumed: Vec<(&'static str, String)>,
     },
     /// Samples that no sensor can have measured; taken for missing.
     #[error(
@@ -140,6 +166,10 @@ pub enum Warning {
         /// The value, m/s².
         found: f64,
     },
+}
+
+fn units(assumed: &[(&'static str, String)]) -> String {
+    assumed.iter().map(|(key, unit)| format!("{key} = \"{unit}\"")).collect::<Vec<_>>().join(", ")
 }
 
 fn suggest(nearest: &Option<String>) -> String {

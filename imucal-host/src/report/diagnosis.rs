@@ -277,6 +277,7 @@ mod tests {
             recording: "case-0007.csv".to_owned(),
             verdict,
             remarks: Vec::new(),
+            warnings: Vec::new(),
             gap: vec![Gap {
                 sensor: "mag".into(),
                 axis: "x".into(),

@@ -29,7 +29,7 @@ pub fn calibration(calibration: &Calibration) -> Value {
         "sensors": sensors,
         "segmentation": calibration.segmentation.as_ref().map(segmentation),
         "compare": calibration.comparisons.iter().map(comparison).collect::<Vec<_>>(),
-        "warnings": calibration.warnings,
+        "warnings": calibration.read_warnings.iter().chain(&calibration.warnings).collect::<Vec<_>>(),
     })
 }
 
@@ -52,9 +52,7 @@ fn sensor(outcome: &SensorOutcome) -> Value {
     };
     let (reason, detail, advice) = match &outcome.verdict {
         Ok(()) => (None, None, None),
-        Err(refused) => {
-            (Some(refused.refusal.reason()), Some(refused.refusal.to_string()), Some(refused.advice.as_str()))
-        }
+        Err(refused) => (Some(refused.refusal.reason()), outcome.detail(), Some(refused.advice.as_str())),
     };
     if let Some(fields) = value.as_object_mut() {
         let follows: Vec<&str> = outcome.suspicions.iter().map(|found| found.follows.name()).collect();

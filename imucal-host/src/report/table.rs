@@ -101,7 +101,7 @@ fn write_sensor(text: &mut String, outcome: &SensorOutcome) -> fmt::Result {
         Ok(()) => write_suspicions(text, name, outcome)?,
         Err(refused) => {
             writeln!(text, "{name} ({}): REFUSED, {}", outcome.model, refused.refusal.reason())?;
-            writeln!(text, "  because: {}", refused.refusal)?;
+            writeln!(text, "  because: {}", outcome.detail().unwrap_or_default())?;
             writeln!(text, "  to do:   {}", refused.advice)?;
         }
     }

@@ -9,6 +9,7 @@ fn nothing(recording: &Recording) -> Diagnosis {
         recording: recording.name.clone(),
         verdict: Verdict::None,
         remarks: Vec::new(),
+        warnings: Vec::new(),
         gap: Vec::new(),
         places: Vec::new(),
         causes: Vec::new(),

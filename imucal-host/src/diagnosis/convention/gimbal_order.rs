@@ -26,6 +26,44 @@ const HEADINGS: usize = 5;
 
 const PERMUTATIONS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
+/// What tells the movement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Told {
+    Encoders,
+    Reference,
+    Rests,
+}
+
+impl Told {
+    fn of(recording: &Recording, motion: &dyn Motion) -> Self {
+        match (motion.encoders(0.0), &recording.reference) {
+            (Some(_), _) => Self::Encoders,
+            (None, Some(_)) => Self::Reference,
+            (None, None) => Self::Rests,
+        }
+    }
+
+    fn words(self) -> &'static str {
+        match self {
+            Self::Encoders => "the encoders as they are read",
+            Self::Reference => "the reference attitude as it is read",
+            Self::Rests => "the attitude that gravity tells at rest and the gyroscope between rests",
+        }
+    }
+
+    fn remedy(self) -> &'static str {
+        match self {
+            Self::Encoders => {
+                "no order, sign or unit of the encoders explains it: check what turned the sensor"
+            }
+            Self::Reference => {
+                "check that ref_q* takes the body's axes to north, east, down, scalar first, and the sensors' units and axes"
+            }
+            Self::Rests => "check the sensors' units, and the order and signs of their axes",
+        }
+    }
+}
+
 /// How encoders might have to be read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Reading {
@@ -115,8 +153,10 @@ pub(super) fn remark(
     let compared: Vec<SensorKind> = lost.iter().chain(&followed).map(|(kind, _)| *kind).collect();
     let names: Vec<String> =
         lost.iter().map(|(kind, left)| format!("{kind} ({:.0} %)", 100.0 * left)).collect();
+    let told_by = Told::of(recording, motion);
     let complaint = format!(
-        "against the encoders as they are read, much of the samples' variance stays unexplained by any gain and bias: {}",
+        "against {}, much of the samples' variance stays unexplained by any gain and bias: {}",
+        told_by.words(),
         names.join(", ")
     );
     if let [(SensorKind::Mag, _)] = lost[..]
@@ -140,9 +180,7 @@ pub(super) fn remark(
             100.0 * left,
             reading.words(&axes)
         ),
-        None => format!(
-            "{complaint}; no order, sign or unit of the encoders explains it: check what turned the sensor"
-        ),
+        None => format!("{complaint}; {}", told_by.remedy()),
     })
 }
 

@@ -12,12 +12,16 @@
 
 use std::ops::Range;
 
-use imucal_core::{rotation::exp, triad::Triad};
+use imucal_core::{
+    accept::{Quantity, Refusal},
+    rotation::exp,
+    triad::Triad,
+};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::super::model::Model;
 use crate::{
-    calibrate::{self, outlier::outliers},
+    calibrate::{self, SensorOutcome, outlier::outliers},
     effect::{Machine, Truth},
     recording::{
         Recording, SensorKind,
@@ -74,10 +78,15 @@ impl Held {
             let outcome = calibration.sensor(kind).ok_or_else(|| NO_REST.to_owned())?;
             match (&outcome.verdict, &outcome.fit) {
                 (Ok(()), Some(fit)) => Ok(fit.triad),
-                (Err(refused), _) => Err(refused.refusal.to_string()),
+                (Err(_), _) => Err(outcome.detail().unwrap_or_default()),
                 (Ok(()), None) => Err(NO_REST.to_owned()),
             }
         };
+        if !model.calibrated.contains(&SensorKind::Gyr)
+            && let Some(why) = calibration.sensor(SensorKind::Gyr).and_then(misread)
+        {
+            return Err(why);
+        }
         let acc_triad = own(SensorKind::Acc).map_err(|why| {
             format!("{NO_REST}; and its rests do not tell the attitude: the accelerometer's calibration is refused, {why}")
         })?;
@@ -143,6 +152,16 @@ impl Held {
             triads: [acc_triad, gyr],
             with_gyroscope: gyr_triad.is_some(),
         })
+    }
+}
+
+/// Why a gyroscope is refused whose columns are not what they are said to be: nothing follows what it turns by.
+fn misread(outcome: &SensorOutcome) -> Option<String> {
+    let refused = outcome.verdict.as_ref().err()?;
+    match refused.refusal {
+        Refusal::Implausible { what: Quantity::Axes, value: 0.0, .. } => None,
+        Refusal::Implausible { what: Quantity::Axes | Quantity::Gain, .. } => Some(refused.advice.clone()),
+        _ => None,
     }
 }
 

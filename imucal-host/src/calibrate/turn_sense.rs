@@ -1,0 +1,132 @@
+//! The sense in which a gyroscope says that a sensor was turned, against gravity's at the rests before and after.
+//!
+//! ```text
+//! C = Π exp([c P (ω − b) Δt]×),   r = Cᵀ u_before − u_after,   P, c: the median of |r| is least
+//! ```
+//!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | ω, b | nominal rate, and its mean at rest |
+//! | u | direction of the specific force at rest |
+//! | P | one of the 48 signed permutations of [`axis_swap`]: axes of the gyroscope to those of the accelerometer |
+//! | c | 1, or what a wrong unit or range makes of a gain |
+//!
+//! With an accelerometer whose axes read Q f, Q orthogonal, gravity turns by `det(Q) Q ω`: where the gyroscope is right P
+//! is always proper, `+Q` or `−Q`. So an improper P says that the gyroscope is mirrored, and a proper one other than 1
+//! that either sensor is turned, or the accelerometer mirrored. Reversing all axes of the accelerometer (f taken for
+//! gravity) does not show. Not modelled: misalignment, since P is told from others by much more.
+
+use std::ops::Range;
+
+use imucal_core::{model::turn, observation::Turn, triad::Triad};
+use nalgebra::{Matrix3, Vector3};
+
+use super::gain_remark::FACTORS;
+use crate::{
+    effect::axis_swap,
+    observe::turn::{BiasPath, TurnData, compress},
+    recording::{Recording, median},
+};
+
+/// A turn tells something once a direction moves by this much, rad (15°).
+const LEAST_ANGLE: f64 = 0.26;
+/// Turns at least, and as many as are looked at.
+const TURNS: (usize, usize) = (6, 32);
+/// A raw gyroscope carries a direction as near as this, rad (23°): a gain wrong by a fifth over a long turn.
+const NEAR: f64 = 0.4;
+/// Another order of the axes is as good within this factor.
+const ALIKE: f64 = 2.0;
+
+/// What carries gravity from rest to rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sense {
+    /// Code of P; where the turns leave several, the one that is as it ought to be or has the fewest changes.
+    pub code: usize,
+    /// Factor c of the rates, 1 where none is needed.
+    pub factor: f64,
+}
+
+/// Looks at the turns between rests; `None` without a gyroscope, with too few turns, or where no order and no factor
+/// carries gravity.
+pub fn of(recording: &Recording, rests: &[Range<usize>], acc: &Triad<f64>, factors: bool) -> Option<Sense> {
+    let (data, ends) = turns(recording, rests, acc)?;
+    let turns: Vec<Turn<'_, f64>> =
+        data.iter().zip(&ends).map(|(turn, [before, after])| turn.between(*before, *after)).collect();
+    if let Some(code) = carried(&turns, 1.0) {
+        return Some(Sense { code, factor: 1.0 });
+    }
+    let factors = FACTORS.iter().filter(|_| factors).flat_map(|(factor, _)| [*factor, factor.recip()]);
+    let errors = factors.map(|factor| (error(&turns, &(Matrix3::identity() * factor)), factor));
+    let (least, factor) = errors.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (least < NEAR).then_some(Sense { code: 0, factor })
+}
+
+/// The order of the axes that carries gravity at a factor, if any does.
+fn carried(turns: &[Turn<'_, f64>], factor: f64) -> Option<usize> {
+    let error = |code: &usize| {
+        let p = axis_swap::signed_permutation(*code).unwrap_or_else(Matrix3::identity);
+        (error(turns, &(p * factor)), *code)
+    };
+    let errors: Vec<(f64, usize)> = (0..axis_swap::CODES).map(|code| error(&code)).collect();
+    let least = errors.iter().map(|(error, _)| *error).fold(f64::INFINITY, f64::min);
+    let alike = errors.into_iter().filter(|(error, _)| *error <= ALIKE * least);
+    let simplest = alike.map(|(_, code)| code).min_by_key(|code| changes(*code));
+    simplest.filter(|_| least < NEAR)
+}
+
+/// How much a code changes: axes out of place, then signs.
+fn changes(code: usize) -> (u32, u32) {
+    let p = axis_swap::signed_permutation(code).unwrap_or_else(Matrix3::zeros);
+    let moved = 3 - p.diagonal().iter().filter(|x| **x != 0.0).count() as u32;
+    (moved, (code % 8).count_ones())
+}
+
+/// Median error of the carried directions, rad.
+fn error(turns: &[Turn<'_, f64>], gain: &Matrix3<f64>) -> f64 {
+    let triad = Triad { gain: *gain, bias: Vector3::zeros() };
+    let chords = turns.iter().map(|t| (turn::attitude(&triad, t).tr_mul(&t.before) - t.after).norm());
+    median(chords.collect()).unwrap_or(f64::INFINITY)
+}
+
+type Turns = (Vec<TurnData>, Vec<[Vector3<f64>; 2]>);
+
+/// Turns that move gravity, evenly from all, and its directions at their ends.
+fn turns(recording: &Recording, rests: &[Range<usize>], acc: &Triad<f64>) -> Option<Turns> {
+    let (force, gyr) = (recording.acc.as_ref()?, recording.gyr.as_ref()?);
+    let usable: Vec<bool> = gyr.values.iter().map(|rate| rate.iter().all(|x| x.is_finite())).collect();
+    let interval = recording.median_interval()?;
+    let still: Vec<(Vector3<f64>, Vector3<f64>, f64)> = rests
+        .iter()
+        .map(|rows| {
+            let direction = acc.correct(&mean(&force.values, rows)).normalize();
+            let middle = 0.5 * (recording.time[rows.start] + recording.time[rows.end - 1]);
+            (direction, mean(&gyr.values, rows), middle)
+        })
+        .collect();
+    let moved: Vec<usize> = (1..rests.len())
+        .filter(|k| {
+            still[k - 1].0.angle(&still[*k].0) > LEAST_ANGLE && still[*k].1.iter().all(|x| x.is_finite())
+        })
+        .collect();
+    let step = moved.len().div_ceil(TURNS.1).max(1);
+    let turns: Turns = moved
+        .into_iter()
+        .step_by(step)
+        .filter_map(|k| {
+            let [before, after] = [&still[k - 1], &still[k]];
+            let path = BiasPath { before: (before.2, before.1), after: (after.2, after.1) };
+            let ends = (k - 1, &rests[k - 1], k, &rests[k]);
+            let data = compress(&recording.time, &gyr.values, &usable, interval, ends, &path).ok()?;
+            Some((data, [before.0, after.0]))
+        })
+        .unzip();
+    (turns.0.len() >= TURNS.0).then_some(turns)
+}
+
+/// Mean of the rows that are measured.
+fn mean(values: &[Vector3<f64>], rows: &Range<usize>) -> Vector3<f64> {
+    let measured = values[rows.clone()].iter().filter(|value| value.iter().all(|x| x.is_finite()));
+    let (sum, count) =
+        measured.fold((Vector3::zeros(), 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    sum / count
+}
