@@ -25,7 +25,7 @@ fn structure(value: &Value, path: &str, lines: &mut Vec<String>) {
 }
 
 /// What the contract allows at each path.
-const CONTRACT: [&str; 53] = [
+const CONTRACT: [&str; 54] = [
     ".absent: list",
     ".absent[].effect: text",
     ".absent[].minimum_detectable: number",
