@@ -3,6 +3,10 @@
 use std::io::Read;
 use std::process::{Command, Stdio};
 
+use imucal_host::calibrate::{Options, calibrate};
+use imucal_host::report::table::table;
+use imucal_tests::simulated;
+
 use super::{Folder, imucal_on_a_day};
 
 #[test]
@@ -35,6 +39,25 @@ fn success_is_silent_on_standard_error() {
         "verify small.csv --calibration cal.bin",
     ] {
         assert_eq!(folder.run(line).with(0).err, "", "{line}");
+    }
+}
+
+#[test]
+fn a_figure_that_is_no_number_is_said_in_words() {
+    let mut calibration = calibrate(&simulated::small(), &Options::default(), &|_| {});
+    let nan = f64::NAN;
+    for fit in calibration.sensors.iter_mut().filter_map(|outcome| outcome.fit.as_mut()) {
+        (fit.rms, fit.held_out_rms, fit.condition, fit.coverage) = (nan, Some(nan), nan, nan);
+        (fit.triad.bias.x, fit.gain_std[(1, 1)], fit.field_norm) = (nan, nan, Some(nan));
+        fit.rig.get_or_insert_default().tilt = Some(([nan; 2], [nan; 2]));
+        if let Some(alignment) = &mut fit.alignment {
+            (alignment.held_out_rms, alignment.dip, alignment.phi.x) = (None, (nan, nan), nan);
+        }
+    }
+    let text = table(&calibration);
+    assert!(!text.contains("NaN"), "{text}");
+    for part in ["dip not known, no rest can be held out", "base tilted by not known", "rms not known"] {
+        assert!(text.contains(part), "{part} is missing in {text}");
     }
 }
 

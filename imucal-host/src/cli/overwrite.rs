@@ -73,6 +73,11 @@ impl Overwrite {
             }
             places.push(place);
         }
+        // A folder that takes no files is found now, and not once all is computed.
+        let mut tried = OutputSet::default();
+        for output in outputs {
+            tried.create(&output.path)?;
+        }
         Ok(OutputSet::sparing_all_but(replaceable))
     }
 

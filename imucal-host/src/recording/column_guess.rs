@@ -2,6 +2,9 @@
 
 use super::spelling;
 
+/// Bytes of the longest name that is taken for one of a column.
+const LONGEST: usize = 60;
+
 /// Other words for the first part of a name.
 const PARTS: [(&str, &str); 13] = [
     ("linearacceleration", "acc"),
@@ -54,7 +57,8 @@ const UNITS: [(&str, &[&str]); 6] = [
 /// The absent column that an unknown name probably means, and whether a unit stands behind the name.
 pub(crate) fn meant(name: &str, absent: &[&'static str]) -> Option<(&'static str, bool)> {
     // Columns of a reference of another kind, which have nothing to do with those of one letter more or less.
-    if name.starts_with("sim_") || ["ref_px", "ref_py", "ref_pz"].contains(&name) {
+    let other = name.starts_with("sim_") || ["ref_px", "ref_py", "ref_pz"].contains(&name);
+    if other || name.len() > LONGEST {
         return None;
     }
     let bare = bare(name);

@@ -76,7 +76,7 @@ fn write_comparison(text: &mut String, comparison: &Comparison) -> fmt::Result {
             plain(step.rms),
             step.held_out_rms.map_or_else(|| "-".into(), plain),
             step.second_half_rms.map_or_else(|| "-".into(), plain),
-            p_value.map_or_else(|| "-".into(), |p| format!("{p:.1e}"))
+            p_value.filter(|p| !p.is_nan()).map_or_else(|| "-".into(), |p| format!("{p:.1e}"))
         )?;
     }
     writeln!(text, "  use {}: {}", comparison.chosen, comparison.why)
@@ -188,7 +188,7 @@ fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {
         let std = alignment.covariance.diagonal().map(f64::sqrt);
         let by = |k: usize| measured_degrees(alignment.phi[k], std[k]);
         let held = alignment.held_out_rms.map_or_else(
-            || "too few rests to hold any out".into(),
+            || "no rest can be held out".into(),
             |rms| format!("held out within {}", degrees(rms, 2)),
         );
         writeln!(
