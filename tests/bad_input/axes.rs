@@ -206,6 +206,15 @@ fn a_mirrored_magnetometer_along_a_real_reference_is_refused_by_name() {
     let Some(path) = data::real("broad-01-undisturbed.csv.gz") else { return };
     let mut recording = Recording::read(&path).expect("a good recording");
     recording.gyr = None;
+    // One row in sixteen tells it as well, in a tenth of the time.
+    let every = |row: &usize| row % 16 == 0;
+    let rows: Vec<usize> = (0..recording.rows()).filter(every).collect();
+    recording.time = rows.iter().map(|row| recording.time[*row]).collect();
+    recording.reference = recording.reference.map(|all| rows.iter().map(|row| all[*row]).collect());
+    for sensor in [&mut recording.acc, &mut recording.mag].into_iter().flatten() {
+        sensor.values = rows.iter().map(|row| sensor.values[*row]).collect();
+    }
+    assert!(calibrated(&recording).sensor(SensorKind::Mag).is_some_and(|mag| mag.accepted().is_some()));
     for code in [4, 8] {
         let calibration = calibrated(&swapped(recording.clone(), SensorKind::Mag, code));
         assert_named(&calibration, SensorKind::Mag, code);

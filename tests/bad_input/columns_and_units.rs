@@ -1,6 +1,6 @@
 //! Columns that are missing, misspelt or in another unit.
 
-use super::{ACC, ALL, Bad, MAG, TIME, assert_as_clean};
+use super::{ACC, ALL, Bad, GYR, MAG, TIME, assert_as_clean};
 
 #[test]
 fn a_missing_axis_is_named_with_its_neighbours() {
@@ -154,6 +154,60 @@ fn a_recording_without_any_sensor_has_nothing_to_calibrate() {
         "acc_x",
         "nothing can be calibrated",
     ]);
+}
+
+/// The gyroscope in °/s; nothing that says so.
+fn in_degrees(bad: &mut Bad) {
+    for (axis, offset) in [32_768.0; 3].into_iter().enumerate() {
+        bad.map(GYR + axis, |raw| ((raw - offset) / 4778.0f64).to_degrees());
+    }
+}
+
+#[test]
+fn degrees_per_second_read_as_radians_are_named() {
+    for unit in ["gyr = \"rad/s\"\n", ""] {
+        let mut bad = Bad::new();
+        in_degrees(&mut bad);
+        bad.manifest("gyr = \"counts\"\n", unit);
+        let ended = bad.calibrate();
+        let gyr = &bad.json()["sensors"]["gyr"];
+        assert_eq!(
+            (&gyr["status"], &gyr["reason"]),
+            (&"refused".into(), &"implausible".into()),
+            "{ended:#?}"
+        );
+        let advice = gyr["advice"].as_str().expect("text");
+        for part in ["gyr.unit_error", "180/π", "write gyr = \"deg/s\" below [units]"] {
+            assert!(advice.contains(part), "{part}: {advice}");
+        }
+        let warnings = bad.json()["warnings"].to_string();
+        let assumed = warnings.contains("leaves out gyr = \\\"rad/s\\\"");
+        assert_eq!(assumed, unit.is_empty(), "{warnings}");
+        // What is said on the terminal is in the file.
+        assert_eq!(assumed, ended.err.contains("leaves out gyr"), "{}", ended.err);
+    }
+}
+
+#[test]
+fn radians_per_second_read_as_degrees_are_named() {
+    let mut bad = Bad::new();
+    (0..3).for_each(|axis| bad.map(GYR + axis, |raw| (raw - 32_768.0) / 4778.0));
+    bad.manifest("gyr = \"counts\"", "gyr = \"deg/s\"");
+    bad.calibrate();
+    let gyr = &bad.json()["sensors"]["gyr"];
+    let advice = gyr["advice"].as_str().expect("refused");
+    assert!(advice.contains("write gyr = \"rad/s\" below [units]"), "{gyr}");
+}
+
+#[test]
+fn a_diagnosis_of_degrees_read_as_radians_blames_no_encoders() {
+    let mut bad = Bad::new();
+    in_degrees(&mut bad);
+    bad.manifest("gyr = \"counts\"", "gyr = \"rad/s\"");
+    bad.calibrate();
+    let ended = bad.diagnose();
+    assert!(!ended.out.contains("encoder") && ended.out.contains("gyr.unit_error"), "{ended:#?}");
+    assert!(ended.out.contains("gyr = \"deg/s\""), "{ended:#?}");
 }
 
 #[test]

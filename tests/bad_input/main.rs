@@ -95,6 +95,15 @@ impl Bad {
         ended
     }
 
+    /// Diagnoses what was last calibrated.
+    fn diagnose(&self) -> Ended {
+        program::run(
+            env!("CARGO_BIN_EXE_imucal-under-test"),
+            &[],
+            &[PathBuf::from("diagnose"), self.path("small.csv")],
+        )
+    }
+
     fn json(&self) -> Value {
         serde_json::from_str(&fs::read_to_string(self.path("cal.json")).expect("written")).expect("JSON")
     }

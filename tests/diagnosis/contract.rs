@@ -77,8 +77,8 @@ const CONTRACT: [&str; 54] = [
     ".recording: text",
     ".remarks: list",
     ".remarks[]: text",
-    ".warnings: list",
     ".verdict: text",
+    ".warnings: list",
     ".where: list",
 ];
 const PLACES: [&str; 5] = [

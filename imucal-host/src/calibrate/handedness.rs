@@ -73,11 +73,12 @@ fn on_rig(calibration: &Calibration, kind: SensorKind) -> bool {
 
 /// The sense of the turns; against nominal directions where the accelerometer is refused.
 fn sense(recording: &Recording, calibration: &Calibration) -> Option<Sense> {
-    let rests = &calibration.segmentation.as_ref()?.rests;
+    let found = calibration.segmentation.as_ref().map(|cut| cut.rests.clone()).unwrap_or_default();
+    let rests = if found.len() > turn_sense::TURNS.0 { found } else { turn_sense::rests_by_force(recording) };
     let fit = calibration.sensor(SensorKind::Acc).and_then(SensorOutcome::passed);
     let acc = fit.map_or_else(Triad::identity, |fit| fit.triad);
     let refused = calibration.sensor(SensorKind::Gyr).is_some_and(|gyr| gyr.verdict.is_err());
-    turn_sense::of(recording, rests, &acc, refused)
+    turn_sense::of(recording, &rests, &acc, refused)
 }
 
 /// A refused gyroscope that would follow gravity in another unit.
@@ -96,6 +97,10 @@ fn wrong_unit(recording: &Recording, calibration: &mut Calibration, factor: f64)
     let advice = format!(
         "gyr.unit_error: gravity moves between rests as {factor:.4} times the rates would have it; {reason}; {mend}"
     );
+    let acc = calibration.sensors.iter_mut().find(|outcome| outcome.kind == SensorKind::Acc);
+    if let Some(Err(refused)) = acc.map(|acc| &mut acc.verdict) {
+        refused.advice = format!("{advice}; rates that large hide the rests");
+    }
     let limit = if factor < 1.0 { 0.5 } else { 2.0 };
     let refusal = Refusal::Implausible { what: Quantity::Gain, value: factor, limit };
     refuse(calibration, SensorKind::Gyr, refusal, advice);

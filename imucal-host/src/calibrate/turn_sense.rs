@@ -24,14 +24,19 @@ use nalgebra::{Matrix3, Vector3};
 use super::gain_remark::FACTORS;
 use crate::{
     effect::axis_swap,
-    observe::turn::{BiasPath, TurnData, compress},
+    observe::{
+        rest::{RestDetector, Samples},
+        turn::{BiasPath, TurnData, compress},
+    },
     recording::{Recording, median},
 };
 
 /// A turn tells something once a direction moves by this much, rad (15°).
 const LEAST_ANGLE: f64 = 0.26;
+/// Multiple of the initial rest's variance up to which the accelerometer alone is at rest.
+const MULTIPLIER: f64 = 5.0;
 /// Turns at least, and as many as are looked at.
-const TURNS: (usize, usize) = (6, 32);
+pub const TURNS: (usize, usize) = (6, 32);
 /// A raw gyroscope carries a direction as near as this, rad (23°): a gain wrong by a fifth over a long turn.
 const NEAR: f64 = 0.4;
 /// Another order of the axes is as good within this factor.
@@ -44,6 +49,17 @@ pub struct Sense {
     pub code: usize,
     /// Factor c of the rates, 1 where none is needed.
     pub factor: f64,
+}
+
+/// Rests by the accelerometer alone: rates in a wrong unit hide those that the gyroscope has to confirm.
+pub fn rests_by_force(recording: &Recording) -> Vec<Range<usize>> {
+    let (Some(acc), Some(interval)) = (&recording.acc, recording.median_interval()) else {
+        return Vec::new();
+    };
+    let usable: Vec<bool> = acc.values.iter().map(|force| force.iter().all(|x| x.is_finite())).collect();
+    let samples =
+        Samples { time: &recording.time, acc: &acc.values, gyr: None, temperature: None, usable: &usable };
+    RestDetector::new(samples, interval).cut(MULTIPLIER).rests
 }
 
 /// Looks at the turns between rests; `None` without a gyroscope, with too few turns, or where no order and no factor
