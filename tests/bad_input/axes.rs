@@ -207,7 +207,7 @@ fn a_mirrored_magnetometer_along_a_real_reference_is_refused_by_name() {
     let mut recording = Recording::read(&path).expect("a good recording");
     recording.gyr = None;
     // One row in sixteen tells it as well, in a tenth of the time.
-    let every = |row: &usize| row % 16 == 0;
+    let every = |row: &usize| row.is_multiple_of(16);
     let rows: Vec<usize> = (0..recording.rows()).filter(every).collect();
     recording.time = rows.iter().map(|row| recording.time[*row]).collect();
     recording.reference = recording.reference.map(|all| rows.iter().map(|row| all[*row]).collect());

@@ -22,7 +22,9 @@ impl Waiting {
         let folder = Folder::with_calibration();
         let made = Command::new("mkfifo").arg(folder.path("out.csv")).status().expect("mkfifo starts");
         assert!(made.success());
-        let mut program = Command::new("sh")
+        // A test run in the background of a shell ignores INT, and so would the program.
+        let mut program = Command::new("env")
+            .args(["--default-signal=INT,TERM,HUP", "sh"])
             .args(["-c", &format!("{words} exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_imucal-under-test")])
             .args(folder.arguments("apply small.csv --calibration cal.bin --out out.csv"))
             .stdout(Stdio::null())
@@ -43,7 +45,15 @@ impl Waiting {
     }
 
     fn end(&mut self) -> ExitStatus {
-        self.program.wait().expect("it is ours")
+        let end = Instant::now() + PATIENCE;
+        while Instant::now() < end {
+            if let Some(status) = self.program.try_wait().expect("it is ours") {
+                return status;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        let _ = self.program.kill();
+        panic!("the program has not ended within {PATIENCE:?}")
     }
 
     /// Reads what it waits to send.
