@@ -15,18 +15,22 @@
 //! Not told: two sensors turned alike, which is how they are mounted; without a site, all axes of the magnetometer or of
 //! the accelerometer reversed.
 
-use imucal_core::accept::{Quantity, Refusal};
-use imucal_core::triad::Triad;
+use imucal_core::{
+    accept::{Quantity, Refusal},
+    model::unified::UnifiedParameters,
+    triad::Triad,
+};
 use nalgebra::Matrix3;
 
 use super::{
     gain_remark,
     outcome::{Calibration, Evidence, FitSummary, Refused, SensorOutcome},
+    reference_fit,
     turn_sense::{self, Sense},
 };
 use crate::{
     effect::axis_swap::{columns, nearest, signed_permutation},
-    observe::motion,
+    observe::{motion, pose},
     recording::{LEAST_DIP, Recording, SensorKind, Unit},
 };
 
@@ -178,33 +182,27 @@ fn aligned(recording: &Recording, calibration: &Calibration) -> Option<Aligned> 
     })
 }
 
-/// The same of a magnetometer that was calibrated along a reference attitude: its axes are those of the reference's body.
+/// The same of a magnetometer that was calibrated along a reference attitude. However its frame stands, and the sensors
+/// on its body: each fit takes its sensor for right-handed, and tells its axes and the direction of what it measures.
 fn along_reference(recording: &Recording, calibration: &Calibration) -> Option<Aligned> {
     let outcome = calibration.sensor(SensorKind::Mag)?;
     let (fit, Evidence::Reference(_, found)) = (outcome.passed()?, outcome.evidence.as_ref()?) else {
         return None;
     };
-    let (code, angle) = nearest(&fit.triad.gain);
-    let dip = found.parameters.vector_n.normalize().z.asin();
-    let dip = if reference_points_up(recording) { -dip } else { dip };
-    let down = recording.manifest.site.field_points_down().filter(|_| dip.abs() > LEAST_DIP);
-    Some(Aligned {
-        order: signed_permutation(code).filter(|_| angle < OBLIQUE),
-        reversed: down.map(|down| down != (dip > 0.0)),
-        dip,
-    })
+    let force = force_along_reference(recording)?;
+    let (code, angle) = nearest(&(force.sensitivity * fit.triad.gain));
+    let upward = force.vector_n.normalize();
+    let dip = (-upward.dot(&found.parameters.vector_n.normalize())).clamp(-1.0, 1.0).asin();
+    let down = recording.manifest.site.field_points_down().filter(|_| dip.abs() > LEAST_DIP)?;
+    let order = signed_permutation(code).filter(|_| angle < OBLIQUE);
+    Some(Aligned { order, reversed: Some(down != (dip > 0.0)), dip })
 }
 
-/// The accelerometer says that z of the reference's frame points up and not, as it ought to, down.
-fn reference_points_up(recording: &Recording) -> bool {
-    let (Some(acc), Some(reference)) = (&recording.acc, &recording.reference) else { return false };
-    let upward: f64 = motion::of_reference(reference)
-        .iter()
-        .zip(&acc.values)
-        .filter_map(|(c_t_n, force)| Some((c_t_n.as_ref()? * force).z))
-        .filter(|z| z.is_finite())
-        .sum();
-    upward > 0.0
+fn force_along_reference(recording: &Recording) -> Option<UnifiedParameters<f64>> {
+    let (acc, reference) = (recording.acc.as_ref()?, recording.reference.as_ref()?);
+    let usable: Vec<bool> = acc.values.iter().map(|force| force.iter().all(|x| x.is_finite())).collect();
+    let (poses, _) = pose::along_reference(&acc.values, &usable, &motion::of_reference(reference));
+    reference_fit::start(&poses)
 }
 
 /// A gyroscope that was calibrated along a reference attitude, and an accelerometer that does not turn as it does.
@@ -327,8 +325,19 @@ fn unchecked(calibration: &mut Calibration, turned: bool, aligned: bool) {
     if passed(SensorKind::Acc) && !turned && !aligned {
         alone.push((SensorKind::Acc, "turns with a gyroscope between rests"));
     }
-    if passed(SensorKind::Mag) && !aligned && !on_rig(calibration, SensorKind::Mag) {
-        alone.push((SensorKind::Mag, "an accepted accelerometer and eight rests or more in all directions"));
+    if passed(SensorKind::Mag) && !aligned {
+        let evidence = calibration.sensor(SensorKind::Mag).and_then(|mag| mag.evidence.as_ref());
+        match evidence {
+            // On gimbals the site's field is known.
+            Some(Evidence::Gimbals(..)) => {}
+            Some(Evidence::Reference(..)) => {
+                alone.push((SensorKind::Mag, "an accelerometer and [site] latitude_deg"));
+            }
+            _ => alone.push((
+                SensorKind::Mag,
+                "an accepted accelerometer and eight rests or more in all directions",
+            )),
+        }
     }
     for (kind, need) in alone {
         calibration.warnings.push(format!(
