@@ -36,8 +36,13 @@ fn recordings(folder: &Path) -> Vec<PathBuf> {
 
 fn read(path: &Path) -> (Recording, Integrity) {
     let recording = Recording::read(path).unwrap_or_else(|error| panic!("{error}"));
-    let assumed = |warning: &Warning| matches!(warning, Warning::UnitsAssumed { .. });
-    assert!(recording.warnings.iter().all(assumed), "{}: {:?}", recording.name, recording.warnings);
+    // Positions of a reference are data of the recording that nothing uses yet.
+    let known = |warning: &Warning| match warning {
+        Warning::UnitsAssumed { .. } => true,
+        Warning::UnknownColumn { column, .. } => column.starts_with("ref_p"),
+        _ => false,
+    };
+    assert!(recording.warnings.iter().all(known), "{}: {:?}", recording.name, recording.warnings);
     let integrity = inspect(&recording);
     (recording, integrity)
 }
