@@ -2,8 +2,10 @@
 //!
 //! A window's variance (sum over axes) is compared with a multiple of that of the initial rest; the multiple is
 //! swept, since no single one suits every hand and table. A rest is a run of window centres below the threshold,
-//! so it ends about half a window before the motion begins and holds none of it. Source: Tedaldi, Pretto &
-//! Menegatti 2014 (ICRA), section IV; the gyroscope's part and the fallback without an initial rest are ours.
+//! so it ends about half a window before the motion begins and holds none of it. Where the recording itself begins or
+//! ends, windows are cut short: half a window is left out there if its mean is not that of the rest, since a motion
+//! has begun in it or not yet ended. Source: Tedaldi, Pretto & Menegatti 2014 (ICRA), section IV; the gyroscope's part,
+//! the recording's ends and the fallback without an initial rest are ours.
 
 use std::ops::Range;
 
@@ -32,6 +34,9 @@ const SHOT_INTERVAL: f64 = 0.2;
 const USABLE_SHARE: f64 = 0.8;
 /// A gap longer than this many usual intervals ends a rest.
 const GAP: f64 = 5.0;
+/// At an end of the recording a motion shows where the mean of some last rows is this many of its standard deviations
+/// from that of the rest: one row in 10⁵ of white noise.
+const MOVES: f64 = 3.0;
 
 /// What rest detection looks at; all of equal length.
 #[derive(Clone, Copy, Debug)]
@@ -61,6 +66,8 @@ pub struct RestDetector<'a> {
     /// The reference is the initial rest, not the quietest stretch.
     from_initial: bool,
     interval: f64,
+    /// Rows to each side of a window's centre.
+    half: usize,
 }
 
 /// Rests found at one threshold, as half-open row ranges in time order.
@@ -81,7 +88,7 @@ impl<'a> RestDetector<'a> {
         let variance = windowed_variance(samples, half, GAP * interval);
         let rate = samples.gyr.map(|gyr| windowed_mean(gyr, samples.usable, half));
         let (noise, from_initial) = reference_noise(&variance, (INITIAL / interval).round() as usize, half);
-        Self { samples, variance, rate, noise, from_initial, interval }
+        Self { samples, variance, rate, noise, from_initial, interval, half }
     }
 
     /// Rows are single shots, seconds apart, each taken at rest.
@@ -119,14 +126,50 @@ impl<'a> RestDetector<'a> {
                 (true, None) => begin = Some(k),
                 (false, Some(first)) => {
                     begin = None;
-                    if self.samples.time[k - 1] - self.samples.time[first] >= SHORTEST {
-                        rests.push(first..k);
+                    let rest = self.without_cut_motion(first..k);
+                    if self.samples.time[rest.end - 1] - self.samples.time[rest.start] >= SHORTEST {
+                        rests.push(rest);
                     }
                 }
                 _ => {}
             }
         }
         rests
+    }
+
+    /// A rest without the half window at an end of the recording in which a motion begins or ends: the windows there are
+    /// cut short, and too few rows of it are in them to show.
+    fn without_cut_motion(&self, rest: Range<usize>) -> Range<usize> {
+        let Range { mut start, mut end } = rest;
+        if end == self.samples.time.len() && end - start > 2 * self.half {
+            let (inside, last) = (start..end - self.half, (end - self.half..end).rev());
+            if self.departs(inside.clone(), last) {
+                end = inside.end;
+            }
+        }
+        if start == 0 && end > 2 * self.half {
+            let (inside, first) = (self.half..end, 0..self.half);
+            if self.departs(inside.clone(), first) {
+                start = inside.start;
+            }
+        }
+        start..end
+    }
+
+    /// The mean of the outermost of some rows, however many, is not that of the rows `inside`; `from_end` are those rows
+    /// from the outermost inwards.
+    fn departs(&self, inside: Range<usize>, from_end: impl Iterator<Item = usize> + Clone) -> bool {
+        let usable = |row: &usize| self.samples.usable[*row];
+        [Some(self.samples.acc), self.samples.gyr].into_iter().flatten().any(|values| {
+            let mut still = Moments::default();
+            inside.clone().filter(usable).for_each(|row| still.push(&values[row]));
+            let (mean, variance, rows) = (still.mean(), still.variance().sum(), f64::from(still.count()));
+            let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+            from_end.clone().filter(usable).any(|row| {
+                (sum, count) = (sum + (values[row] - mean), count + 1.0);
+                (sum / count).norm_squared() > MOVES * MOVES * variance * (1.0 / count + 1.0 / rows)
+            })
+        })
     }
 
     /// Moments of a rest.
@@ -278,6 +321,30 @@ mod tests {
         assert_eq!(cut.rests.len(), 2, "{cut:?}");
         assert!(cut.rests[0].end <= 400 && cut.rests[1].start >= 600);
         assert!(cut.rests[0].len() > 300 && cut.rests[1].len() > 300);
+    }
+
+    #[test]
+    fn a_rest_holds_none_of_a_motion_that_an_end_of_the_recording_cuts() {
+        // A turn that speeds up from 0 rad/s: 0.06 rad/s where the recording ends, 0.1 s into it.
+        let turning = |t: f64| 6.0 * t * t.max(0.0);
+        let noise = |k: usize| 1e-3 * (0.7 * (k * k) as f64).sin();
+        let acc: Vec<_> =
+            (0..600).map(|k| Vector3::new(noise(k), noise(k + 3), 9.8 + noise(k + 9))).collect();
+        let still: Vec<_> =
+            (0..600).map(|k| Vector3::new(noise(k + 1), noise(k + 5), noise(k + 7))).collect();
+        let time: Vec<f64> = (0..600).map(|k| k as f64 * DT).collect();
+        let usable = vec![true; 600];
+        let rests = |gyr: &[Vector3<f64>]| {
+            let samples =
+                Samples { time: &time, acc: &acc, gyr: Some(gyr), temperature: None, usable: &usable };
+            RestDetector::new(samples, DT).cut(4.0).rests
+        };
+        assert_eq!(rests(&still), [0..600]);
+        let moved = |since: &dyn Fn(usize) -> f64| -> Vec<_> {
+            (0..600).map(|k| still[k] + Vector3::y() * turning(since(k))).collect()
+        };
+        assert_eq!(rests(&moved(&|k| DT * (k as f64 - 590.0))), [0..550]);
+        assert_eq!(rests(&moved(&|k| DT * (10.0 - k as f64))), [50..600]);
     }
 
     #[test]
