@@ -3,7 +3,7 @@
 
 use firmware_example::{RECORD, drill, scene::Noise};
 use imucal_core::{
-    link::{BATCH, FitModel, MAX_FRAME, Reply, Request, Values, encode},
+    link::{BATCH, FitModel, Header, MAX_FRAME, Origin, Reply, Request, Values, encode},
     record::{Date, Sensor},
 };
 use rand::{Rng, RngExt, SeedableRng};
@@ -51,7 +51,7 @@ fn messages() -> Vec<Vec<u8>> {
     assert_eq!(observations.len(), BATCH);
     let raw = Values::from_slice(&[[1.0, -2.0, f32::NAN]; 5]).expect("room");
     let requests = [
-        Request::Identify,
+        Request::Identify { nonce: 1 << 63 },
         Request::PutRecord { record: RECORD, replace: true },
         Request::Correct { sensor: Sensor::Gyroscope, temperature: 25.0, raw: raw.clone() },
         Request::StartFit(drill::task(FitModel::K12)),
@@ -60,9 +60,15 @@ fn messages() -> Vec<Vec<u8>> {
     ];
     let replies = [Reply::Record(RECORD), Reply::Corrected(raw), Reply::Stored { sequence: 70_000 }];
     let mut buffer = [0; MAX_FRAME];
-    let mut framed: Vec<Vec<u8>> =
-        requests.iter().map(|each| encode(9, each, &mut buffer).expect("it fits").to_vec()).collect();
-    framed.extend(replies.iter().map(|each| encode(9, each, &mut buffer).expect("it fits").to_vec()));
+    let asked = Header { id: 9, origin: Origin::Host, session: 0x0102_0304 };
+    let answered = Header { origin: Origin::Device, ..asked };
+    let mut framed: Vec<Vec<u8>> = requests
+        .iter()
+        .map(|each| encode(&asked, each, None, &mut buffer).expect("it fits").to_vec())
+        .collect();
+    framed.extend(
+        replies.iter().map(|each| encode(&answered, each, None, &mut buffer).expect("it fits").to_vec()),
+    );
     let plain: Vec<Vec<u8>> = framed
         .iter()
         .map(|frame| {
@@ -70,8 +76,8 @@ fn messages() -> Vec<Vec<u8>> {
             let whole =
                 frame.iter().find_map(|byte| receiver.push(*byte).map(|f| f.expect("whole").to_vec()));
             let whole = whole.expect("a frame");
-            // Behind version and id, before the checksum.
-            whole[5..whole.len() - 4].to_vec()
+            // Behind the header, before the checksum.
+            whole[10..whole.len() - 4].to_vec()
         })
         .collect();
     [framed, plain].concat()

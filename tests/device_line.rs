@@ -101,11 +101,11 @@ fn pass(device: TcpStream, mut host: TcpStream, mut change: impl FnMut(&mut Repl
     for byte in BufReader::new(device).bytes() {
         let Ok(byte) = byte else { return };
         let Some(Ok(frame)) = receiver.push(byte) else { continue };
-        let (header, message) = split(frame).expect("whole");
-        let mut reply: Reply<'_> = header.read(message).expect("a reply");
+        let frame = split(frame).expect("whole");
+        let mut reply: Reply<'_> = frame.read().expect("a reply");
         change(&mut reply);
         let mut buffer = [0; MAX_FRAME];
-        if host.write_all(encode(header.id, &reply, &mut buffer).expect("it fits")).is_err() {
+        if host.write_all(encode(&frame.header, &reply, None, &mut buffer).expect("it fits")).is_err() {
             return;
         }
     }

@@ -34,6 +34,7 @@ pub mod judgement;
 #[cfg(target_os = "none")]
 pub mod machine;
 pub mod replay;
+pub mod ring;
 pub mod scene;
 pub mod search;
 #[cfg(microbit)]

@@ -1,7 +1,7 @@
 //! What is asked of the decoders, whatever the bytes are: by the fuzzer, and by `tests/decoders.rs` with a seed.
 
 use crc::{CRC_32_ISO_HDLC, Crc};
-use imucal_core::link::{Header, MAX_FRAME, Receiver, Reply, Request, encode, split};
+use imucal_core::link::{Frame, Header, MAX_FRAME, Origin, Receiver, Reply, Request, encode, split};
 use imucal_core::record;
 
 /// Bytes as they come over a line: frames and messages are read or refused, and nothing panics. Gives how many
@@ -11,21 +11,30 @@ pub fn frames(bytes: &[u8]) -> u32 {
     let mut count = 0;
     for byte in bytes {
         if let Some(Ok(frame)) = receiver.push(*byte)
-            && let Ok((header, message)) = split(frame)
+            && let Ok(frame) = split(frame)
         {
-            count += read(&header, message);
+            count += read(&frame);
         }
     }
     // Past the checksum, which a fuzzer hardly ever meets.
-    count + read(&Header { version: imucal_core::link::VERSION, id: 1 }, bytes)
+    let whole = checked(bytes);
+    count + split(&whole).map_or(0, |frame| read(&frame))
+}
+
+/// Bytes behind the header of a request of this version, and before a checksum that fits them.
+fn checked(bytes: &[u8]) -> Vec<u8> {
+    let mut whole = [&[imucal_core::link::VERSION, 1, 0, 0, 0, 0, 0, 0, 0, 0], bytes].concat();
+    whole.extend(Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(&whole).to_le_bytes());
+    whole
 }
 
 /// What is read comes back when it is written again.
-fn read(header: &Header, message: &[u8]) -> u32 {
-    let reply = header.read::<Reply<'_>>(message).is_ok();
-    let Ok(request) = header.read::<Request<'_>>(message) else { return reply.into() };
+fn read(frame: &Frame<'_>) -> u32 {
+    let reply = frame.read::<Reply<'_>>().is_ok();
+    let Ok(request) = frame.read::<Request<'_>>() else { return reply.into() };
     let mut buffer = [0; MAX_FRAME];
-    if encode(header.id, &request, &mut buffer).is_ok() {
+    let header = Header { origin: Origin::Host, ..frame.header };
+    if encode(&header, &request, None, &mut buffer).is_ok() {
         let mut receiver = Receiver::default();
         let whole = buffer.iter().find_map(|byte| receiver.push(*byte).map(|frame| frame.is_ok()));
         assert_eq!(whole, Some(true));

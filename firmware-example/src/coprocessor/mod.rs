@@ -17,7 +17,7 @@ mod requests;
 
 use embedded_storage::nor_flash::NorFlash;
 use imucal_core::{
-    link::{Fault, FitProgress, FrameError, Receiver, RecordState, Reply, Request, VERSION, split},
+    link::{Asked, Fault, FitProgress, Frame, FrameError, Guard, Receiver, RecordState, Reply, split},
     record::{Date, Sensor, SensorIdentity},
 };
 
@@ -43,11 +43,11 @@ enum Job {
     Booting,
     None,
     /// A record on its way into flash.
-    Storing(u32, Writing),
+    Storing(Asked, Writing),
     /// Slices of the fit that are left; `None`: to its end.
-    Stepping(u32, Option<u16>),
+    Stepping(Asked, Option<u16>),
     /// A fit that has stopped, and the day.
-    Judging(u32, Date),
+    Judging(Asked, Date),
 }
 
 /// An answer that waits until the link is free.
@@ -62,7 +62,7 @@ enum Due {
 /// A stream of corrected samples.
 #[derive(Clone, Copy, Debug)]
 struct Stream {
-    id: u32,
+    asked: Asked,
     every: u16,
     /// Samples until the next that is sent.
     left: u16,
@@ -112,12 +112,11 @@ struct Device<
     job: Job,
     /// Turns that bytes or samples have kept the work waiting.
     waited: u8,
-    due: Option<(u32, Due)>,
+    due: Option<(Asked, Due)>,
     /// The last fit that was judged.
     finished: Option<Finished>,
     stream: Option<Stream>,
-    /// The last id taken.
-    last: u32,
+    guard: Guard<'a>,
     refused: u32,
     corrected: u32,
     number: u32,
@@ -136,10 +135,11 @@ impl<
     const PARTICLES: usize,
 > Coprocessor<'a, L, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES>
 {
-    /// Looks for the record in the flash; the first turn reads it.
+    /// Looks for the record in the flash; the first turn reads it. `guard` is of this start alone.
     pub fn new(
         board: Board<L, F, C, S>,
         unit: SensorIdentity,
+        guard: Guard<'a>,
         memory: &'a mut Memory<POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
     ) -> Self {
         let Board { link, flash, clock, sensors, stack } = board;
@@ -158,7 +158,7 @@ impl<
             due: None,
             finished: None,
             stream: None,
-            last: 0,
+            guard,
             refused: 0,
             corrected: 0,
             number: 0,
@@ -231,63 +231,68 @@ impl<
         if !self.outgoing.is_free() {
             return false;
         }
-        let Some((id, due)) = self.due.take() else { return false };
+        let Some((asked, due)) = self.due.take() else { return false };
         let reply = match due {
             Due::Stored(sequence) => Reply::Stored { sequence },
             Due::Progress => self.progress(),
             Due::Fault(fault) => Reply::Fault(fault),
-            Due::Report => return self.answer_report(id),
+            Due::Report => return self.answer_report(asked),
         };
-        self.outgoing.send(id, &reply);
+        self.send(asked, &reply);
         true
     }
 
     #[inline(never)]
-    fn answer_report(&mut self, id: u32) -> bool {
+    fn answer_report(&mut self, asked: Asked) -> bool {
         let report = self.finished.take().map(|finished| Reply::Report(finished.report));
-        self.outgoing.send(id, &report.unwrap_or(Reply::Fault(Fault::NotReady)));
+        self.send(asked, &report.unwrap_or(Reply::Fault(Fault::NotReady)));
         true
     }
 
     #[inline(never)]
-    fn judge(&mut self, id: u32, date: Date) {
+    fn judge(&mut self, asked: Asked, date: Date) {
         self.finished = self.fitting.finish().ok();
         if let Some((sensor, triad)) = self.finished.as_ref().and_then(|finished| finished.accepted.as_ref())
         {
             self.calibration.adopt(*sensor, triad, date);
         }
-        self.end(id, Due::Report);
+        self.end(asked, Due::Report);
     }
 
     /// Apart from who waits for bytes: a request takes its memory only while it is worked at.
     #[inline(never)]
     fn receive(&mut self, frame: Result<&[u8], FrameError>) {
         match frame.and_then(split) {
-            Ok((header, message)) => match header.read::<Request<'_>>(message) {
-                Ok(request) => self.take(header.id, request),
-                Err(error) => self.refuse(header.id, of_frame(error)),
-            },
-            Err(error) => self.refuse(0, of_frame(error)),
-        }
-    }
-
-    /// Ids rise; only who asks for the next one may use any.
-    fn take(&mut self, id: u32, request: Request<'_>) {
-        if id == 0 {
-            return self.refuse(0, Fault::Malformed);
-        }
-        if !matches!(request, Request::Identify) {
-            if id <= self.last {
-                return self.refuse(id, Fault::Stale { last: self.last });
+            Ok(frame) if self.guard.is_for_us(&frame) => self.take(&frame),
+            // An echo, or another device: an answer might be answered for ever.
+            Ok(_) | Err(FrameError::Refused { .. }) => {}
+            Err(FrameError::Version { id, .. }) => {
+                self.refused = self.refused.saturating_add(1);
+                self.outgoing.refuse_version(id);
             }
-            self.last = id;
+            Err(error) if self.guard.may_complain() => self.refuse(Asked::NOBODY, of_frame(error)),
+            Err(_) => self.refused = self.refused.saturating_add(1),
         }
-        self.handle(id, request);
     }
 
-    fn refuse(&mut self, id: u32, fault: Fault) {
+    fn take(&mut self, frame: &Frame<'_>) {
+        let request = match frame.read() {
+            Ok(request) => request,
+            Err(error) => return self.refuse(Asked::by(&frame.header), of_frame(error)),
+        };
+        match self.guard.admit(frame, &request) {
+            Ok(asked) => self.handle(asked, request),
+            Err(fault) => self.refuse(Asked::by(&frame.header), fault),
+        }
+    }
+
+    fn refuse(&mut self, asked: Asked, fault: Fault) {
         self.refused = self.refused.saturating_add(1);
-        self.outgoing.send(id, &Reply::Fault(fault));
+        self.send(asked, &Reply::Fault(fault));
+    }
+
+    fn send(&mut self, asked: Asked, reply: &Reply<'_>) {
+        self.outgoing.send(&asked, self.guard.seal_for(&asked), reply);
     }
 
     /// Corrects a sample of the board's own sensors.
@@ -301,13 +306,16 @@ impl<
         }
         self.corrected = self.corrected.saturating_add(1);
         let number = self.number;
+        // A session that is over takes its stream along.
+        self.stream = self.stream.filter(|stream| self.guard.is_current(&stream.asked));
         if let Some(stream) = &mut self.stream {
             stream.left = stream.left.saturating_sub(1);
             // A stream never waits: what the link does not take is left out, and the number tells.
             if stream.left == 0 {
                 stream.left = stream.every;
+                let asked = stream.asked;
                 if self.outgoing.is_free() {
-                    self.outgoing.send(stream.id, &Reply::Sample { number, values });
+                    self.send(asked, &Reply::Sample { number, values });
                 }
             }
         }
@@ -329,49 +337,49 @@ impl<
     fn work(&mut self) -> bool {
         match &mut self.job {
             Job::Booting | Job::None => return false,
-            Job::Storing(id, writing) => {
-                let id = *id;
+            Job::Storing(asked, writing) => {
+                let asked = *asked;
                 let done = match &mut self.slots {
                     Some(slots) => slots.step(writing),
                     None => return false,
                 };
                 match done {
                     Ok(None) => {}
-                    Ok(Some(sequence)) => self.stored(id, sequence),
-                    Err(_) => self.end(id, Due::Fault(Fault::Flash)),
+                    Ok(Some(sequence)) => self.stored(asked, sequence),
+                    Err(_) => self.end(asked, Due::Fault(Fault::Flash)),
                 }
             }
-            Job::Stepping(id, left) => {
-                let id = *id;
+            Job::Stepping(asked, left) => {
+                let asked = *asked;
                 let stopped = self.fitting.step();
                 if let Some(left) = left {
                     *left = left.saturating_sub(1);
                 }
                 if stopped || *left == Some(0) {
-                    self.end(id, Due::Progress);
+                    self.end(asked, Due::Progress);
                 }
             }
-            Job::Judging(id, date) => {
-                let (id, date) = (*id, *date);
-                self.judge(id, date);
+            Job::Judging(asked, date) => {
+                let (asked, date) = (*asked, *date);
+                self.judge(asked, date);
             }
         }
         true
     }
 
-    fn end(&mut self, id: u32, due: Due) {
+    fn end(&mut self, asked: Asked, due: Due) {
         self.job = Job::None;
-        self.due = Some((id, due));
+        self.due = Some((asked, due));
     }
 
     /// A record is whole in flash: it is in use from now on.
     #[inline(never)]
-    fn stored(&mut self, id: u32, sequence: u32) {
+    fn stored(&mut self, asked: Asked, sequence: u32) {
         let mut buffer = [0; SLOT];
         let bytes = self.slots.as_mut().and_then(|slots| slots.read(&mut buffer).ok());
         self.calibration.state = bytes.map_or(RecordState::Unusable, |bytes| self.calibration.load(bytes));
         self.calibration.unsaved = false;
-        self.end(id, Due::Stored(sequence));
+        self.end(asked, Due::Stored(sequence));
     }
 }
 
@@ -379,7 +387,6 @@ fn of_frame(error: FrameError) -> Fault {
     match error {
         FrameError::Oversized => Fault::Oversized,
         FrameError::Damaged => Fault::Damaged,
-        FrameError::Version { .. } => Fault::Version { supported: VERSION },
-        FrameError::Malformed => Fault::Malformed,
+        _ => Fault::Malformed,
     }
 }

@@ -1,6 +1,6 @@
 //! One frame on its way out.
 
-use imucal_core::link::{MAX_FRAME, Reply, encode};
+use imucal_core::link::{Asked, Header, MAX_FRAME, Reply, Seal, encode, refuse_version};
 
 use crate::board::ByteLink;
 
@@ -23,9 +23,16 @@ impl Outgoing {
 
     /// Puts a reply on its way; only while [`is_free`](Self::is_free).
     #[inline(never)]
-    pub(super) fn send(&mut self, id: u32, reply: &Reply<'_>) {
+    pub(super) fn send(&mut self, asked: &Asked, seal: Option<Seal<'_>>, reply: &Reply<'_>) {
         // Every reply fits: `link` tests the longest.
-        self.length = encode(id, reply, &mut self.bytes).map_or(0, <[u8]>::len);
+        self.length = encode(&Header::answer(asked), reply, seal, &mut self.bytes).map_or(0, <[u8]>::len);
+        self.sent = 0;
+    }
+
+    /// Puts the refusal of a frame of another version on its way.
+    #[inline(never)]
+    pub(super) fn refuse_version(&mut self, id: u32) {
+        self.length = refuse_version(id, &mut self.bytes).len();
         self.sent = 0;
     }
 

@@ -2,7 +2,7 @@
 
 use embedded_storage::nor_flash::NorFlash;
 use imucal_core::{
-    link::{Fault, FitTask, Identity, Observation, RecordState, Reply, Request, Status, Values},
+    link::{Asked, Fault, FitTask, Identity, Observation, RecordState, Reply, Request, Status, Values},
     record::{self, Date, Sensor},
 };
 
@@ -30,29 +30,30 @@ impl<
 > Device<'_, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES>
 {
     /// Does what a request asks for, or says why not.
-    pub(super) fn handle(&mut self, id: u32, request: Request<'_>) {
+    pub(super) fn handle(&mut self, asked: Asked, request: Request<'_>) {
         let done = match request {
-            Request::Identify => self.identify(id),
-            Request::Status => self.status(id),
-            Request::GetRecord => self.get_record(id),
-            Request::Correct { sensor, temperature, raw } => self.correct(id, sensor, temperature, &raw),
+            Request::Identify { .. } => self.identify(asked),
+            Request::Status => self.status(asked),
+            Request::GetRecord => self.get_record(asked),
+            Request::Correct { sensor, temperature, raw } => self.correct(asked, sensor, temperature, &raw),
             Request::Stream { every } => {
-                let stream = Stream { id, every, left: every };
+                let stream = Stream { asked, every, left: every };
                 self.stream = Some(stream).filter(|stream| stream.every > 0);
-                self.done(id)
+                self.done(asked)
             }
-            Request::AbortFit => self.abort(id),
+            Request::AbortFit => self.abort(asked),
+            Request::Lock | Request::Unlock => self.done(asked),
             _ if self.is_busy() => Err(Fault::Busy),
-            Request::PutRecord { record, replace } => self.put_record(id, record, replace),
-            Request::Store { replace } => self.store(id, replace),
-            Request::StartFit(task) => self.start_fit(id, task),
-            Request::Feed { index, observations } => self.feed(id, index, &observations),
-            Request::StepFit { slices } => self.step_fit(id, slices),
-            Request::FinishFit { date } => self.finish_fit(id, date),
+            Request::PutRecord { record, replace } => self.put_record(asked, record, replace),
+            Request::Store { replace } => self.store(asked, replace),
+            Request::StartFit(task) => self.start_fit(asked, task),
+            Request::Feed { index, observations } => self.feed(asked, index, &observations),
+            Request::StepFit { slices } => self.step_fit(asked, slices),
+            Request::FinishFit { date } => self.finish_fit(asked, date),
             _ => Err(Fault::Malformed),
         };
         if let Err(fault) = done {
-            self.refuse(id, fault);
+            self.refuse(asked, fault);
         }
     }
 
@@ -60,132 +61,134 @@ impl<
         !matches!(self.job, Job::None) || self.due.is_some()
     }
 
-    fn done(&mut self, id: u32) -> Result<(), Fault> {
-        self.outgoing.send(id, &Reply::Done);
+    fn done(&mut self, asked: Asked) -> Result<(), Fault> {
+        self.send(asked, &Reply::Done);
         Ok(())
     }
 
     #[inline(never)]
-    fn identify(&mut self, id: u32) -> Result<(), Fault> {
+    fn identify(&mut self, asked: Asked) -> Result<(), Fault> {
         let identity = Identity {
             unit: self.calibration.unit.clone(),
             firmware: FIRMWARE,
             record_version: record::VERSION,
-            next_id: self.last.saturating_add(1),
+            nonce: self.guard.nonce(),
+            keyed: self.guard.is_keyed(),
             capacity: Fitting::<POINTS, POSES, TURNS, BLOCKS, PARTICLES>::CAPACITY,
         };
-        self.outgoing.send(id, &Reply::Identity(identity));
+        self.send(asked, &Reply::Identity(identity));
         Ok(())
     }
 
     #[inline(never)]
-    fn status(&mut self, id: u32) -> Result<(), Fault> {
+    fn status(&mut self, asked: Asked) -> Result<(), Fault> {
         let newest = self.slots.as_ref().and_then(|slots| slots.newest());
         let status = Status {
             uptime: self.clock.uptime(),
             record: self.calibration.state,
             sequence: newest.map_or(0, |newest| newest.sequence),
             unsaved: self.calibration.unsaved,
+            locked: self.guard.is_locked(),
             corrected: self.corrected,
             refused: self.refused,
             stack: (self.stack)(),
             fit: self.fitting.progress(),
         };
-        self.outgoing.send(id, &Reply::Status(status));
+        self.send(asked, &Reply::Status(status));
         Ok(())
     }
 
     #[inline(never)]
-    fn get_record(&mut self, id: u32) -> Result<(), Fault> {
+    fn get_record(&mut self, asked: Asked) -> Result<(), Fault> {
         let mut buffer = [0; SLOT];
         let slots = self.slots.as_mut().ok_or(Fault::Flash)?;
         if slots.newest().is_none() {
             return Err(Fault::NoRecord);
         }
         let bytes = slots.read(&mut buffer).map_err(|_| Fault::Flash)?;
-        self.outgoing.send(id, &Reply::Record(bytes));
+        self.send(asked, &Reply::Record(bytes));
         Ok(())
     }
 
     #[inline(never)]
-    fn correct(&mut self, id: u32, sensor: Sensor, temperature: f32, raw: &Values) -> Result<(), Fault> {
+    fn correct(&mut self, asked: Asked, sensor: Sensor, temperature: f32, raw: &Values) -> Result<(), Fault> {
         let mut values = Values::new();
         for raw in raw {
             let value = self.calibration.correct(sensor, *raw, temperature).ok_or(Fault::NoRecord)?;
             values.push(value).map_err(|_| Fault::Full)?;
         }
         self.corrected = self.corrected.saturating_add(raw.len() as u32);
-        self.outgoing.send(id, &Reply::Corrected(values));
+        self.send(asked, &Reply::Corrected(values));
         Ok(())
     }
 
     #[inline(never)]
-    fn put_record(&mut self, id: u32, bytes: &[u8], replace: bool) -> Result<(), Fault> {
+    fn put_record(&mut self, asked: Asked, bytes: &[u8], replace: bool) -> Result<(), Fault> {
         match self.calibration.refusal(bytes) {
             Some(fault) => Err(fault),
-            None => self.write(id, bytes, replace),
+            None => self.write(asked, bytes, replace),
         }
     }
 
     #[inline(never)]
-    fn store(&mut self, id: u32, replace: bool) -> Result<(), Fault> {
+    fn store(&mut self, asked: Asked, replace: bool) -> Result<(), Fault> {
         if self.calibration.state == RecordState::Empty && !self.calibration.unsaved {
             return Err(Fault::NoRecord);
         }
         let mut buffer = [0xFF; record::MAX_LEN];
         let length = self.calibration.encode(&mut buffer)?.len();
-        self.write(id, buffer.get(..length).unwrap_or_default(), replace)
+        self.write(asked, buffer.get(..length).unwrap_or_default(), replace)
     }
 
-    fn write(&mut self, id: u32, bytes: &[u8], replace: bool) -> Result<(), Fault> {
+    fn write(&mut self, asked: Asked, bytes: &[u8], replace: bool) -> Result<(), Fault> {
         if self.calibration.is_occupied() && !replace {
             return Err(Fault::Occupied);
         }
         let slots = self.slots.as_ref().ok_or(Fault::Flash)?;
-        self.job = Job::Storing(id, slots.begin(bytes).map_err(|_| Fault::BadRecord)?);
+        self.job = Job::Storing(asked, slots.begin(bytes).map_err(|_| Fault::BadRecord)?);
         Ok(())
     }
 
-    fn start_fit(&mut self, id: u32, task: FitTask) -> Result<(), Fault> {
+    fn start_fit(&mut self, asked: Asked, task: FitTask) -> Result<(), Fault> {
         self.fitting.begin(task)?;
-        self.outgoing.send(id, &self.progress());
+        self.send(asked, &self.progress());
         Ok(())
     }
 
     #[inline(never)]
-    fn feed(&mut self, id: u32, index: u16, observations: &[Observation]) -> Result<(), Fault> {
+    fn feed(&mut self, asked: Asked, index: u16, observations: &[Observation]) -> Result<(), Fault> {
         let expected = self.fitting.progress().ok_or(Fault::NotReady)?.observations;
         if index != expected {
             return Err(Fault::OutOfSequence { expected });
         }
         // Up to the first that is not taken: the answer to whoever goes on tells the index.
         observations.iter().try_for_each(|observation| self.fitting.take(observation))?;
-        self.outgoing.send(id, &self.progress());
+        self.send(asked, &self.progress());
         Ok(())
     }
 
-    fn step_fit(&mut self, id: u32, slices: u16) -> Result<(), Fault> {
+    fn step_fit(&mut self, asked: Asked, slices: u16) -> Result<(), Fault> {
         self.fitting.progress().ok_or(Fault::NotReady)?;
-        self.job = Job::Stepping(id, Some(slices).filter(|slices| *slices != TO_THE_END));
+        self.job = Job::Stepping(asked, Some(slices).filter(|slices| *slices != TO_THE_END));
         Ok(())
     }
 
     /// Judges in the next turn, from the bottom of the stack.
-    fn finish_fit(&mut self, id: u32, date: Date) -> Result<(), Fault> {
+    fn finish_fit(&mut self, asked: Asked, date: Date) -> Result<(), Fault> {
         if !self.fitting.progress().is_some_and(|progress| progress.stopped) {
             return Err(Fault::NotReady);
         }
-        self.job = Job::Judging(id, date);
+        self.job = Job::Judging(asked, date);
         Ok(())
     }
 
     /// Gives the fit up; a request that waits for it is answered first come, later.
-    fn abort(&mut self, id: u32) -> Result<(), Fault> {
+    fn abort(&mut self, asked: Asked) -> Result<(), Fault> {
         if let Job::Stepping(waiting, _) = self.job {
             self.end(waiting, Due::Fault(Fault::NotReady));
         }
         self.fitting.clear();
-        self.done(id)
+        self.done(asked)
     }
 
     pub(super) fn progress(&self) -> Reply<'static> {

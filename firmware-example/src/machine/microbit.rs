@@ -135,3 +135,23 @@ impl NorFlash for Flash {
         Ok(())
     }
 }
+
+const START_RANDOM: Register = Register(0x4000_D000);
+const STOP_RANDOM: Register = Register(0x4000_D004);
+const RANDOM_READY: Register = Register(0x4000_D100);
+/// With the correction of its bias.
+const RANDOM_CONFIGURATION: Register = Register(0x4000_D504);
+const RANDOM: Register = Register(0x4000_D508);
+
+/// A number of this start alone: 64 bits of the random number generator (the manual's chapter 21).
+pub(super) fn boot_number() -> u64 {
+    RANDOM_CONFIGURATION.write(1);
+    START_RANDOM.write(1);
+    let number = (0..8).fold(0, |number, _| {
+        while RANDOM_READY.read() == 0 {}
+        RANDOM_READY.write(0);
+        number << 8 | u64::from(RANDOM.read() & 0xFF)
+    });
+    STOP_RANDOM.write(1);
+    number
+}

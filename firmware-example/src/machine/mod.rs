@@ -8,6 +8,8 @@
 
 use core::{mem::MaybeUninit, num::NonZeroU32};
 
+use imucal_core::link::{Guard, Key};
+
 #[cfg(microbit)]
 mod microbit;
 #[cfg(mps2)]
@@ -16,7 +18,11 @@ mod stopwatch;
 mod ticks;
 
 #[cfg(microbit)]
+use microbit::boot_number;
+#[cfg(microbit)]
 pub use microbit::{Flash, Uart, idle};
+#[cfg(mps2)]
+use mps2::boot_number;
 #[cfg(mps2)]
 pub use mps2::{Flash, Uart, idle};
 pub use stopwatch::Stopwatch;
@@ -50,8 +56,8 @@ type Whole = Coprocessor<'static, Uart, Flash, Ticks, NoSensor, 256, 64, 48, 204
 type Whole = Coprocessor<'static, Uart, Flash, Ticks, NoSensor, 40, 12, 8, 48, 3>;
 
 /// Runs the co-processor on this machine, for ever.
-pub fn run(name: &str, serial: &str) -> ! {
-    let coprocessor = start(name, serial);
+pub fn run(name: &str, serial: &str, key: Option<&'static Key>) -> ! {
+    let coprocessor = start(name, serial, key);
     loop {
         if !coprocessor.poll() {
             idle();
@@ -61,7 +67,7 @@ pub fn run(name: &str, serial: &str) -> ! {
 
 /// Puts the co-processor where it stays: on the stack it would lie below all that follows.
 #[inline(never)]
-fn start(name: &str, serial: &str) -> &'static mut Whole {
+fn start(name: &str, serial: &str, key: Option<&'static Key>) -> &'static mut Whole {
     static mut MEMORY: MachineMemory = MachineMemory::new();
     static mut WHOLE: MaybeUninit<Whole> = MaybeUninit::uninit();
     // SAFETY: `run` is called once, and nothing else knows the variables.
@@ -77,7 +83,7 @@ fn start(name: &str, serial: &str) -> &'static mut Whole {
         sensors: NoSensor,
         stack: || u32::try_from(crate::stack::deepest().0).ok(),
     };
-    whole.write(Coprocessor::new(board, unit, memory))
+    whole.write(Coprocessor::new(board, unit, Guard::new(key, boot_number()), memory))
 }
 
 /// A register.

@@ -109,3 +109,14 @@ impl NorFlash for Flash {
         Ok(())
     }
 }
+
+/// Starts so far, behind the record's pages.
+const STARTS: Register = Register(WINDOW as usize + CAPACITY);
+
+/// A number of this start alone, since the machine has no random numbers: a count of starts. It is kept as the record
+/// is; where no file backs the memory, it is lost with the record.
+pub(super) fn boot_number() -> u64 {
+    let starts = STARTS.read().wrapping_add(1);
+    STARTS.write(starts);
+    starts.into()
+}

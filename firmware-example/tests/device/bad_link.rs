@@ -4,19 +4,19 @@ use std::collections::HashSet;
 
 use firmware_example::{RECORD, drill};
 use imucal_core::{
-    link::{BATCH, Fault, FitModel, MAX_FRAME, Observation, RecordState, Reply, Request, Values, encode},
+    link::{BATCH, Fault, FitModel, MAX_FRAME, Observation, RecordState, Reply, Request, Values},
     record::{self, Date, Sensor},
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::{
-    bench::{Bench, BenchMemory, Counting, SERIAL},
+    bench::{Bench, BenchMemory, Counting, SERIAL, framed},
     nor::Nor,
 };
 
 /// Records that differ in their date.
-fn records(count: u32) -> Vec<Vec<u8>> {
+pub fn records(count: u32) -> Vec<Vec<u8>> {
     let golden = record::decode(RECORD).expect("golden");
     let of = |day| {
         let mut page = [0; record::MAX_LEN];
@@ -28,7 +28,7 @@ fn records(count: u32) -> Vec<Vec<u8>> {
 
 fn request<'a>(rng: &mut ChaCha8Rng, records: &'a [Vec<u8>]) -> Request<'a> {
     match rng.random_range(0..12) {
-        0 => Request::Identify,
+        0 => Request::Identify { nonce: rng.random() },
         1 => Request::Status,
         2 => Request::GetRecord,
         3 => {
@@ -70,9 +70,7 @@ fn a_hundred_thousand_frames_over_a_bad_link_store_no_wrong_record_and_hang_noth
     // Ids between are left to the checks.
     for id in (1..=100_000u32).map(|count| 2 * count) {
         asked.insert(id);
-        let mut buffer = [0; MAX_FRAME];
-        let frame = encode(id, &request(&mut rng, &records), &mut buffer).expect("it fits").to_vec();
-        waiting.push(frame);
+        waiting.push(framed(bench.session, id, &request(&mut rng, &records)));
         while waiting.len() > rng.random_range(0..4) {
             let at = if rng.random_bool(0.9) { 0 } else { rng.random_range(0..waiting.len()) };
             let mut frame = waiting.remove(at);
@@ -107,7 +105,7 @@ fn a_hundred_thousand_frames_over_a_bad_link_store_no_wrong_record_and_hang_noth
     );
     assert!(answered >= whole * 9 / 10 && unread > 1_000);
     assert!(bench.ask_from(
-        1_000_000,
+        200_002,
         &Request::Status,
         |reply| matches!(reply, Reply::Status(status) if status.corrected > 0)
     ));

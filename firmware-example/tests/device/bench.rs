@@ -8,7 +8,7 @@ use firmware_example::{
     fitting::Memory,
 };
 use imucal_core::{
-    link::{MAX_FRAME, Receiver, Reply, Request, encode, split},
+    link::{Guard, Header, MAX_FRAME, Origin, Receiver, Reply, Request, encode, split},
     record::SensorIdentity,
 };
 
@@ -73,6 +73,12 @@ impl SampleSource for Counting {
 pub type BenchMemory = Memory<256, 64, 48, 512, 10>;
 type Device<'a> = Coprocessor<'a, Wire, Nor, Ticks, Counting, 256, 64, 48, 512, 10>;
 
+/// A request's frame.
+pub fn framed(session: u32, id: u32, request: &Request<'_>) -> Vec<u8> {
+    let header = Header { id, origin: Origin::Host, session };
+    encode(&header, request, None, &mut [0; MAX_FRAME]).expect("a request fits").to_vec()
+}
+
 /// Serial of the record that the images carry.
 pub const SERIAL: &str = "00300017";
 
@@ -84,16 +90,46 @@ pub struct Bench<'a> {
     pub device: Device<'a>,
     pub wire: Wire,
     receiver: Receiver,
+    /// The session that requests are sent in.
+    pub session: u32,
     next: u32,
 }
 
 impl<'a> Bench<'a> {
+    /// With a session begun.
     pub fn new(nor: Nor, serial: &str, sensors: Counting, memory: &'a mut BenchMemory) -> Self {
+        let mut bench = Self::started(nor, serial, sensors, Guard::new(None, 1), memory);
+        bench.identify(1);
+        bench
+    }
+
+    /// Without a session.
+    pub fn started(
+        nor: Nor,
+        serial: &str,
+        sensors: Counting,
+        guard: Guard<'a>,
+        memory: &'a mut BenchMemory,
+    ) -> Self {
         let wire = Wire::default();
         let board =
             Board { link: wire.clone(), flash: nor, clock: Ticks::default(), sensors, stack: || None };
-        let device = Coprocessor::new(board, unit(serial), memory);
-        Self { device, wire, receiver: Receiver::default(), next: 1 }
+        let device = Coprocessor::new(board, unit(serial), guard, memory);
+        Self { device, wire, receiver: Receiver::default(), session: 0, next: 1 }
+    }
+
+    /// Asks for a session; its requests begin with the id 1.
+    pub fn identify(&mut self, nonce: u64) {
+        self.send_as(u32::MAX, &Request::Identify { nonce });
+        let mut sessions = Vec::new();
+        while sessions.is_empty() {
+            self.device.poll();
+            sessions = self.sent(|header, reply| {
+                assert!(matches!(reply, Reply::Identity(_)), "{reply:?}");
+                header.session
+            });
+        }
+        (self.session, self.next) = (sessions[0], 1);
     }
 
     /// Takes the power away.
@@ -110,13 +146,21 @@ impl<'a> Bench<'a> {
     }
 
     pub fn send_as(&mut self, id: u32, request: &Request<'_>) {
-        let mut buffer = [0; MAX_FRAME];
-        let frame = encode(id, request, &mut buffer).expect("a request fits").to_vec();
-        self.wire.to_device.borrow_mut().extend(frame);
+        self.put(&framed(self.session, id, request));
+    }
+
+    /// Puts bytes on the wire.
+    pub fn put(&mut self, bytes: &[u8]) {
+        self.wire.to_device.borrow_mut().extend(bytes);
     }
 
     /// Polls until the device has nothing to do; the replies that came, each with its id.
     pub fn replies<R>(&mut self, mut each: impl FnMut(u32, &Reply<'_>) -> R) -> Vec<R> {
+        self.heard(|header, reply| each(header.id, reply))
+    }
+
+    /// Polls until the device has nothing to do; the same with each reply's header.
+    pub fn heard<R>(&mut self, mut each: impl FnMut(&Header, &Reply<'_>) -> R) -> Vec<R> {
         let mut turns = 0;
         let mut replies = Vec::new();
         let mut busy = true;
@@ -124,14 +168,20 @@ impl<'a> Bench<'a> {
             busy = self.device.poll();
             turns += 1;
             assert!(turns < 1_000_000, "the device hangs");
-            let bytes: Vec<u8> = self.wire.to_host.borrow_mut().drain(..).collect();
-            for byte in bytes {
-                if let Some(frame) = self.receiver.push(byte) {
-                    let (header, message) = split(frame.expect("intact")).expect("intact");
-                    let reply = header.read::<Reply<'_>>(message).expect("a reply");
-                    replies.push(each(header.id, &reply));
-                }
-            }
+            replies.extend(self.sent(&mut each));
+        }
+        replies
+    }
+
+    /// What the device has sent.
+    fn sent<R>(&mut self, mut each: impl FnMut(&Header, &Reply<'_>) -> R) -> Vec<R> {
+        let bytes: Vec<u8> = self.wire.to_host.borrow_mut().drain(..).collect();
+        let mut replies = Vec::new();
+        for byte in bytes {
+            let Some(frame) = self.receiver.push(byte) else { continue };
+            let frame = split(frame.expect("intact")).expect("intact");
+            assert_eq!(frame.header.origin, Origin::Device);
+            replies.push(each(&frame.header, &frame.read().expect("a reply")));
         }
         replies
     }

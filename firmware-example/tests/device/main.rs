@@ -2,7 +2,9 @@
 
 mod bad_link;
 mod bench;
+mod hostile_line;
 mod nor;
 mod rate;
 mod session;
 mod storage;
+mod uart_ring;

@@ -11,12 +11,12 @@ use firmware_example::{
     scene::Noise,
 };
 use imucal_core::{
-    link::{BATCH, FitModel, MAX_FRAME, Observation, Receiver, Reply, Request, Values, encode, split},
+    link::{BATCH, FitModel, Guard, Observation, Receiver, Reply, Request, Values, split},
     record::{Date, Sensor},
 };
 
 use crate::{
-    bench::{Queued, SERIAL, Ticks, Wire, unit},
+    bench::{Queued, SERIAL, Ticks, Wire, framed, unit},
     nor::Nor,
 };
 
@@ -38,6 +38,7 @@ struct Stand<'a> {
     wire: Wire,
     sensors: Queued,
     receiver: Receiver,
+    session: u32,
     next: u32,
     time: f64,
     /// Samples that have come.
@@ -56,15 +57,19 @@ impl<'a> Stand<'a> {
             sensors: sensors.clone(),
             stack: || None,
         };
-        let device = Coprocessor::new(board, unit(SERIAL), memory);
-        let receiver = Receiver::default();
-        Self { device, wire, sensors, receiver, next: 1, time: 0.0, come: 0, waited: (0, 0) }
+        let device = Coprocessor::new(board, unit(SERIAL), Guard::new(None, 1), memory);
+        let (receiver, waited) = (Receiver::default(), (0, 0));
+        let mut stand =
+            Self { device, wire, sensors, receiver, session: 0, next: 1, time: 0.0, come: 0, waited };
+        stand.send(&Request::Identify { nonce: 1 });
+        stand.settle();
+        stand
     }
 
     fn send(&mut self, request: &Request<'_>) -> u32 {
-        let (id, mut buffer) = (self.next, [0; MAX_FRAME]);
+        let id = self.next;
         self.next += 1;
-        self.wire.to_device.borrow_mut().extend(encode(id, request, &mut buffer).expect("it fits"));
+        self.wire.to_device.borrow_mut().extend(framed(self.session, id, request));
         id
     }
 
@@ -83,8 +88,9 @@ impl<'a> Stand<'a> {
         let mut replies = Vec::new();
         for byte in bytes {
             let Some(frame) = self.receiver.push(byte) else { continue };
-            let (header, message) = split(frame.expect("intact")).expect("intact");
-            replies.push((header.id, format!("{:?}", header.read::<Reply<'_>>(message).expect("a reply"))));
+            let frame = split(frame.expect("intact")).expect("intact");
+            self.session = frame.header.session;
+            replies.push((frame.header.id, format!("{:?}", frame.read::<Reply<'_>>().expect("a reply"))));
         }
         replies
     }

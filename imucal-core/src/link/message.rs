@@ -17,8 +17,11 @@ pub type Values = Vec<[f32; 3], { 4 * BATCH }>;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Request<'a> {
-    /// Who is there? Answered by [`Reply::Identity`].
-    Identify,
+    /// Who is there? Answered by [`Reply::Identity`], and offers a session.
+    Identify {
+        /// A number that the host has drawn: of 64 random bits.
+        nonce: u64,
+    },
     /// How are you? Answered by [`Reply::Status`].
     Status,
     /// The stored record's bytes, whether they can be used or not. Answered by [`Reply::Record`].
@@ -73,6 +76,34 @@ pub enum Request<'a> {
     },
     /// Give the fit up. Answered by [`Reply::Done`].
     AbortFit,
+    /// Refuse whatever changes something from now on. Answered by [`Reply::Done`].
+    Lock,
+    /// Take changes again. Answered by [`Reply::Done`]; of a device without a key, by [`Fault::Locked`] where it is
+    /// locked.
+    Unlock,
+}
+
+impl Request<'_> {
+    /// Whether it changes a record, the calibration in use, a fit or the lock's end: what the lock refuses, and what
+    /// needs a seal where the device has a key.
+    pub fn changes(&self) -> bool {
+        match self {
+            Self::Identify { .. }
+            | Self::Status
+            | Self::GetRecord
+            | Self::Correct { .. }
+            | Self::Stream { .. }
+            | Self::Lock => false,
+            Self::PutRecord { .. }
+            | Self::StartFit(_)
+            | Self::Feed { .. }
+            | Self::StepFit { .. }
+            | Self::FinishFit { .. }
+            | Self::Store { .. }
+            | Self::AbortFit
+            | Self::Unlock => true,
+        }
+    }
 }
 
 /// From device to host. The order of the variants is the format: append only.
@@ -80,7 +111,7 @@ pub enum Request<'a> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Reply<'a> {
-    /// To [`Request::Identify`].
+    /// To [`Request::Identify`]; its frame bears the name of the session that is offered.
     Identity(Identity),
     /// To [`Request::Status`].
     Status(Status),
@@ -121,8 +152,10 @@ pub struct Identity {
     pub firmware: (u8, u8, u8),
     /// Major and minor version of the records it reads.
     pub record_version: (u8, u8),
-    /// An id that is above all taken so far.
-    pub next_id: u32,
+    /// The device's number of the session that is offered.
+    pub nonce: u64,
+    /// What changes something needs the seal of its key.
+    pub keyed: bool,
     /// What it has room for.
     pub capacity: Capacity,
 }
@@ -173,6 +206,8 @@ pub struct Status {
     pub sequence: u32,
     /// The record in use differs from the stored one.
     pub unsaved: bool,
+    /// What changes something is refused.
+    pub locked: bool,
     /// Samples corrected since the start.
     pub corrected: u32,
     /// Frames refused since the start.
@@ -192,14 +227,14 @@ pub enum Fault {
     Damaged,
     /// A frame was too long.
     Oversized,
-    /// The frame's version is not this.
+    /// The frame's version is not this. Only written as [`refuse_version`](super::refuse_version) does.
     Version {
         /// The device's.
         supported: u8,
     },
     /// Intact, but no request of this version, or figures that are not finite.
     Malformed,
-    /// A request that came again, or late.
+    /// A request that came again or late, or whose id is too far above the last one.
     Stale {
         /// The last id taken.
         last: u32,
@@ -229,6 +264,14 @@ pub enum Fault {
     Occupied,
     /// The flash did not take it.
     Flash,
+    /// Not of this session: the device has started again, or another host has begun one. Identify.
+    Session,
+    /// It changes something, and has no seal.
+    KeyNeeded,
+    /// Its seal is wrong, or the device has no key.
+    WrongSeal,
+    /// The device is locked.
+    Locked,
 }
 
 #[cfg(test)]
@@ -236,13 +279,14 @@ mod tests {
     use super::*;
     use crate::{
         accept::Refusal,
-        link::{FitModel, MAX_FRAME, MOST_COVARIANCE, MOST_PARAMETERS, encode},
+        link::{FitModel, Header, MAX_FRAME, MOST_COVARIANCE, MOST_PARAMETERS, Origin, encode},
         record,
         solver::Termination,
     };
 
     fn fits(message: &impl Serialize) -> bool {
-        encode(u32::MAX, message, &mut [0; MAX_FRAME]).is_ok()
+        let header = Header { id: u32::MAX, origin: Origin::Device, session: u32::MAX };
+        encode(&header, message, None, &mut [0; MAX_FRAME]).is_ok()
     }
 
     #[test]

@@ -1,10 +1,14 @@
 //! `imucal device`
 
-use std::path::PathBuf;
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
+use anyhow::Context;
 use clap::{Args, Subcommand};
 use imucal_core::{
-    link::FitReport,
+    link::{FitReport, Key, VERSION},
     record::{self, Date},
 };
 
@@ -43,6 +47,10 @@ enum Command {
     Stream(Stream),
     /// Fit a recording's observations on board, and store what is accepted
     Calibrate(Calibrate),
+    /// Have the device refuse changes until its power goes, or until it is unlocked
+    Lock(Place),
+    /// Have it take changes again; only with its key
+    Unlock(Place),
 }
 
 /// Where the device is.
@@ -54,6 +62,9 @@ pub(super) struct Place {
     /// File that keeps the flash of qemu from one start to the next
     #[arg(long, value_name = "FILE")]
     flash: Option<PathBuf>,
+    /// File of the device's key: 64 hexadecimal digits
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]
@@ -115,14 +126,27 @@ struct Calibrate {
 }
 
 impl Place {
-    pub(super) fn open(&self) -> Result<Session, DeviceError> {
-        Session::open(&self.device, self.flash.as_deref())
+    pub(super) fn open(&self) -> anyhow::Result<Session> {
+        open(&self.device, self.flash.as_deref(), self.key.as_deref())
     }
 
     /// The files that the device itself is in.
     fn files(&self) -> Vec<PathBuf> {
-        self.flash.iter().cloned().collect()
+        self.flash.iter().chain(&self.key).cloned().collect()
     }
+}
+
+/// Begins a session, with the key in a file if there is one.
+pub(super) fn open(address: &Address, flash: Option<&Path>, key: Option<&Path>) -> anyhow::Result<Session> {
+    let key = key.map(key_of).transpose()?;
+    Ok(Session::open_with(address, flash, key)?)
+}
+
+/// The key in a file; what it holds is in no message.
+fn key_of(path: &Path) -> anyhow::Result<Key> {
+    let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    Key::from_hex(text.trim())
+        .with_context(|| format!("{}: found no key, expected 64 hexadecimal digits", path.display()))
 }
 
 /// A device that says no is a refusal; one that cannot be reached, an error.
@@ -144,6 +168,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Command::Put(arguments) => put(arguments),
         Command::Stream(arguments) => stream(arguments),
         Command::Calibrate(arguments) => fit(arguments),
+        Command::Lock(place) => lock(place),
+        Command::Unlock(place) => unlock(place),
     })
 }
 
@@ -154,9 +180,14 @@ fn identify(place: &Place) -> anyhow::Result<Ending> {
     let (major, minor, patch) = identity.firmware;
     say!("{}, serial {}", named(&identity.unit.name), named(&identity.unit.serial));
     say!(
-        "firmware {major}.{minor}.{patch}, records {}.{}",
+        "firmware {major}.{minor}.{patch}, records {}.{}, protocol {VERSION}",
         identity.record_version.0,
         identity.record_version.1
+    );
+    say!(
+        "{}, {}",
+        if identity.keyed { "changes need its key" } else { "changes need no key" },
+        if status.locked { "locked" } else { "not locked" }
     );
     let capacity = identity.capacity;
     say!(
@@ -176,6 +207,18 @@ fn identify(place: &Place) -> anyhow::Result<Ending> {
     if let Some(stack) = status.stack {
         say!("stack used so far: {stack} B");
     }
+    Ok(Ending::Done)
+}
+
+fn lock(place: &Place) -> anyhow::Result<Ending> {
+    place.open()?.lock()?;
+    say!("locked: it refuses changes until its power goes, or until it is unlocked with its key");
+    Ok(Ending::Done)
+}
+
+fn unlock(place: &Place) -> anyhow::Result<Ending> {
+    place.open()?.unlock()?;
+    say!("unlocked: it takes changes again");
     Ok(Ending::Done)
 }
 

@@ -6,7 +6,14 @@ use clap::Args;
 use imucal_core::record::{self, CalibrationRecord};
 
 use super::{
-    Ending, device::ending, load, output::say, progress::Progress, read, reading::Reading, refuse, warn,
+    Ending,
+    device::{self, ending},
+    load,
+    output::say,
+    progress::Progress,
+    read,
+    reading::Reading,
+    refuse, warn,
 };
 use crate::{
     apply,
@@ -37,6 +44,9 @@ pub(super) struct Arguments {
     /// File that keeps the flash of qemu from one start to the next
     #[arg(long, value_name = "FILE")]
     flash: Option<PathBuf>,
+    /// File of the device's key: 64 hexadecimal digits
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
     /// Compare although the calibration was made for another serial
     #[arg(long, alias = "force")]
     other_serial: bool,
@@ -72,11 +82,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let alike = match &arguments.device {
         None => true,
         Some(address) => {
-            let session = Session::open(address, arguments.flash.as_deref());
-            match session
-                .map_err(Into::into)
-                .and_then(|mut session| replay(&mut session, &recording, &record))
-            {
+            let session = device::open(address, arguments.flash.as_deref(), arguments.key.as_deref());
+            match session.and_then(|mut session| replay(&mut session, &recording, &record)) {
                 Err(error) => return ending(Err(error)),
                 Ok(alike) => alike,
             }

@@ -14,7 +14,7 @@ pub use session::Session;
 
 use std::{io, time::Duration};
 
-use imucal_core::link::Fault;
+use imucal_core::link::{Fault, VERSION};
 
 /// Why a device did not do what it was asked for.
 #[derive(Debug, thiserror::Error)]
@@ -50,6 +50,9 @@ pub enum DeviceError {
         /// How often it was asked.
         tries: u32,
     },
+    /// The system gives no random number to begin a session with.
+    #[error("no random number from the system: {0}")]
+    NoRandomNumber(getrandom::Error),
     /// It says no.
     #[error("{address}: refused: {}", of_fault(.fault))]
     Refused {
@@ -75,7 +78,8 @@ fn of_fault(fault: &Fault) -> String {
     match fault {
         Fault::Version { supported } => {
             format!(
-                "it speaks version {supported} of the protocol; flash the firmware that goes with this program"
+                "it speaks version {supported} of the protocol, and this program version {VERSION}; flash the \
+                 firmware that goes with this program"
             )
         }
         Fault::NoRecord => {
@@ -91,6 +95,15 @@ fn of_fault(fault: &Fault) -> String {
         Fault::Flash => "its flash did not take the record, and the last one is still there".into(),
         Fault::Busy => "it is still at work on another request; ask again".into(),
         Fault::NotReady => "no fit was begun, or it has not stopped".into(),
+        Fault::Session => {
+            "it is in another session: it has started again, or another program talks to it; run the command again"
+                .into()
+        }
+        Fault::KeyNeeded => "it changes nothing without its key; add --key with the key's file".into(),
+        Fault::WrongSeal => "the key is not the device's, or the device has none; check --key".into(),
+        Fault::Locked => {
+            "it is locked; switch its power off and on, or unlock it with its key (`imucal device unlock`)".into()
+        }
         other => format!("{other:?}"),
     }
 }

@@ -6,7 +6,8 @@ use std::{
 };
 
 use imucal_core::link::{
-    Fault, FrameError, Identity, MAX_FRAME, Receiver, Reply, Request, Status, encode, split,
+    Fault, Frame, FrameError, Header, Identity, Key, MAX_FRAME, Nonces, Origin, Receiver, Reply, Request,
+    Seal, Status, encode, split,
 };
 
 use super::{Address, DeviceError, line::Line};
@@ -18,13 +19,26 @@ const FLASH_PATIENCE: Duration = Duration::from_secs(10);
 /// A request is sent this often.
 const TRIES: u32 = 3;
 
-/// A conversation with a device. Lost and damaged answers are asked for again.
+/// A session with a device, by the rules of [`imucal_core::link`]. Lost and damaged answers are asked for again.
 pub struct Session {
     address: String,
     line: Line,
     receiver: Receiver,
     next: u32,
     identity: Identity,
+    nonces: Nonces,
+    /// The session's name; 0 before there is one.
+    name: u32,
+    /// Seals each request, where the device has a key too.
+    key: Option<Key>,
+}
+
+/// What one answer came to.
+enum Heard<R> {
+    /// The answer.
+    Answer(R),
+    /// None, or none that can be read: the request is sent again.
+    Nothing,
 }
 
 impl Session {
@@ -33,13 +47,23 @@ impl Session {
     /// # Errors
     /// [`DeviceError`].
     pub fn open(address: &Address, flash: Option<&Path>) -> Result<Self, DeviceError> {
+        Self::open_with(address, flash, None)
+    }
+
+    /// The same with the device's key, without which one that has a key changes nothing.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn open_with(address: &Address, flash: Option<&Path>, key: Option<Key>) -> Result<Self, DeviceError> {
         let nobody = Identity {
             unit: Default::default(),
             firmware: (0, 0, 0),
             record_version: (0, 0),
-            next_id: 1,
+            nonce: 0,
+            keyed: false,
             capacity: imucal_core::link::Capacity { points: 0, poses: 0, turns: 0, blocks: 0, particles: 0 },
         };
+        let host = getrandom::u64().map_err(DeviceError::NoRandomNumber)?;
         let line = Line::open(address, flash)?;
         let mut session = Self {
             address: address.to_string(),
@@ -47,14 +71,19 @@ impl Session {
             receiver: Receiver::default(),
             next: 1,
             identity: nobody,
+            nonces: Nonces { host, device: 0 },
+            name: 0,
+            key,
         };
         // What was left on the line by whoever came before ends here.
         session.write(&[0])?;
-        session.identity = session.ask(&Request::Identify, IDENTITY, |reply| match reply {
-            Reply::Identity(identity) => Some(identity.clone()),
-            _ => None,
-        })?;
-        session.next = session.identity.next_id.max(session.next);
+        session.identity =
+            session.ask(&Request::Identify { nonce: host }, IDENTITY, |reply| match reply {
+                Reply::Identity(identity) => Some(identity.clone()),
+                _ => None,
+            })?;
+        session.nonces.device = session.identity.nonce;
+        (session.name, session.next) = (session.nonces.session(), 1);
         Ok(session)
     }
 
@@ -105,6 +134,26 @@ impl Session {
         self.store(&Request::Store { replace })
     }
 
+    /// Has the device refuse whatever changes something, until its power goes or it is unlocked.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn lock(&mut self) -> Result<(), DeviceError> {
+        self.done(&Request::Lock)
+    }
+
+    /// Ends that; only with the device's key.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn unlock(&mut self) -> Result<(), DeviceError> {
+        self.done(&Request::Unlock)
+    }
+
+    fn done(&mut self, request: &Request<'_>) -> Result<(), DeviceError> {
+        self.ask(request, "that it is done", |reply| matches!(reply, Reply::Done).then_some(()))
+    }
+
     fn store(&mut self, request: &Request<'_>) -> Result<u32, DeviceError> {
         self.ask_within(FLASH_PATIENCE, request, "that it is stored", |reply| match reply {
             Reply::Stored { sequence } => Some(*sequence),
@@ -132,7 +181,7 @@ impl Session {
     ) -> Result<R, DeviceError> {
         for _ in 0..TRIES {
             let id = self.send(request)?;
-            if let Some(answer) = self.wait(id, patience, expected, &read)? {
+            if let Heard::Answer(answer) = self.wait(id, patience, expected, &read)? {
                 return Ok(answer);
             }
         }
@@ -142,25 +191,32 @@ impl Session {
     fn send(&mut self, request: &Request<'_>) -> Result<u32, DeviceError> {
         let id = self.next;
         self.next += 1;
+        let header = Header { id, origin: Origin::Host, session: self.name };
         let mut buffer = [0; MAX_FRAME];
         // The longest request fits, as the core tests.
-        let frame = encode(id, request, &mut buffer).unwrap_or_default().to_vec();
+        let frame = encode(&header, request, self.seal(), &mut buffer).unwrap_or_default().to_vec();
         self.write(&frame)?;
         Ok(id)
+    }
+
+    /// What seals this session's frames; nothing before there is one.
+    fn seal(&self) -> Option<Seal<'_>> {
+        let key = self.key.as_ref().filter(|_| self.identity.keyed)?;
+        Some(Seal { key, nonces: self.nonces })
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), DeviceError> {
         self.line.write(bytes).map_err(|cause| DeviceError::Broken { address: self.address.clone(), cause })
     }
 
-    /// Waits for the answer to one request; `None` where it does not come, or the request was damaged on its way.
+    /// Waits for the answer to one request.
     fn wait<R>(
         &mut self,
         id: u32,
         patience: Duration,
         expected: &'static str,
         read: &impl Fn(&Reply<'_>) -> Option<R>,
-    ) -> Result<Option<R>, DeviceError> {
+    ) -> Result<Heard<R>, DeviceError> {
         let end = Instant::now() + patience;
         let mut bytes = [0; 1024];
         while Instant::now() < end {
@@ -169,34 +225,69 @@ impl Session {
                 .read(&mut bytes)
                 .map_err(|cause| DeviceError::Broken { address: self.address.clone(), cause })?;
             for byte in &bytes[..count] {
-                let Some(frame) = self.receiver.push(*byte) else { continue };
-                match frame.and_then(split) {
-                    Ok((header, message)) if header.id == id => {
-                        return match header.read::<Reply<'_>>(message) {
-                            Ok(Reply::Fault(fault)) => {
-                                Err(DeviceError::Refused { address: self.address.clone(), fault })
-                            }
-                            Ok(reply) => read(&reply).map(Some).ok_or_else(|| DeviceError::Unexpected {
-                                address: self.address.clone(),
-                                found: format!("{reply:?}"),
-                                expected,
-                            }),
-                            Err(FrameError::Version { found }) => Err(DeviceError::Unexpected {
-                                address: self.address.clone(),
-                                found: format!("in version {found} of the protocol"),
-                                expected,
-                            }),
-                            Err(_) => Ok(None),
-                        };
-                    }
-                    // Something could not be read there: most likely this request.
-                    Ok((header, _)) if header.id == 0 && expected != IDENTITY => return Ok(None),
-                    // An answer to what was given up, or damaged here.
-                    _ => {}
+                let Some(plain) = self.receiver.push(*byte) else { continue };
+                let plain = plain.map(<[u8]>::to_vec);
+                let frame = plain.as_deref().map_err(|error| *error).and_then(split);
+                if let Some(heard) = self.hear(frame, id, expected, read)? {
+                    return Ok(heard);
                 }
             }
         }
-        Ok(None)
+        Ok(Heard::Nothing)
+    }
+
+    /// What a frame is to whoever waits for the answer to a request; `None` where it is none of his.
+    fn hear<R>(
+        &mut self,
+        frame: Result<Frame<'_>, FrameError>,
+        id: u32,
+        expected: &'static str,
+        read: &impl Fn(&Reply<'_>) -> Option<R>,
+    ) -> Result<Option<Heard<R>>, DeviceError> {
+        let address = || self.address.clone();
+        let frame = match frame {
+            Ok(frame) if frame.header.origin == Origin::Device => frame,
+            Err(FrameError::Refused { supported, id: refused }) if refused == id => {
+                return Err(DeviceError::Refused { address: address(), fault: Fault::Version { supported } });
+            }
+            Err(FrameError::Version { found, id: answered }) if answered == id => {
+                let found = format!("in version {found} of the protocol");
+                return Err(DeviceError::Unexpected { address: address(), found, expected });
+            }
+            // What was sent here, by an echo; or an answer that was damaged.
+            _ => return Ok(None),
+        };
+        // Something could not be read there: most likely this request.
+        if frame.header.id == 0 && self.name != 0 {
+            return Ok(Some(Heard::Nothing));
+        }
+        if frame.header.id != id {
+            return Ok(None);
+        }
+        match frame.read::<Reply<'_>>() {
+            // The id is used up, by whomever: the next one is above that.
+            Ok(Reply::Fault(Fault::Stale { last })) => {
+                self.next = self.next.max(last.saturating_add(1));
+                Ok(Some(Heard::Nothing))
+            }
+            Ok(Reply::Fault(fault)) => Err(DeviceError::Refused { address: address(), fault }),
+            // Of another session, or made up.
+            Ok(reply) if !self.is_answer(&frame, &reply) => Ok(None),
+            Ok(reply) => read(&reply).map(|answer| Some(Heard::Answer(answer))).ok_or_else(|| {
+                DeviceError::Unexpected { address: address(), found: format!("{reply:?}"), expected }
+            }),
+            Err(_) => Ok(Some(Heard::Nothing)),
+        }
+    }
+
+    /// Whether it is of this session and has the seal that it must have; before the session, whether it names the one
+    /// that it offers.
+    fn is_answer(&self, frame: &Frame<'_>, reply: &Reply<'_>) -> bool {
+        let name = match reply {
+            Reply::Identity(identity) => Nonces { device: identity.nonce, ..self.nonces }.session(),
+            _ => self.name,
+        };
+        frame.header.session == name && self.seal().is_none_or(|seal| frame.is_sealed_by(&seal))
     }
 }
 

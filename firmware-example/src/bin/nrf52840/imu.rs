@@ -1,0 +1,108 @@
+//! A BMI160 on I²C, read by DMA without a wait (Bosch BST-BMI160-DS000, 2.11; nRF52840 Product Specification 1.11, TWIM).
+
+use core::sync::atomic::{Ordering, compiler_fence};
+
+use bmi160::{AccelerometerPowerMode, Bmi160, GyroscopePowerMode, SlaveAddr};
+use firmware_example::board::{Sample, SampleSource};
+use nrf52840_hal::{
+    Timer, Twim,
+    pac::{Peripherals, TIMER0, TWIM0},
+    timer::Periodic,
+};
+
+/// Between samples, µs.
+const INTERVAL: u32 = 10_000;
+/// The first register of the rates, which the specific forces follow.
+const DATA: u8 = 0x0C;
+
+/// Memory of the DMA.
+pub struct ImuMemory {
+    register: [u8; 1],
+    data: [u8; 12],
+}
+
+impl ImuMemory {
+    pub const fn new() -> Self {
+        Self { register: [DATA], data: [0; 12] }
+    }
+}
+
+/// The sensor, its bus and when to read it.
+pub struct Imu {
+    bus: TWIM0,
+    timer: Timer<TIMER0, Periodic>,
+    /// Written by the DMA: read only as volatile.
+    memory: *const ImuMemory,
+    /// A read is on its way.
+    reading: bool,
+}
+
+impl Imu {
+    /// Wakes the sensor, which waits for the bus: before the first turn. One that does not answer gives no samples.
+    pub fn start(bus: Twim<TWIM0>, timer: TIMER0, memory: &'static mut ImuMemory) -> Self {
+        let mut sensor = Bmi160::new_with_i2c(bus, SlaveAddr::default());
+        let _awake = sensor.set_accel_power_mode(AccelerometerPowerMode::Normal);
+        let _awake = sensor.set_gyro_power_mode(GyroscopePowerMode::Normal);
+        // SAFETY: the driver above ends here, and its registers are this one's alone.
+        let bus = unsafe { Peripherals::steal() }.TWIM0;
+        let memory = &raw mut *memory;
+        bus.shorts.write(|w| w.lasttx_startrx().enabled().lastrx_stop().enabled());
+        // SAFETY: the memory lives for ever, and nothing but the DMA writes it.
+        unsafe {
+            bus.txd.ptr.write(|w| w.ptr().bits((&raw const (*memory).register).addr() as u32));
+            bus.txd.maxcnt.write(|w| w.maxcnt().bits(1));
+            bus.rxd.ptr.write(|w| w.ptr().bits((&raw const (*memory).data).addr() as u32));
+            bus.rxd.maxcnt.write(|w| w.maxcnt().bits(12));
+        }
+        let mut timer = Timer::periodic(timer);
+        timer.start(INTERVAL);
+        Self { bus, timer, memory, reading: false }
+    }
+
+    /// Starts a read.
+    fn read(&mut self) {
+        // SAFETY: events are cleared by a zero, and tasks take a one.
+        unsafe {
+            self.bus.events_stopped.write(|w| w.bits(0));
+            self.bus.events_error.write(|w| w.bits(0));
+            self.bus.tasks_starttx.write(|w| w.bits(1));
+        }
+        self.reading = true;
+    }
+
+    /// Ends a read that the sensor does not acknowledge; its sample is left out.
+    fn give_up(&mut self) {
+        // SAFETY: as above.
+        unsafe {
+            self.bus.events_error.write(|w| w.bits(0));
+            self.bus.tasks_stop.write(|w| w.bits(1));
+        }
+        self.reading = false;
+    }
+}
+
+impl SampleSource for Imu {
+    fn sample(&mut self) -> Option<Sample> {
+        if self.reading && self.bus.events_error.read().bits() != 0 {
+            self.give_up();
+        }
+        if !self.reading {
+            if self.timer.reset_if_finished() {
+                self.read();
+            }
+            return None;
+        }
+        if self.bus.events_stopped.read().bits() == 0 {
+            return None;
+        }
+        self.reading = false;
+        compiler_fence(Ordering::Acquire);
+        // SAFETY: the DMA has stopped.
+        let data = unsafe { (&raw const (*self.memory).data).read_volatile() };
+        let (words, _) = data.as_chunks::<2>();
+        let counts = |first: usize| {
+            [0, 1, 2].map(|k| words.get(first + k).map_or(0.0, |word| f32::from(i16::from_le_bytes(*word))))
+        };
+        Some(Sample { raw: [Some(counts(3)), Some(counts(0)), None], temperature: f32::NAN })
+    }
+}
