@@ -66,7 +66,9 @@ impl<T: Scalar> TemperatureTerms<T> {
         if factor.iter().any(|f| *f == T::zero()) {
             return None;
         }
-        Some(triad.predict(&calibrated.component_div(&factor))? + self.drift(change))
+        // Component by component: `component_div` indexes, a path to a panic.
+        let value = Vector3::new(calibrated.x / factor.x, calibrated.y / factor.y, calibrated.z / factor.z);
+        Some(triad.predict(&value)? + self.drift(change))
     }
 
     /// Every term is finite.
