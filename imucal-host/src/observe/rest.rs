@@ -339,12 +339,12 @@ mod tests {
                 Samples { time: &time, acc: &acc, gyr: Some(gyr), temperature: None, usable: &usable };
             RestDetector::new(samples, DT).cut(4.0).rests
         };
-        assert_eq!(rests(&still), [0..600]);
+        assert_eq!(rests(&still), std::slice::from_ref(&(0..600)));
         let moved = |since: &dyn Fn(usize) -> f64| -> Vec<_> {
             (0..600).map(|k| still[k] + Vector3::y() * turning(since(k))).collect()
         };
-        assert_eq!(rests(&moved(&|k| DT * (k as f64 - 590.0))), [0..550]);
-        assert_eq!(rests(&moved(&|k| DT * (10.0 - k as f64))), [50..600]);
+        assert_eq!(rests(&moved(&|k| DT * (k as f64 - 590.0))), std::slice::from_ref(&(0..550)));
+        assert_eq!(rests(&moved(&|k| DT * (10.0 - k as f64))), std::slice::from_ref(&(50..600)));
     }
 
     #[test]
