@@ -30,7 +30,6 @@ mod moves;
 pub mod nodes;
 pub mod noise;
 pub mod orientation;
-pub mod reference_clock;
 pub mod refit;
 pub mod revisits;
 mod scan;
@@ -55,7 +54,6 @@ use self::{
     finding::{Cause, Place as Driven},
     following::Following,
     footing::Footing,
-    reference_clock::Clock,
     scene::Scene,
     search::Explained,
 };
@@ -99,7 +97,7 @@ pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str
     let candidates = Candidates::new(&setting, &options.without);
     let explained = search::search(&scene, &candidates, progress);
     let answered = explained.as_ref().and_then(|explained| {
-        let (diagnosis, explainable) = answer(recording, explained, footing.moved, progress)?;
+        let (diagnosis, explainable) = answer(recording, explained, progress)?;
         let mut diagnosis = with_faults(beyond_model(diagnosis, &footing.model), &footing);
         fault::tell(&mut diagnosis, &fault::faults(recording, &footing.findings, explained), explainable);
         Some(diagnosis)
@@ -175,7 +173,6 @@ fn untestable(recording: &Recording, why: String) -> Diagnosis {
 fn answer(
     recording: &Recording,
     explained: &Explained<'_>,
-    moved: f64,
     progress: &dyn Fn(&str),
 ) -> Option<(Diagnosis, f64)> {
     let (linear, best) = (&explained.linear, &explained.best);
@@ -215,12 +212,6 @@ fn answer(
             remarks
         }
     };
-    let apart = reference_clock::candidates(linear.candidates);
-    let remainder = left.map_or(0.0, |f| f.size);
-    let clock = match &apart {
-        Some(apart) => reference_clock::clock(explained, apart, moved, remainder)?,
-        None => None,
-    };
     causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let mut credible_set: Vec<String> = Vec::new();
     let suspects = if best.set.is_empty() { credible::suspects(linear, best)? } else { Vec::new() };
@@ -245,14 +236,13 @@ fn answer(
         credible_set
             .retain(|id| causes.iter().any(|cause| cause.effect == *id || cause.equivalents.contains(id)));
     }
-    let is_judged = remarks.is_empty();
-    let own = match (is_judged, found) {
+    let verdict = match (remarks.is_empty(), found) {
         (true, _) => verdict(&causes, left, &closed),
         (false, true) => Verdict::Partly,
         (false, false) => Verdict::Unknown,
     };
-    let mut diagnosis = Diagnosis {
-        verdict: own,
+    let diagnosis = Diagnosis {
+        verdict,
         remarks,
         gap: gap::table(linear, &best.set, &best.noise)?,
         places: places(if found { &before } else { &after }, gap::size(linear, &best.set, &best.noise)?),
@@ -266,37 +256,7 @@ fn answer(
         next_experiment,
         ..untestable(recording, String::new())
     };
-    match clock {
-        Some(clock) => {
-            let explainable = clock.closed.explainable;
-            let places_before = following::following(&clock.linear, &[], &best.noise, &drivers)?;
-            let explained = gap::size(&clock.linear, &clock.set, &best.noise)?;
-            diagnosis.gap = gap::table(&clock.linear, &clock.set, &best.noise)?;
-            diagnosis.places = places(&places_before, explained);
-            if !found {
-                let alone = std::slice::from_ref(&clock.cause);
-                let as_explained = verdict(alone, left, &clock.closed);
-                diagnosis.verdict = if is_judged { as_explained } else { Verdict::Partly };
-            }
-            with_clock(&mut diagnosis, clock);
-            Some((diagnosis, explainable))
-        }
-        None => Some((diagnosis, closed.explainable)),
-    }
-}
-
-/// Names the offset of a reference's clock first: the other causes were judged with it in the baseline, and what they
-/// close is now a share of the gap that it is a part of.
-fn with_clock(diagnosis: &mut Diagnosis, clock: Clock<'_>) {
-    for cause in &mut diagnosis.causes {
-        let mut shares = clock.set.iter().zip(&clock.closed.each);
-        let share = shares.find(|(effect, _)| effect.id == cause.effect).map(|(_, share)| *share);
-        (cause.gap_closed, cause.gap_closed_ci95) = (share.map(|s| s.value), share.map(|s| s.interval));
-    }
-    diagnosis.gap_closed_total = Some(clock.closed.total.value);
-    diagnosis.gap_closed_total_ci95 = Some(clock.closed.total.interval);
-    diagnosis.credible_set.insert(0, clock.cause.effect.clone());
-    diagnosis.causes.insert(0, clock.cause);
+    Some((diagnosis, closed.explainable))
 }
 
 fn is_followed(following: &Following, tests: usize) -> bool {
