@@ -57,7 +57,7 @@ type Whole = Coprocessor<'static, Uart, Flash, Ticks, NoSensor, 40, 12, 8, 48, 3
 
 /// Runs the co-processor on this machine, for ever.
 pub fn run(name: &str, serial: &str, key: Option<&'static Key>) -> ! {
-    let coprocessor = start(name, serial, key);
+    let coprocessor = start(name, serial, Guard::new(key, boot_number()));
     loop {
         if !coprocessor.poll() {
             idle();
@@ -67,7 +67,7 @@ pub fn run(name: &str, serial: &str, key: Option<&'static Key>) -> ! {
 
 /// Puts the co-processor where it stays: on the stack it would lie below all that follows.
 #[inline(never)]
-fn start(name: &str, serial: &str, key: Option<&'static Key>) -> &'static mut Whole {
+fn start(name: &str, serial: &str, guard: Guard<'static>) -> &'static mut Whole {
     static mut MEMORY: MachineMemory = MachineMemory::new();
     static mut WHOLE: MaybeUninit<Whole> = MaybeUninit::uninit();
     // SAFETY: `run` is called once, and nothing else knows the variables.
@@ -83,7 +83,7 @@ fn start(name: &str, serial: &str, key: Option<&'static Key>) -> &'static mut Wh
         sensors: NoSensor,
         stack: || u32::try_from(crate::stack::deepest().0).ok(),
     };
-    whole.write(Coprocessor::new(board, unit, Guard::new(key, boot_number()), memory))
+    whole.write(Coprocessor::new(board, unit, guard, memory))
 }
 
 /// A register.
