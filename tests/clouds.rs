@@ -1,7 +1,10 @@
 //! Clouds over parts of a sphere: an accurate answer or a refusal, and never a runaway.
 
 use imucal_host::{
-    calibrate::{FitSummary, SensorOutcome, mag},
+    calibrate::{
+        FitSummary, SensorOutcome,
+        mag::{self, MagInput},
+    },
     recording::Triple,
 };
 use imucal_tests::clouds::CapCloud;
@@ -17,7 +20,7 @@ const NINE: f64 = 33.7;
 const THREE: f64 = 21.1;
 
 fn calibrated(cloud: &CapCloud, field: Option<f64>) -> SensorOutcome {
-    mag::calibrate(&cloud.sensor, &vec![true; cloud.sensor.values.len()], field)
+    mag::calibrate(&MagInput::of_cloud(&cloud.sensor, &vec![true; cloud.sensor.values.len()], field))
 }
 
 /// Estimated entries of found less true, file's unit.
@@ -148,7 +151,7 @@ fn whole(seed: u64) -> Triple {
 /// Centre and AᵀA of a cloud's shell of radius `field`.
 fn shell(values: Vec<Vector3<f64>>, field: f64) -> (Vector3<f64>, Matrix3<f64>) {
     let usable = vec![true; values.len()];
-    let outcome = mag::calibrate(&Triple { values, ..whole(0) }, &usable, Some(field));
+    let outcome = mag::calibrate(&MagInput::of_cloud(&Triple { values, ..whole(0) }, &usable, Some(field)));
     let triad = outcome.accepted().expect("the whole sphere is accepted").triad;
     (triad.bias, triad.gain.tr_mul(&triad.gain))
 }

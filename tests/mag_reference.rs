@@ -6,7 +6,11 @@ use imucal_core::{
     triad::Triad,
 };
 use imucal_host::{
-    calibrate::{Calibration, FitSummary, Options, calibrate, mag, mag_reference, reference_fit},
+    calibrate::{
+        Calibration, FitSummary, Options, calibrate,
+        mag::{self, MagInput},
+        mag_reference, reference_fit,
+    },
     observe::{motion, pose},
     recording::{Recording, SensorKind},
 };
@@ -71,7 +75,7 @@ fn on_the_half_not_seen_vectors_predict_directions_better_than_an_ellipsoid_does
         let vectors =
             mag_reference::magnetometer(&recording, mag, &usable, &Options::default(), &mut calibration)
                 .expect("a reference");
-        let ellipsoid = mag::calibrate(mag, &usable, None);
+        let ellipsoid = mag::calibrate(&MagInput::of_cloud(mag, &usable, None));
         println!("M15 {:?}, E9 {:?}", vectors.verdict, ellipsoid.verdict);
         let of = |fit: &FitSummary| {
             // Each at the lag that suits it best.

@@ -100,17 +100,24 @@ impl Judgement {
         }
     }
 
-    /// Accepted, or why not.
+    /// Accepted, or why not; `std` are the standard errors of `triad`.
     ///
     /// # Errors
     ///
     /// [`Refusal`].
     #[inline(never)]
-    pub fn verdict(&self, triad: &Triad<f32>, question: &Question<'_>) -> Result<(), Refusal> {
+    pub fn verdict(
+        &self,
+        triad: &Triad<f32>,
+        std: &Triad<f32>,
+        question: &Question<'_>,
+    ) -> Result<(), Refusal> {
         let limits = &question.limits;
         accept::check_observations(&self.coverage, self.parameters, limits)?;
-        accept::check_report(&self.report, limits)?;
-        accept::check_nonlinearity(self.nonlinearity, limits)?;
+        accept::check_report(&self.report)?;
+        let error = accept::relative_error(&triad.gain, std, question.radius);
+        accept::check_precision(error, limits)?;
+        accept::check_nonlinearity(self.nonlinearity, error, limits)?;
         accept::check_plausibility(triad, true, self.rms / question.radius, limits)
     }
 

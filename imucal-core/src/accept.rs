@@ -7,7 +7,7 @@
 
 use core::fmt;
 
-use nalgebra::SVector;
+use nalgebra::{Matrix3, SVector};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -15,8 +15,9 @@ use crate::{
     model::{Model, SquaredSum},
     scalar::Scalar,
     solver::{
-        LevenbergMarquardt, SolveReport, Termination, condition::weakest_direction,
-        triangular::weighted_square,
+        LevenbergMarquardt, SolveReport, Termination,
+        condition::weakest_direction,
+        triangular::{dot, weighted_square},
     },
     triad::Triad,
 };
@@ -33,10 +34,11 @@ pub struct Limits {
     pub coverage: f64,
     /// Least variance of the directions along any axis; 0.01 is a band of ±10°.
     pub flatness: f64,
-    /// Largest condition number of the Jacobian with columns at unit length.
-    pub condition: f64,
-    /// Largest departure from a parabola one standard error along the weakest direction, relative. Above it the
-    /// standard errors do not describe the answer.
+    /// Largest error of a calibrated vector to be expected, one standard error, as a share of its length
+    /// ([`relative_error`]).
+    pub error: f64,
+    /// Largest departure from a parabola one standard error along the weakest direction, relative, of a vector as
+    /// imprecise as `error` allows. Above it the standard errors do not describe the answer.
     pub nonlinearity: f64,
     /// Least and largest gain of an axis against nominal, and of one axis against another.
     pub gain: (f64, f64),
@@ -52,7 +54,7 @@ impl Limits {
             directions,
             coverage: 0.25,
             flatness: 0.01,
-            condition: 60.0,
+            error: 0.06,
             nonlinearity: 0.1,
             gain: (0.5, 2.0),
             rms: 0.05,
@@ -97,7 +99,7 @@ pub enum Refusal {
         /// Parameters estimated.
         parameters: usize,
     },
-    /// The observations hardly tell some combination of the parameters.
+    /// The observations tell some combination of the parameters no better than the arithmetic rounds.
     IllConditioned {
         /// Condition number of the normalised Jacobian.
         condition: f64,
@@ -127,6 +129,13 @@ pub enum Refusal {
     },
     /// A figure is infinite or NaN.
     NotFinite,
+    /// What the standard errors come to: the observations hardly tell some combination of the parameters.
+    Imprecise {
+        /// Expected error of a calibrated vector, as a share of its length.
+        error: f64,
+        /// Largest one allowed.
+        limit: f64,
+    },
 }
 
 /// A quantity that [`Refusal::Implausible`] speaks of.
@@ -153,7 +162,9 @@ impl Refusal {
             Self::TooFewObservations { .. } => "too-few-observations",
             Self::PoorCoverage { .. } => "poor-coverage",
             Self::NotRedundant { .. } => "not-redundant",
-            Self::IllConditioned { .. } | Self::TooNonlinear { .. } => "ill-conditioned",
+            Self::IllConditioned { .. } | Self::TooNonlinear { .. } | Self::Imprecise { .. } => {
+                "ill-conditioned"
+            }
             Self::DidNotConverge { .. } => "did-not-converge",
             Self::Implausible { .. } => "implausible",
             Self::NotFinite => "not-finite",
@@ -180,8 +191,15 @@ impl fmt::Display for Refusal {
             ),
             Self::IllConditioned { condition, limit } => write!(
                 f,
-                "condition {condition:.0}, at most {limit:.0}: the observations hardly tell some combination of \
+                "condition {condition:.1e}, at most {limit:.1e}: the observations do not tell some combination of \
                  the parameters"
+            ),
+            Self::Imprecise { error, limit } => write!(
+                f,
+                "a calibrated vector is expected to be wrong by {:.1} % of its length (at most {:.1} %): the \
+                 observations hardly tell some combination of the parameters",
+                100.0 * error,
+                100.0 * limit
             ),
             Self::TooNonlinear { nonlinearity, limit } => write!(
                 f,
@@ -240,19 +258,50 @@ pub fn check_observations<T: Scalar>(
     Ok(())
 }
 
-/// The solver stopped at a minimum, and the minimum is sharp.
+/// The solver stopped at a minimum, and the arithmetic tells all directions there apart.
 ///
 /// # Errors
 /// not-finite, did-not-converge or ill-conditioned.
-pub fn check_report<T: Scalar>(report: &SolveReport<T>, limits: &Limits) -> Result<(), Refusal> {
+pub fn check_report<T: Scalar>(report: &SolveReport<T>) -> Result<(), Refusal> {
     match report.termination {
         Termination::NotFinite => return Err(Refusal::NotFinite),
         termination if !termination.was_successful() => return Err(Refusal::DidNotConverge { termination }),
         _ => {}
     }
-    if report.condition > T::of(limits.condition) {
-        let condition = report.condition.wide();
-        return Err(Refusal::IllConditioned { condition, limit: limits.condition });
+    let limit = T::of(DIGITS_KEPT) / T::EPSILON;
+    if report.condition > limit {
+        return Err(Refusal::IllConditioned { condition: report.condition.wide(), limit: limit.wide() });
+    }
+    Ok(())
+}
+
+/// Beyond this share of 1/ε a condition leaves no two digits of the weakest combination.
+const DIGITS_KEPT: f64 = 0.01;
+
+/// Error of a calibrated vector to be expected from the standard errors of gain and bias, as a share of its length: the
+/// root mean square over all directions and, of the gain, over its columns.
+///
+/// ```text
+/// √( |σ_G|² / |G|² + |σ_b|² / r² )
+/// ```
+///
+/// with r the vector's length in raw units. It is what a condition number cannot know: how good the observations are.
+/// The largest number there is where a standard error is infinite or NaN.
+pub fn relative_error<T: Scalar>(gain: &Matrix3<T>, std: &Triad<T>, radius: T) -> T {
+    let squared = |values: &[T]| dot(values, values);
+    let of_gain = squared(std.gain.as_slice()) / squared(gain.as_slice());
+    let of_bias = squared(std.bias.as_slice()) / (radius * radius);
+    let error = (of_gain + of_bias).root();
+    if error.finite() { error } else { T::LARGEST }
+}
+
+/// The standard errors come to no more than a calibration may be wrong by.
+///
+/// # Errors
+/// ill-conditioned, with the error.
+pub fn check_precision<T: Scalar>(error: T, limits: &Limits) -> Result<(), Refusal> {
+    if error > T::of(limits.error) {
+        return Err(Refusal::Imprecise { error: error.wide(), limit: limits.error });
     }
     Ok(())
 }
@@ -307,13 +356,22 @@ pub fn nonlinearity<T: Scalar, const P: usize>(
     if worst.finite() { worst } else { T::LARGEST }
 }
 
-/// The minimum is as round as standard errors assume.
+/// How many times the limit a departure may be where errors are small: beyond, no standard error describes anything.
+const BENT_AT_MOST: f64 = 5.0;
+
+/// The minimum is as round as standard errors assume. What a departure comes to is its share of the error
+/// ([`relative_error`]): of a vector n times as precise as it need be, it may be n times the limit, and five times at
+/// most.
 ///
 /// # Errors
 /// ill-conditioned, with the departure.
-pub fn check_nonlinearity<T: Scalar>(nonlinearity: T, limits: &Limits) -> Result<(), Refusal> {
-    if nonlinearity > T::of(limits.nonlinearity) {
-        return Err(Refusal::TooNonlinear { nonlinearity: nonlinearity.wide(), limit: limits.nonlinearity });
+pub fn check_nonlinearity<T: Scalar>(nonlinearity: T, error: T, limits: &Limits) -> Result<(), Refusal> {
+    let (least, most) = (T::of(limits.nonlinearity), T::of(BENT_AT_MOST * limits.nonlinearity));
+    let allowed = least * T::of(limits.error) / error;
+    let limit = if allowed > least { allowed } else { least };
+    let limit = if limit < most { limit } else { most };
+    if nonlinearity > limit {
+        return Err(Refusal::TooNonlinear { nonlinearity: nonlinearity.wide(), limit: limit.wide() });
     }
     Ok(())
 }
@@ -373,7 +431,7 @@ mod tests {
         model::{norm::NormModel, parameterisation::UPPER_TRIANGULAR},
         observation::ShellPoint,
     };
-    use nalgebra::{Matrix3, Vector3};
+    use nalgebra::Vector3;
 
     fn coverage(observations: usize, share: f64, flatness: f64, distinct: usize) -> Coverage<f64> {
         Coverage { observations, share, flatness, distinct }
@@ -408,6 +466,35 @@ mod tests {
         assert!(fit.run(&model).termination.was_successful());
         assert!(fit.variance().unwrap() > 0.0, "rounding leaves something");
         assert_eq!(nonlinearity(&fit, &model, 1.0), 0.0);
+    }
+
+    #[test]
+    fn what_is_expected_of_a_vector_is_what_its_gain_and_bias_are_known_to() {
+        let gain = Matrix3::identity() * 2.0f64;
+        // A hundredth of each axis; a bias of three thousandths of the length on one.
+        let std = Triad { gain: Matrix3::identity() * 0.02, bias: Vector3::new(0.015, 0.0, 0.0) };
+        let error = relative_error(&gain, &std, 5.0);
+        assert!((error - (1e-4f64 + 9e-6).sqrt()).abs() < 1e-12, "{error}");
+        assert!(check_precision(error, &Limits::for_norm(9, 10)).is_ok());
+        let unknown = Triad { gain: Matrix3::repeat(f64::INFINITY), ..std };
+        let refused = check_precision(relative_error(&gain, &unknown, 5.0), &Limits::for_norm(9, 10));
+        assert_eq!(refused.unwrap_err().reason(), "ill-conditioned");
+    }
+
+    #[test]
+    fn a_large_condition_is_no_reason_while_standard_errors_are_small() {
+        let report = SolveReport {
+            termination: Termination::Gradient,
+            iterations: 1,
+            evaluations: 1,
+            independent_rows: 40,
+            cost: 1e-9f32,
+            gradient: 0.0,
+            condition: 700.0,
+        };
+        assert_eq!(check_report(&report), Ok(()));
+        let singular = SolveReport { condition: f32::MAX, ..report };
+        assert_eq!(check_report(&singular).unwrap_err().reason(), "ill-conditioned");
     }
 
     #[test]

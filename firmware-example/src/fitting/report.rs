@@ -90,7 +90,7 @@ pub(super) fn finished(
         Sensor::Gyroscope => RawUnit::RadianPerSecond,
         Sensor::Magnetometer => RawUnit::MicroTesla,
     };
-    let verdict = judgement.verdict(triad, question);
+    let verdict = judgement.verdict(triad, std, question);
     let unit = Unit { raw: task.unit_in, calibrated, offset: task.offset, per_unit: task.per_unit };
     let record = || (sensor, judgement.record(triad, std, task.model.name(), &unit));
     let solved = &judgement.report;

@@ -2,8 +2,8 @@
 
 use imucal_core::{
     accept::{
-        Limits, Quantity, Refusal, check_nonlinearity, check_observations, check_plausibility, check_report,
-        check_residual, nonlinearity,
+        Limits, Quantity, Refusal, check_nonlinearity, check_observations, check_plausibility,
+        check_precision, check_report, check_residual, nonlinearity,
     },
     coverage::Coverage,
     solver::{LevenbergMarquardt, SolveReport, Termination},
@@ -82,30 +82,48 @@ fn report(termination: Termination, condition: f64) -> SolveReport<f64> {
 #[test]
 fn only_a_solver_that_stopped_at_a_minimum_is_believed() {
     for good in [Termination::Gradient, Termination::Step, Termination::Precision, Termination::Spread] {
-        assert_eq!(check_report(&report(good, 1.0), &limits()), Ok(()), "{good:?}");
+        assert_eq!(check_report(&report(good, 1.0)), Ok(()), "{good:?}");
     }
     for termination in [Termination::Iterations, Termination::Stalled] {
         let refusal = Refusal::DidNotConverge { termination };
-        assert_eq!(check_report(&report(termination, 1.0), &limits()), Err(refusal));
+        assert_eq!(check_report(&report(termination, 1.0)), Err(refusal));
     }
-    assert_eq!(check_report(&report(Termination::NotFinite, 1.0), &limits()), Err(Refusal::NotFinite));
+    assert_eq!(check_report(&report(Termination::NotFinite, 1.0)), Err(Refusal::NotFinite));
 }
 
 #[test]
 fn a_condition_is_taken_at_its_limit_and_refused_beyond() {
-    let limits = Limits { condition: 40.0, ..limits() };
-    let check = |condition| check_report(&report(Termination::Step, condition), &limits);
-    assert_eq!((check(1.0), check(40.0)), (Ok(()), Ok(())));
-    let beyond = 40f64.next_up();
-    assert_eq!(check(beyond), Err(Refusal::IllConditioned { condition: beyond, limit: 40.0 }));
+    // A hundredth of 1/ε of the arithmetic.
+    let limit = 0.01 / f64::EPSILON;
+    let check = |condition| check_report(&report(Termination::Step, condition));
+    assert_eq!((check(1.0), check(limit)), (Ok(()), Ok(())));
+    let beyond = limit.next_up();
+    assert_eq!(check(beyond), Err(Refusal::IllConditioned { condition: beyond, limit }));
+}
+
+#[test]
+fn an_expected_error_is_taken_at_its_limit_and_refused_beyond() {
+    let check = |error: f64| check_precision(error, &limits());
+    assert_eq!((check(0.0), check(0.06)), (Ok(()), Ok(())));
+    let beyond = 0.06f64.next_up();
+    assert_eq!(check(beyond), Err(Refusal::Imprecise { error: beyond, limit: 0.06 }));
+    assert!(check(f64::MAX).is_err());
 }
 
 #[test]
 fn a_departure_is_taken_at_its_limit_and_refused_beyond() {
-    let check = |departure: f64| check_nonlinearity(departure, &limits());
-    assert_eq!((check(0.0), check(0.1)), (Ok(()), Ok(())));
-    let beyond = 0.1f64.next_up();
-    assert_eq!(check(beyond), Err(Refusal::TooNonlinear { nonlinearity: beyond, limit: 0.1 }));
+    // As imprecise as is allowed, half, a fifth, a hundredth of it, and not known.
+    for (error, limit) in [(0.06, 0.1), (0.03, 0.2), (0.012, 0.5), (0.0006, 0.5), (0.0, 0.5), (f64::NAN, 0.1)]
+    {
+        let check = |departure: f64| check_nonlinearity(departure, error, &limits());
+        assert_eq!((check(0.0), check(limit * (1.0 - 1e-12))), (Ok(()), Ok(())), "{error}");
+        let beyond = limit * (1.0 + 1e-12);
+        let Err(Refusal::TooNonlinear { nonlinearity, limit: stated }) = check(beyond) else {
+            panic!("{beyond} at {error}");
+        };
+        assert_eq!(nonlinearity, beyond);
+        assert!((stated / limit - 1.0).abs() < 1e-12, "{stated} at {error}");
+    }
 }
 
 #[test]
@@ -272,7 +290,7 @@ fn every_refusal_has_its_name_and_says_its_figures() {
         need_flatness: 0.01,
     };
     let implausible = |what| Refusal::Implausible { what, value: 0.4321, limit: 2.5 };
-    let said: [(Refusal, &str, &[&str]); 12] = [
+    let said: [(Refusal, &str, &[&str]); 13] = [
         (Refusal::NoRest, "no-rest", &["lay still"]),
         (Refusal::NoMotion, "no-motion", &["turned"]),
         (Refusal::TooFewObservations { have: 7, need: 10 }, "too-few-observations", &["7", "10"]),
@@ -282,7 +300,12 @@ fn every_refusal_has_its_name_and_says_its_figures() {
             "not-redundant",
             &["6", "10", "9"],
         ),
-        (Refusal::IllConditioned { condition: 123.4, limit: 60.0 }, "ill-conditioned", &["123", "60"]),
+        (
+            Refusal::IllConditioned { condition: 1.25e15, limit: 4.5e13 },
+            "ill-conditioned",
+            &["1.2e15", "4.5e13"],
+        ),
+        (Refusal::Imprecise { error: 0.123, limit: 0.06 }, "ill-conditioned", &["12.3 %", "6.0 %"]),
         (Refusal::TooNonlinear { nonlinearity: 0.23, limit: 0.1 }, "ill-conditioned", &["23 %", "10 %"]),
         (Refusal::DidNotConverge { termination: Termination::Stalled }, "did-not-converge", &["stalled"]),
         (implausible(Quantity::Gain), "implausible", &["0.432", "2.5"]),

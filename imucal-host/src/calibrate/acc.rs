@@ -15,8 +15,13 @@ use super::{
     compare::{self, Comparison, Step},
     norm_fit::{NormFit, NormProblem, dynamic, raw_coverage},
     outcome::{Evidence, FitSummary, Refused, SensorOutcome},
+    rest_noise::RestNoise,
+    shell_errors::ShellErrors,
 };
-use crate::recording::{SensorKind, Triple, Unit};
+use crate::{
+    noise::Noise,
+    recording::{SensorKind, Triple, Unit},
+};
 
 /// Forms of the accelerometer's model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -54,6 +59,8 @@ pub struct AccResult {
     pub outcome: SensorOutcome,
     /// Indices of the rests that were used.
     pub used: Vec<usize>,
+    /// Noise of the rests' means, nominal SI, where the fit tells it.
+    pub noise: Option<Noise>,
 }
 
 fn points(rests: &[Rest<f64>]) -> Vec<ShellPoint<f64>> {
@@ -121,25 +128,34 @@ fn refused(refusal: Refusal, fit: Option<FitSummary>, model: AccModel) -> AccRes
             evidence: None,
         },
         used: Vec::new(),
+        noise: None,
     }
 }
 
-/// Calibrates from rests; `gravity` is the local one, m/s².
-pub fn calibrate(rests: &[Rest<f64>], sensor: &Triple, gravity: f64, model: AccModel) -> AccResult {
+/// What an accelerometer is calibrated from.
+#[derive(Clone, Copy, Debug)]
+pub struct AccInput<'a> {
+    /// The rests.
+    pub rests: &'a [Rest<f64>],
+    /// What they show of the noise of their means.
+    pub noise: &'a RestNoise,
+    /// The accelerometer.
+    pub sensor: &'a Triple,
+    /// Local gravity, m/s².
+    pub gravity: f64,
+}
+
+/// Calibrates from rests.
+pub fn calibrate(input: &AccInput<'_>, model: AccModel) -> AccResult {
     match model {
-        AccModel::T9 => with_form(rests, sensor, gravity, model, UPPER_TRIANGULAR),
-        AccModel::T6 => with_form(rests, sensor, gravity, model, DIAGONAL),
+        AccModel::T9 => with_form(input, model, UPPER_TRIANGULAR),
+        AccModel::T6 => with_form(input, model, DIAGONAL),
     }
 }
 
-fn with_form<const P: usize>(
-    rests: &[Rest<f64>],
-    sensor: &Triple,
-    gravity: f64,
-    model: AccModel,
-    form: Parameterisation<P>,
-) -> AccResult {
-    let points = points(rests);
+fn with_form<const P: usize>(input: &AccInput<'_>, model: AccModel, form: Parameterisation<P>) -> AccResult {
+    let gravity = input.gravity;
+    let points = points(input.rests);
     let limits = Limits::for_norm(P, model.directions());
     let refuse = |refusal: Refusal, fit: Option<FitSummary>| refused(refusal, fit, model);
     if points.is_empty() {
@@ -155,9 +171,9 @@ fn with_form<const P: usize>(
     let problem = NormProblem { points: &points, norm: gravity, form, serial: false };
     let fit = problem.fit(&Triad::identity());
     let coverage = problem.coverage(&fit);
-    let inflation = problem.inflation(&fit);
-    let (bend, verdict) = problem.judge(&fit, &coverage, &inflation, true, &limits);
-    let summary = summary(&problem, &fit, sensor, coverage.share, bend, rests);
+    let errors = ShellErrors::of_rests(&problem, &fit, input.noise);
+    let (bend, verdict) = problem.judge(&fit, &coverage, &errors.stated(&problem.form, &fit), true, &limits);
+    let summary = summary(&problem, &fit, input, &errors, (coverage.share, bend));
     match verdict {
         Err(refusal) => refuse(refusal, Some(summary)),
         Ok(()) => AccResult {
@@ -176,6 +192,7 @@ fn with_form<const P: usize>(
                 fit: Some(summary),
             },
             used: fit.used,
+            noise: errors.noise,
         },
     }
 }
@@ -183,12 +200,11 @@ fn with_form<const P: usize>(
 fn summary<const P: usize>(
     problem: &NormProblem<'_, P>,
     fit: &NormFit<P>,
-    sensor: &Triple,
-    coverage: f64,
-    nonlinearity: f64,
-    rests: &[Rest<f64>],
+    input: &AccInput<'_>,
+    errors: &ShellErrors<P>,
+    (coverage, nonlinearity): (f64, f64),
 ) -> FitSummary {
-    let covariance = fit.covariance(&nalgebra::SVector::repeat(1.0));
+    let (covariance, sensor) = (errors.covariance, input.sensor);
     let std = problem.form.triad(&covariance.diagonal().map(f64::sqrt));
     FitSummary {
         triad: problem.form.triad(fit.solver.theta()),
@@ -206,7 +222,7 @@ fn summary<const P: usize>(
         condition: fit.report.condition,
         coverage,
         nonlinearity,
-        inflation: 1.0,
+        inflation: errors.inflation.max(),
         iterations: fit.report.iterations,
         termination: fit.report.termination,
         field_norm: None,
@@ -214,7 +230,11 @@ fn summary<const P: usize>(
             .left_out
             .iter()
             .map(|(k, size)| {
-                format!("rest {} at {:.1} s: {size:.1} robust standard deviations", k + 1, rests[*k].time)
+                format!(
+                    "rest {} at {:.1} s: {size:.1} robust standard deviations",
+                    k + 1,
+                    input.rests[*k].time
+                )
             })
             .collect(),
         gain_spread: None,
@@ -240,7 +260,7 @@ fn advice(refusal: &Refusal, model: AccModel) -> String {
             "record more poses at rest, each turned by 15° or more from the others".into()
         }
         Refusal::PoorCoverage { .. } => "turn the sensor about all of its axes, face down as well as face up".into(),
-        Refusal::IllConditioned { .. } | Refusal::TooNonlinear { .. } => {
+        Refusal::IllConditioned { .. } | Refusal::Imprecise { .. } | Refusal::TooNonlinear { .. } => {
             "add oblique poses between the faces, and poses upside down".into()
         }
         Refusal::Implausible { .. } => "check [units], [counts] and [site] gravity of the recording's TOML".into(),

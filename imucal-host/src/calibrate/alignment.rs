@@ -6,14 +6,20 @@ use imucal_core::{
     solver::{LevenbergMarquardt, lm::Settings},
     triad::Triad,
 };
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, MatrixXx3, SMatrix, SVector, Vector3};
 
-use super::rows::{Residuals, Rows};
+use super::{
+    directions::Directions,
+    rows::{Residuals, Rows, influence},
+};
+use crate::noise::interval::{Parts, Scale};
 
 /// Rests at least: four parameters, and some to check them.
 const LEAST_RESTS: usize = 8;
-/// Largest condition of the fit, and largest standard error of the rotation, rad (2°).
-const LIMITS: (f64, f64) = (60.0, 0.035);
+/// Largest standard error of the rotation, rad (2°).
+const LIMIT: f64 = 0.035;
+/// Noise of the field at rest against that of the directions, in multiples of what rests show of both.
+const RATIOS: [(f64, f64); 4] = [(1.0, 0.5), (4.0, 0.2), (16.0, 0.2), (64.0, 0.1)];
 
 /// Where the magnetometer's axes lie against the accelerometer's.
 #[derive(Clone, Copy, Debug)]
@@ -40,8 +46,71 @@ pub struct Alignment {
     pub rests: usize,
 }
 
-/// Finds the rotation from calibrated pairs (specific force, field); `None` where the rests cannot tell it.
+/// A magnetometer at rest.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldAtRest {
+    /// Index of the rest.
+    pub rest: usize,
+    /// Mean output, nominal SI.
+    pub mean: Vector3<f64>,
+    /// Variance of the mean that its own samples explain, per axis.
+    pub variance: Vector3<f64>,
+}
+
+/// Finds the rotation from what was seen at rests, with errors that follow from those of both sensors' means and of the
+/// accelerometer's calibration; `triad` is the magnetometer's. `None` where the rests cannot tell it.
+pub fn align_at_rests(
+    directions: &Directions,
+    at_rest: &[FieldAtRest],
+    triad: &Triad<f64>,
+) -> Option<Alignment> {
+    let pairs: Vec<_> =
+        at_rest.iter().map(|seen| (directions.calibrated(seen.rest), triad.correct(&seen.mean))).collect();
+    if pairs.len() < LEAST_RESTS || pairs.iter().any(|(f, b)| !(f + b).iter().all(|x| x.is_finite())) {
+        return None;
+    }
+    let errors = |model: &DipModel<'_, f64>, theta: &SVector<f64, 4>| {
+        let rotation = imucal_core::rotation::exp(&theta.xyz());
+        let by_direction: Vec<(usize, MatrixXx3<f64>)> = (at_rest.iter().zip(model.pairs).enumerate())
+            .map(|(k, (seen, pair))| {
+                let mut by = MatrixXx3::zeros(at_rest.len());
+                by.set_row(k, &(rotation * pair.u_b).transpose());
+                (seen.rest, by)
+            })
+            .collect();
+        let of_field = DVector::from_iterator(
+            at_rest.len(),
+            at_rest.iter().zip(model.pairs).zip(&pairs).map(|((seen, pair), (_, field))| {
+                let along = rotation.tr_mul(&pair.u_f);
+                let across = (along - pair.u_b * pair.u_b.dot(&along)) / field.norm();
+                triad.gain.tr_mul(&across).map(|x| x * x).dot(&seen.variance)
+            }),
+        );
+        let parts = Parts {
+            parts: [&directions.propagated(&by_direction), &DMatrix::from_diagonal(&of_field)],
+            ratios: &RATIOS,
+            scale: Scale::AtLeastOne,
+            five: false,
+        };
+        let rows = Rows::of(model, theta);
+        let jacobian = rows.derivatives(at_rest.len(), &[0, 1, 2, 3]);
+        let residuals = DVector::from_column_slice(&rows.residuals);
+        let errors = parts.errors(&residuals, &jacobian, &influence(&jacobian)?)?;
+        Some(SMatrix::from_fn(|i, j| errors.covariance[(i, j)]))
+    };
+    align_with(&pairs, &errors)
+}
+
+/// Finds the rotation from calibrated pairs (specific force, field) alone, each as good as the next; `None` where the
+/// rests cannot tell it.
 pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Alignment> {
+    align_with(pairs, &|_, _| None)
+}
+
+/// Covariance of a fit's four parameters; `None` for that of residuals that are independent and alike.
+type Covariance<'a> = &'a dyn Fn(&DipModel<'_, f64>, &SVector<f64, 4>) -> Option<SMatrix<f64, 4, 4>>;
+
+fn align_with(pairs: &[(Vector3<f64>, Vector3<f64>)], errors: Covariance<'_>) -> Option<Alignment> {
     let field = pairs.iter().map(|(_, b)| b.norm()).sum::<f64>() / pairs.len() as f64;
     let pairs: Vec<DirectionPair<f64>> = pairs
         .iter()
@@ -53,14 +122,11 @@ pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Alignment> {
     }
     let model = DipModel { pairs: &pairs };
     let solver = best(&model);
-    let report = solver.report();
-    let covariance = solver.covariance()?;
+    let covariance = errors(&model, solver.theta()).or_else(|| solver.covariance())?;
     let (rotation, jacobian) = exp_with_jacobian(&solver.theta().xyz());
     let own = jacobian * covariance.fixed_view::<3, 3>(0, 0) * jacobian.transpose();
-    if !report.termination.was_successful()
-        || report.condition > LIMITS.0
-        || own.diagonal().max().sqrt() > LIMITS.1
-    {
+    let error = own.diagonal().max().sqrt();
+    if !solver.report().termination.was_successful() || error.is_nan() || error > LIMIT {
         return None;
     }
     let by_mag = moved_by_mag(&model, solver.theta(), &jacobian)?;
@@ -154,7 +220,7 @@ impl Alignment {
     pub fn turn(
         &self,
         triad: &Triad<f64>,
-        covariance: &nalgebra::DMatrix<f64>,
+        covariance: &DMatrix<f64>,
         of: &[u8],
     ) -> (Triad<f64>, SMatrix<f64, 12, 12>) {
         let gain = self.rotation * triad.gain;
@@ -166,7 +232,7 @@ impl Alignment {
             }
         }
         let inverse = triad.gain.try_inverse().unwrap_or_else(Matrix3::zeros);
-        let mut by_entries = nalgebra::DMatrix::zeros(12, of.len());
+        let mut by_entries = DMatrix::zeros(12, of.len());
         for (column, entry) in of.iter().enumerate() {
             let mut moved = SVector::<f64, 12>::zeros();
             let mut carried = SVector::<f64, 12>::zeros();

@@ -12,14 +12,21 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use std::ops::Range;
 
 use super::{
+    directions::Directions,
     norm_fit::dynamic,
     outcome::{BiasWander, Evidence, FitSummary, KnownTurn, Refused, SensorOutcome},
     outlier::outliers,
-    rows::{Residuals, Rows},
+    rest_bias::{self, BiasErrors},
+    rest_noise::AtRest,
+    rows::{Residuals, Rows, weakest_inflation},
     search::{SWARM_OBSERVATIONS, Search, Searched},
+    turn_errors::{self, Between, RateNoise},
 };
 use crate::{
-    observe::turn::{BiasPath, TurnData, compress},
+    observe::{
+        quantum::quantum,
+        turn::{BiasPath, TurnData, compress},
+    },
     recording::{SensorKind, Triple, Unit},
 };
 
@@ -55,25 +62,29 @@ pub struct GyrInput<'a> {
     pub used: &'a [usize],
     /// The accelerometer's calibration, nominal SI in.
     pub acc: &'a Triad<f64>,
+    /// How its directions err, where that is asked for.
+    pub directions: Option<&'a Directions>,
+    /// Part of Earth's rotation along the vertical, rad/s, upwards positive; 0 where the latitude is not known.
+    pub vertical_rate: f64,
 }
 
 /// Turns and the bias they are counted from.
 struct Turns {
     data: Vec<TurnData>,
     bias: Vector3<f64>,
-    bias_std: Vector3<f64>,
     wander: BiasWander,
     left_out: Vec<String>,
 }
 
 impl GyrInput<'_> {
     fn turns(&self) -> Turns {
-        let (bias, bias_std, wander) = rest_bias(self.rests);
-        let mut turns = Turns { data: Vec::new(), bias, bias_std, wander, left_out: Vec::new() };
+        let means = self.rest_means();
+        let (bias, wander) = wander(self.rests, &means);
+        let mut turns = Turns { data: Vec::new(), bias, wander, left_out: Vec::new() };
         for pair in self.used.windows(2) {
             let (i, j) = (pair[0], pair[1]);
             let mean = |k: usize| {
-                if wander.interpolated { self.rests[k].gyr.mean() } else { bias }
+                if wander.interpolated { means[k] } else { bias }
             };
             let path =
                 BiasPath { before: (self.rests[i].time, mean(i)), after: (self.rests[j].time, mean(j)) };
@@ -84,6 +95,22 @@ impl GyrInput<'_> {
             }
         }
         turns
+    }
+
+    fn at_rest(&self) -> AtRest<'_> {
+        AtRest {
+            time: self.time,
+            values: &self.sensor.values,
+            usable: self.usable,
+            interval: self.interval,
+            rows: self.rows,
+        }
+    }
+
+    /// Mean rate of each rest, less Earth's about the vertical.
+    fn rest_means(&self) -> Vec<Vector3<f64>> {
+        let mean = |k: usize| self.rests[k].gyr.mean() - self.direction(k) * self.vertical_rate;
+        (0..self.rests.len()).map(mean).collect()
     }
 
     fn direction(&self, rest: usize) -> Vector3<f64> {
@@ -97,19 +124,17 @@ impl GyrInput<'_> {
     }
 }
 
-/// Mean rate at rest, its standard error, and how it moved from rest to rest.
-fn rest_bias(rests: &[Rest<f64>]) -> (Vector3<f64>, Vector3<f64>, BiasWander) {
-    let total: f64 = rests.iter().map(|r| f64::from(r.gyr.count())).sum();
-    let bias = rests.iter().map(|r| r.gyr.mean() * f64::from(r.gyr.count())).sum::<Vector3<f64>>() / total;
+/// Mean rate at rest, and how it moved from rest to rest.
+fn wander(rests: &[Rest<f64>], means: &[Vector3<f64>]) -> (Vector3<f64>, BiasWander) {
+    let bias = rest_bias::mean(rests, means);
     let count = rests.len().max(2) as f64;
-    let spread =
-        rests.iter().map(|r| (r.gyr.mean() - bias).map(|d| d * d)).sum::<Vector3<f64>>() / (count - 1.0);
+    let spread = means.iter().map(|m| (m - bias).map(|d| d * d)).sum::<Vector3<f64>>() / (count - 1.0);
     let noise =
         rests.iter().map(|r| r.gyr.variance() / f64::from(r.gyr.count().max(1))).sum::<Vector3<f64>>()
             / count;
     let (spread, expected) = (spread.map(f64::sqrt), noise.map(f64::sqrt));
     let interpolated = (0..3).any(|axis| spread[axis] > WANDER * expected[axis]);
-    (bias, spread / count.sqrt(), BiasWander { spread, expected, interpolated })
+    (bias, BiasWander { spread, expected, interpolated })
 }
 
 /// From the nominal gain; a swarm looks at the shortest turns.
@@ -231,8 +256,11 @@ fn check_turns(input: &GyrInput<'_>, turns: &Turns) -> Result<(), Refusal> {
 
 fn judge(solver: &LevenbergMarquardt<f64, 9>, summary: &FitSummary) -> Result<(), Refusal> {
     let limits = Limits { rms: LARGEST_RMS, ..Limits::for_norm(9, LEAST_TURNS) };
-    accept::check_report(&solver.report(), &limits)?;
-    accept::check_nonlinearity(summary.nonlinearity, &limits)?;
+    accept::check_report(&solver.report())?;
+    let std = Triad { gain: summary.gain_std, bias: Vector3::zeros() };
+    let error = accept::relative_error(&summary.triad.gain, &std, 1.0);
+    accept::check_precision(error, &limits)?;
+    accept::check_nonlinearity(summary.nonlinearity, error, &limits)?;
     accept::check_plausibility(&summary.triad, true, summary.rms, &limits)
 }
 
@@ -241,7 +269,7 @@ fn refuse(refusal: Refusal, fit: Option<FitSummary>) -> SensorOutcome {
         Refusal::NoMotion | Refusal::TooFewObservations { .. } => {
             "turn the sensor by 30° or more between rests, ten times or more, each time about another axis"
         }
-        Refusal::IllConditioned { .. } | Refusal::TooNonlinear { .. } => {
+        Refusal::IllConditioned { .. } | Refusal::Imprecise { .. } | Refusal::TooNonlinear { .. } => {
             "turn the sensor about all three of its axes between rests, by large angles and in both senses"
         }
         Refusal::Implausible { .. } => {
@@ -280,12 +308,14 @@ fn summarise(
 ) -> FitSummary {
     let report = solver.report();
     let gain = FULL_GAIN.triad(solver.theta()).gain;
-    let covariance = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
-    let gain_std = FULL_GAIN.triad(&covariance.diagonal().map(f64::sqrt)).gain;
+    let classical = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
+    let bias = rest_bias::errors(input.rests, &input.rest_means(), &input.at_rest());
+    let covariance = gain_covariance(input, turns, known, &gain, &bias).unwrap_or(classical);
+    let inflation = covariance.diagonal().component_div(&classical.diagonal()).map(f64::sqrt).max();
     FitSummary {
         triad: Triad { gain, bias: turns.bias },
-        gain_std,
-        bias_std: turns.bias_std,
+        gain_std: FULL_GAIN.triad(&covariance.diagonal().map(f64::sqrt)).gain,
+        bias_std: bias.std,
         covariance: dynamic(&covariance),
         covariance_of: FULL_GAIN.entries().to_vec(),
         unit_in: input.sensor.unit,
@@ -297,8 +327,12 @@ fn summarise(
         parameters: 9,
         condition: report.condition,
         coverage: Coverage::of(known.iter().flat_map(|t| turn_axis(t))).share,
-        nonlinearity: accept::nonlinearity(solver, &TurnModel { turns: known, form: FULL_GAIN }, 1.0),
-        inflation: 1.0,
+        nonlinearity: accept::nonlinearity(
+            solver,
+            &TurnModel { turns: known, form: FULL_GAIN },
+            weakest_inflation(solver, &covariance),
+        ),
+        inflation,
         iterations: report.iterations,
         termination: report.termination,
         field_norm: None,
@@ -309,6 +343,31 @@ fn summarise(
         alignment: None,
         search: Some(search),
     }
+}
+
+/// Covariance of the gain; `None` where it is not known how directions err.
+fn gain_covariance(
+    input: &GyrInput<'_>,
+    turns: &Turns,
+    known: &[Turn<'_, f64>],
+    gain: &Matrix3<f64>,
+    bias: &BiasErrors,
+) -> Option<SMatrix<f64, 9, 9>> {
+    let between: Vec<Between<'_>> = known
+        .iter()
+        .zip(&turns.data)
+        .map(|(turn, data)| Between { turn: *turn, rests: (data.rest_before, data.rest_after) })
+        .collect();
+    // In motion the steps of the converter are noise, whatever they are at rest.
+    let rounding =
+        quantum(&input.sensor.values, input.usable).map(|step| step * step / 12.0) * input.interval;
+    let interpolated = turns.wander.interpolated;
+    let rates = RateNoise {
+        density: input.at_rest().density().zip_map(&rounding, f64::max).mean(),
+        bias: if interpolated { bias.steps } else { bias.std.map(|std| std * std) },
+        interpolated,
+    };
+    turn_errors::errors(&between, gain, input.directions?, &rates).map(|errors| turn_errors::fixed(&errors))
 }
 
 /// The axis that carries one direction of gravity to the next, both senses: a turn and its reverse tell the same.

@@ -13,6 +13,7 @@ use imucal_core::{
     accept::{self, Limits, Refusal},
     coverage::Coverage,
     model::parameterisation::{FULL, FULL_WITH_SENSITIVITY},
+    triad::Triad,
 };
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -118,8 +119,11 @@ fn outcome(name: &'static str, sensor: &Triple, observations: &Observations) -> 
 
 fn judge(fit: &MotionFit, summary: &FitSummary) -> Result<(), Refusal> {
     let limits = Limits { rms: LARGEST_RMS, ..Limits::for_norm(fit.entries.len(), LEAST_MOTIONS) };
-    accept::check_report(&fit.report, &limits)?;
-    accept::check_nonlinearity(fit.nonlinearity, &limits)?;
+    accept::check_report(&fit.report)?;
+    let std = Triad { gain: summary.gain_std, bias: Vector3::zeros() };
+    let error = accept::relative_error(&summary.triad.gain, &std, 1.0);
+    accept::check_precision(error, &limits)?;
+    accept::check_nonlinearity(fit.nonlinearity, error, &limits)?;
     accept::check_plausibility(&summary.triad, true, fit.rms, &limits)
 }
 
@@ -130,7 +134,7 @@ fn refused(model: &'static str, refusal: Refusal, fit: Option<FitSummary>) -> Se
              optical reference, half a minute of turning about all axes in view of the cameras; or --model gyr=K9 for \
              the field form"
         }
-        Refusal::IllConditioned { .. } | Refusal::TooNonlinear { .. } => {
+        Refusal::IllConditioned { .. } | Refusal::Imprecise { .. } | Refusal::TooNonlinear { .. } => {
             "turn the table about all three of its axes, by large angles and in both senses; with G21, in many \
              attitudes"
         }

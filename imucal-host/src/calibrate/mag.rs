@@ -1,21 +1,25 @@
 //! The magnetometer from a cloud of its samples: an ellipsoid that calibration maps to a sphere.
 
+use std::ops::Range;
+
 use imucal_core::{
     accept::{Limits, Refusal},
     model::parameterisation::UPPER_TRIANGULAR,
-    observation::ShellPoint,
 };
-use nalgebra::{DMatrix, Matrix3, SVector, Vector3};
+use nalgebra::{DMatrix, Matrix3};
 use rayon::prelude::*;
 
 use super::{
-    alignment,
+    alignment::{self, FieldAtRest},
+    directions::Directions,
     norm_fit::{NormFit, NormProblem, dynamic, raw_coverage},
     outcome::{Evidence, FitSummary, Refused, SensorOutcome},
+    rest_noise::AtRest,
+    shell_errors::ShellErrors,
 };
 use crate::{
     ellipsoid::{adjusted, sphere},
-    observe::cloud::cloud,
+    observe::cloud::{Cloud, cloud},
     recording::{SensorKind, Triple, Unit},
 };
 
@@ -24,10 +28,34 @@ pub const MODEL: &str = "E9";
 /// Contiguous parts that are held out in turn.
 const FOLDS: usize = 5;
 
-/// Calibrates a cloud; `field` is the length of Earth's field, µT, where it is known.
-pub fn calibrate(sensor: &Triple, usable: &[bool], field: Option<f64>) -> SensorOutcome {
-    let cloud = cloud(&sensor.values, usable);
-    match fit(&cloud.points, sensor, field) {
+/// What a magnetometer is calibrated from.
+#[derive(Clone, Copy, Debug)]
+pub struct MagInput<'a> {
+    /// Sample times, s; where there are none, rows are the clock.
+    pub time: &'a [f64],
+    /// The magnetometer.
+    pub sensor: &'a Triple,
+    /// Rows in which it is usable.
+    pub usable: &'a [bool],
+    /// Usual interval, s.
+    pub interval: f64,
+    /// Rows of the rests, where there are any.
+    pub rests: &'a [Range<usize>],
+    /// Length of Earth's field, µT, where it is known.
+    pub field: Option<f64>,
+}
+
+impl<'a> MagInput<'a> {
+    /// Samples without times and rests.
+    pub fn of_cloud(sensor: &'a Triple, usable: &'a [bool], field: Option<f64>) -> Self {
+        Self { time: &[], sensor, usable, interval: 1.0, rests: &[], field }
+    }
+}
+
+/// Calibrates a cloud.
+pub fn calibrate(input: &MagInput<'_>) -> SensorOutcome {
+    let cloud = cloud(&input.sensor.values, input.usable);
+    match fit(&cloud, input) {
         Ok((summary, Ok(evidence))) => outcome(Ok(()), Some(summary), Some(evidence)),
         Ok((summary, Err(refusal))) => outcome(Err(refusal), Some(summary), None),
         Err(refusal) => outcome(Err(refusal), None, None),
@@ -53,7 +81,9 @@ fn best_fit(problem: &NormProblem<'_, 9>) -> Option<NormFit<9>> {
 
 type Judged = (FitSummary, Result<Evidence, Refusal>);
 
-fn fit(points: &[ShellPoint<f64>], sensor: &Triple, field: Option<f64>) -> Result<Judged, Refusal> {
+fn fit(cloud: &Cloud, input: &MagInput<'_>) -> Result<Judged, Refusal> {
+    let (sensor, field) = (input.sensor, input.field);
+    let points = cloud.points.as_slice();
     let limits = Limits::for_norm(9, 10);
     if points.len() < limits.observations {
         return Err(Refusal::TooFewObservations { have: points.len(), need: limits.observations });
@@ -76,9 +106,18 @@ fn fit(points: &[ShellPoint<f64>], sensor: &Triple, field: Option<f64>) -> Resul
     let problem = NormProblem { points, norm, form: UPPER_TRIANGULAR, serial: true };
     let fit = best_fit(&problem).ok_or(flat)?;
     let coverage = problem.coverage(&fit);
-    let inflation = problem.inflation(&fit);
-    let (bend, verdict) = problem.judge(&fit, &coverage, &inflation, false, &limits);
-    let mut summary = summarise(&problem, &fit, sensor, &inflation);
+    let at: Vec<f64> =
+        cloud.rows.iter().map(|row| input.time.get(*row).copied().unwrap_or(*row as f64)).collect();
+    let at_rest = AtRest {
+        time: input.time,
+        values: &sensor.values,
+        usable: input.usable,
+        interval: input.interval,
+        rows: input.rests,
+    };
+    let errors = ShellErrors::of_cloud(&problem, &fit, &at, &at_rest.noise_of_cloud());
+    let (bend, verdict) = problem.judge(&fit, &coverage, &errors.stated(&problem.form, &fit), false, &limits);
+    let mut summary = summarise(&problem, &fit, sensor, &errors);
     summary.coverage = coverage.share;
     summary.nonlinearity = bend;
     if field.is_none() {
@@ -88,7 +127,7 @@ fn fit(points: &[ShellPoint<f64>], sensor: &Triple, field: Option<f64>) -> Resul
         norm,
         diagonal: false,
         triad: problem.form.triad(fit.solver.theta()),
-        std: Box::new(problem.form.triad(&fit.covariance(&inflation).diagonal().map(f64::sqrt))),
+        std: Box::new(problem.form.triad(&errors.covariance.diagonal().map(f64::sqrt))),
         points: fit.points,
     };
     Ok((summary, verdict.map(|()| evidence)))
@@ -98,9 +137,9 @@ fn summarise(
     problem: &NormProblem<'_, 9>,
     fit: &NormFit<9>,
     sensor: &Triple,
-    inflation: &SVector<f64, 9>,
+    errors: &ShellErrors<9>,
 ) -> FitSummary {
-    let covariance = fit.covariance(inflation);
+    let covariance = errors.covariance;
     let std = problem.form.triad(&covariance.diagonal().map(f64::sqrt));
     FitSummary {
         triad: problem.form.triad(fit.solver.theta()),
@@ -118,7 +157,7 @@ fn summarise(
         condition: fit.report.condition,
         coverage: 0.0,
         nonlinearity: 0.0,
-        inflation: inflation.max(),
+        inflation: errors.inflation.max(),
         iterations: fit.report.iterations,
         termination: fit.report.termination,
         field_norm: None,
@@ -187,7 +226,7 @@ fn advice(refusal: &Refusal) -> String {
         Refusal::TooFewObservations { .. } | Refusal::PoorCoverage { .. } | Refusal::NotRedundant { .. } => {
             "turn the sensor through all directions, upside down as well, slowly and away from iron"
         }
-        Refusal::IllConditioned { .. } | Refusal::TooNonlinear { .. } => {
+        Refusal::IllConditioned { .. } | Refusal::Imprecise { .. } | Refusal::TooNonlinear { .. } => {
             "cover the part of the sphere that is missing: its noise hides the far side's curvature"
         }
         Refusal::Implausible { .. } => "keep away from iron and currents while turning, and check the unit",
@@ -197,10 +236,9 @@ fn advice(refusal: &Refusal) -> String {
 }
 
 /// Turns an accepted magnetometer alone into the accelerometer's axes, where the rests tell the rotation.
-/// `pairs` are the calibrated specific force and the nominal output of the magnetometer at each rest.
-pub fn align_with(fit: &mut FitSummary, pairs: &[(Vector3<f64>, Vector3<f64>)]) {
-    let corrected: Vec<_> = pairs.iter().map(|(f, m)| (*f, fit.triad.correct(m))).collect();
-    let Some(alignment) = alignment::align(&corrected) else { return };
+/// `at_rest` is its nominal output at rests, of which `directions` knows the specific force.
+pub fn align_with(fit: &mut FitSummary, directions: &Directions, at_rest: &[FieldAtRest]) {
+    let Some(alignment) = alignment::align_at_rests(directions, at_rest, &fit.triad) else { return };
     let (triad, covariance) = alignment.turn(&fit.triad, &fit.covariance, &fit.covariance_of);
     fit.triad = triad;
     fit.gain_std = Matrix3::from_fn(|i, j| covariance[(3 * i + j, 3 * i + j)].sqrt());

@@ -202,8 +202,10 @@ fn judge(
     if found.fit.report.termination.was_successful() {
         accept::check_residual(relative, &limits)?;
     }
-    accept::check_report(&found.fit.report, &limits)?;
-    accept::check_nonlinearity(found.nonlinearity, &limits)?;
+    accept::check_report(&found.fit.report)?;
+    let error = summary.relative_error(found.fit.parameters.vector_n.norm());
+    accept::check_precision(error, &limits)?;
+    accept::check_nonlinearity(found.nonlinearity, error, &limits)?;
     accept::check_plausibility(&summary.triad, nominal, relative, &limits)
 }
 
@@ -213,6 +215,7 @@ fn refused(model: &'static str, refusal: Refusal, fit: Option<FitSummary>) -> Se
         | Refusal::PoorCoverage { .. }
         | Refusal::NotRedundant { .. }
         | Refusal::IllConditioned { .. }
+        | Refusal::Imprecise { .. }
         | Refusal::TooNonlinear { .. } => {
             "turn the body about all of its axes, upside down as well, in view of the cameras; or --model mag=E9 for \
              the field form"

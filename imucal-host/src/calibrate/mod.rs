@@ -5,17 +5,20 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::{
+    noise::Noise,
     observe::rest::{RestDetector, Samples},
     recording::{
-        Recording, SensorKind,
+        Recording, SensorKind, Triple,
         integrity::{self, Integrity},
         unit::STANDARD_GRAVITY,
     },
+    simulator::place::EARTH_RATE,
 };
 
 pub mod acc;
 pub mod alignment;
 pub mod compare;
+pub mod directions;
 pub mod gain_remark;
 pub mod gyr;
 pub mod gyr_ladder;
@@ -32,17 +35,26 @@ pub mod norm_fit;
 pub mod outcome;
 pub mod outlier;
 pub mod reference_fit;
+pub mod rest_bias;
+pub mod rest_noise;
 pub mod rig;
 pub mod rig_fit;
 pub mod rows;
 pub mod search;
 pub mod segmentation;
 pub mod serial;
+pub mod shell_errors;
 pub mod suspicion;
+pub mod turn_errors;
 pub mod turn_sense;
 
+use acc::AccInput;
 pub use acc::AccModel;
+use alignment::FieldAtRest;
+use directions::Directions;
+use mag::MagInput;
 pub use outcome::{Calibration, FitSummary, Refused, SegmentationReport, SensorOutcome};
+use rest_noise::{AtRest, RestNoise};
 use segmentation::Cut;
 pub use suspicion::{Follows, Status, Suspicion};
 
@@ -94,7 +106,7 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         read_warnings: recording.warnings.iter().map(ToString::to_string).collect(),
     };
     integrity_warnings(&integrity, &mut calibration.warnings);
-    inertial(recording, &integrity, options, progress, &mut calibration);
+    let directions = inertial(recording, &integrity, options, progress, &mut calibration);
     if let Some(mag) = recording.mag.as_ref().filter(|_| !options.skip.contains(&SensorKind::Mag)) {
         progress("fitting the magnetometer");
         let field = recording.manifest.site.field_ned_ut.map(|f| Vector3::from(f).norm());
@@ -102,11 +114,15 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         let on_rig = rig::magnetometer(recording, mag, &usable, options, &mut calibration)
             .or_else(|| mag_reference::magnetometer(recording, mag, &usable, options, &mut calibration));
         let outcome = on_rig.unwrap_or_else(|| {
-            let mut outcome = mag::calibrate(mag, &usable, field);
+            let rests = calibration.segmentation.as_ref().map_or(&[][..], |found| &found.rests);
+            let interval = recording.median_interval().unwrap_or(1.0);
+            let input =
+                MagInput { time: &recording.time, sensor: mag, usable: &usable, interval, rests, field };
+            let mut outcome = mag::calibrate(&input);
             if outcome.verdict.is_ok()
                 && let Some(fit) = &mut outcome.fit
             {
-                mag::align_with(fit, &rest_pairs(recording, &usable, &calibration));
+                align(fit, recording, &usable, &calibration, directions.as_ref());
             }
             outcome
         });
@@ -117,25 +133,23 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
     calibration
 }
 
-/// Calibrated specific force and nominal magnetometer output at each rest; none where the accelerometer is refused.
-fn rest_pairs(
+/// Turns a magnetometer into the accelerometer's axes, where there is one that passed and the rests tell the rotation.
+fn align(
+    fit: &mut FitSummary,
     recording: &Recording,
     usable: &[bool],
     calibration: &Calibration,
-) -> Vec<(Vector3<f64>, Vector3<f64>)> {
-    let passed = calibration.sensor(SensorKind::Acc).and_then(SensorOutcome::passed);
-    let (Some(fit), Some(segmentation)) = (passed, &calibration.segmentation) else { return Vec::new() };
-    let (Some(acc), Some(mag)) = (&recording.acc, &recording.mag) else { return Vec::new() };
-    let mean = |values: &[Vector3<f64>], rows: &std::ops::Range<usize>| {
+    directions: Option<&Directions>,
+) {
+    let (Some(directions), Some(mag)) = (directions, &recording.mag) else { return };
+    let Some(segmentation) = &calibration.segmentation else { return };
+    let at_rest = segmentation.rests.iter().enumerate().filter_map(|(rest, rows)| {
         let mut moments = Moments::default();
-        rows.clone().filter(|k| usable[*k]).for_each(|k| moments.push(&values[k]));
-        (moments.count() > 0).then(|| moments.mean())
-    };
-    segmentation
-        .rests
-        .iter()
-        .filter_map(|rows| Some((fit.triad.correct(&mean(&acc.values, rows)?), mean(&mag.values, rows)?)))
-        .collect()
+        rows.clone().filter(|k| usable[*k]).for_each(|k| moments.push(&mag.values[k]));
+        let (mean, count) = (moments.mean(), f64::from(moments.count()));
+        (count > 0.0).then(|| FieldAtRest { rest, mean, variance: moments.variance() / count })
+    });
+    mag::align_with(fit, directions, &at_rest.collect::<Vec<_>>());
 }
 
 /// What was found wrong with the samples and left out, in words.
@@ -167,14 +181,14 @@ fn usable(integrity: &Integrity, kind: SensorKind, rows: usize) -> Vec<bool> {
     integrity.sensor(kind).map_or_else(|| vec![true; rows], |sensor| sensor.usable.clone())
 }
 
-/// Accelerometer and gyroscope, which share the rests.
+/// Accelerometer and gyroscope, which share the rests; the directions there, where the accelerometer passed.
 fn inertial(
     recording: &Recording,
     integrity: &Integrity,
     options: &Options,
     progress: &(dyn Fn(&str) + Sync),
     calibration: &mut Calibration,
-) {
+) -> Option<Directions> {
     let wanted = recording.gyr.as_ref().filter(|_| !options.skip.contains(&SensorKind::Gyr));
     let (gyr_on_rig, motions) = wanted
         .and_then(|gyr| {
@@ -192,7 +206,7 @@ fn inertial(
         compare_gyr(calibration, &|_| None);
         let without = || wanted.map(|_| gyr::without_accelerometer(Refusal::NoRest));
         calibration.sensors.extend(gyr_on_rig.or_else(without));
-        return;
+        return None;
     };
     let gravity = recording.manifest.site.gravity().unwrap_or_else(|| {
         calibration.warnings.push(format!(
@@ -221,15 +235,21 @@ fn inertial(
     let Some(chosen) = segmentation::choose(&cuts) else {
         compare_gyr(calibration, &|_| None);
         calibration.sensors.extend(gyr_on_rig);
-        return;
+        return None;
     };
 
     progress("fitting the accelerometer");
+    let at_rest =
+        AtRest { time: &recording.time, values: &acc.values, usable: &usable, interval, rows: &chosen.rows };
+    let shown = at_rest.noise();
     let on_rig = rig::accelerometer(recording, acc, &usable, gravity, options, calibration);
     let result = match on_rig {
-        Some(outcome) => acc::AccResult { outcome, used: (0..chosen.rests.len()).collect() },
+        Some(outcome) => acc::AccResult { outcome, used: (0..chosen.rests.len()).collect(), noise: None },
         None if never_moved(&chosen.rows, recording.rows()) => acc::never_moved(options.acc),
-        None => acc::calibrate(&chosen.rests, acc, gravity, options.acc),
+        None => {
+            let input = AccInput { rests: &chosen.rests, noise: &shown, sensor: acc, gravity };
+            acc::calibrate(&input, options.acc)
+        }
     };
     if options.compare && recording.gimbal.is_none() {
         calibration.comparisons.extend(acc::compare(&chosen.rests, gravity));
@@ -244,18 +264,21 @@ fn inertial(
             segmentation::comparable(&cuts).filter_map(|cut| Some(cut.fit?.0.gain.diagonal())).collect();
         fit.gain_spread = Some(outcome::gain_spread(gains.iter().copied()));
     }
+    let directions = acc_outcome.passed().map(|fit| directions(fit, chosen, shown, result.noise));
     let usable = self::usable(integrity, SensorKind::Gyr, recording.rows());
+    let latitude = recording.manifest.site.latitude_deg;
+    let vertical_rate = latitude.map_or(0.0, |degrees| EARTH_RATE * libm::sin(degrees.to_radians()));
+    let shared =
+        GyrShared { recording, usable: &usable, interval, vertical_rate, directions: directions.as_ref() };
     compare_gyr(calibration, &|until| {
         let (gyr, acc) = (wanted?, acc_outcome.passed()?);
-        let shared = GyrShared { recording, gyr, usable: &usable, interval };
-        shared.before(until.unwrap_or(usize::MAX), chosen, &acc.triad, &result.used)
+        shared.before(gyr, until.unwrap_or(usize::MAX), chosen, &acc.triad, &result.used)
     });
     let gyr_outcome = gyr_on_rig.or_else(|| {
         let gyr = wanted?;
         progress("fitting the gyroscope");
-        let shared = GyrShared { recording, gyr, usable: &usable, interval };
         Some(match (&acc_outcome.verdict, acc_outcome.fit.as_ref()) {
-            (Ok(()), Some(fit)) => shared.outcome(chosen, &cuts, &fit.triad, &result.used, &mut trials),
+            (Ok(()), Some(fit)) => shared.outcome(gyr, chosen, &cuts, &fit.triad, &result.used, &mut trials),
             (Err(refused), _) => gyr::without_accelerometer(refused.refusal),
             (Ok(()), None) => gyr::without_accelerometer(Refusal::NoRest),
         })
@@ -273,6 +296,19 @@ fn inertial(
         gain_spread: spreads.fold(0.0, f64::max),
         trials,
     });
+    directions
+}
+
+/// How an accelerometer's directions err. Where its fit says nothing of the rests' noise, by what they show of it.
+fn directions(fit: &FitSummary, cut: &Cut, shown: RestNoise, noise: Option<Noise>) -> Directions {
+    Directions {
+        triad: fit.triad,
+        covariance: fit.covariance.clone(),
+        covariance_of: fit.covariance_of.clone(),
+        means: cut.rests.iter().map(|rest| rest.acc.mean()).collect(),
+        noise: noise.unwrap_or(Noise { density: shown.density, white: 1.0, drift: 0.0 }),
+        spans: shown.spans,
+    }
 }
 
 /// One rest that is all but the whole recording: the windows at its ends take a little.
@@ -287,43 +323,61 @@ type FieldForm<'a> = &'a dyn Fn(Option<usize>) -> Option<Triad<f64>>;
 /// What all of a gyroscope's fits share.
 struct GyrShared<'a> {
     recording: &'a Recording,
-    gyr: &'a crate::recording::Triple,
     usable: &'a [bool],
     interval: f64,
+    vertical_rate: f64,
+    directions: Option<&'a Directions>,
 }
 
 impl GyrShared<'_> {
-    fn input<'b>(&'b self, cut: &'b Cut, acc: &'b Triad<f64>, used: &'b [usize]) -> gyr::GyrInput<'b> {
+    fn input<'b>(
+        &'b self,
+        gyr: &'b Triple,
+        cut: &'b Cut,
+        acc: &'b Triad<f64>,
+        used: &'b [usize],
+    ) -> gyr::GyrInput<'b> {
         gyr::GyrInput {
             time: &self.recording.time,
-            sensor: self.gyr,
+            sensor: gyr,
             usable: self.usable,
             interval: self.interval,
             rows: &cut.rows,
             rests: &cut.rests,
             used,
             acc,
+            directions: None,
+            vertical_rate: self.vertical_rate,
         }
     }
 
     /// The field form of the rests that end before a row.
-    fn before(&self, row: usize, cut: &Cut, acc: &Triad<f64>, used: &[usize]) -> Option<Triad<f64>> {
+    fn before(
+        &self,
+        gyr: &Triple,
+        row: usize,
+        cut: &Cut,
+        acc: &Triad<f64>,
+        used: &[usize],
+    ) -> Option<Triad<f64>> {
         let count = cut.rows.partition_point(|rest| rest.end <= row);
         let used: Vec<usize> = used.iter().copied().filter(|k| *k < count).collect();
-        let whole = self.input(cut, acc, &used);
+        let whole = self.input(gyr, cut, acc, &used);
         let input = gyr::GyrInput { rows: &cut.rows[..count], rests: &cut.rests[..count], ..whole };
         gyr::calibrate(&input).passed().map(|fit| fit.triad)
     }
 
     fn outcome(
         &self,
+        gyr: &Triple,
         chosen: &Cut,
         cuts: &[Cut],
         acc: &Triad<f64>,
         used: &[usize],
         trials: &mut [outcome::ThresholdTrial],
     ) -> SensorOutcome {
-        let mut outcome = gyr::calibrate(&self.input(chosen, acc, used));
+        let input = gyr::GyrInput { directions: self.directions, ..self.input(gyr, chosen, acc, used) };
+        let mut outcome = gyr::calibrate(&input);
         let Some(fit) = &mut outcome.fit else {
             return outcome;
         };
@@ -334,7 +388,7 @@ impl GyrShared<'_> {
             .map(|cut| {
                 let all: Vec<usize> = (0..cut.rows.len()).collect();
                 let own = cut.fit.map_or(*acc, |(triad, _)| triad);
-                gyr::trial(&self.input(cut, &own, &all), &start)
+                gyr::trial(&self.input(gyr, cut, &own, &all), &start)
             })
             .collect();
         for (trial, gain) in trials.iter_mut().zip(&gains) {

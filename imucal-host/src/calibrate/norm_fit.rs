@@ -19,7 +19,6 @@ use rayon::prelude::*;
 use super::{
     outlier::{MOST, outliers},
     rows::{Residuals, Rows},
-    serial,
 };
 
 /// Rounds of leaving out gross outliers.
@@ -41,6 +40,15 @@ pub struct NormProblem<'a, const P: usize> {
     pub form: Parameterisation<P>,
     /// Neighbouring residuals may be alike: a cloud, not rests.
     pub serial: bool,
+}
+
+/// What a fit's errors are said to be.
+#[derive(Clone, Copy, Debug)]
+pub struct Stated {
+    /// Standard errors of the entries, zero where one is not estimated.
+    pub std: Triad<f64>,
+    /// The standard error along the weakest direction over its classical one.
+    pub inflation: f64,
 }
 
 /// A fit, before anyone has accepted it.
@@ -154,16 +162,6 @@ impl<const P: usize> NormProblem<'_, P> {
         Some((errors?.iter().sum::<f64>() / count as f64).sqrt())
     }
 
-    /// Factor on each standard error for residuals alike in time; ones where they are independent.
-    pub fn inflation(&self, fit: &NormFit<P>) -> SVector<f64, P> {
-        match fit.solver.factor().covariance(1.0) {
-            Some(unscaled) if self.serial => {
-                serial::inflation(&Rows::of(&self.model(&fit.points), fit.solver.theta()), &unscaled, 1)
-            }
-            _ => SVector::repeat(1.0),
-        }
-    }
-
     /// Directions seen, as the fit sees them.
     pub fn coverage(&self, fit: &NormFit<P>) -> Coverage<f64> {
         let triad = self.form.triad(fit.solver.theta());
@@ -175,12 +173,12 @@ impl<const P: usize> NormProblem<'_, P> {
         &self,
         fit: &NormFit<P>,
         coverage: &Coverage<f64>,
-        inflation: &SVector<f64, P>,
+        stated: &Stated,
         nominal: bool,
         limits: &Limits,
     ) -> (f64, Result<(), Refusal>) {
-        let bend = accept::nonlinearity(&fit.solver, &self.model(&fit.points), inflation.max());
-        let verdict = self.verdict(fit, coverage, bend, nominal, limits);
+        let bend = accept::nonlinearity(&fit.solver, &self.model(&fit.points), stated.inflation);
+        let verdict = self.verdict(fit, coverage, (bend, &stated.std), nominal, limits);
         (bend, verdict)
     }
 
@@ -188,19 +186,22 @@ impl<const P: usize> NormProblem<'_, P> {
         &self,
         fit: &NormFit<P>,
         coverage: &Coverage<f64>,
-        bend: f64,
+        (bend, std): (f64, &Triad<f64>),
         nominal: bool,
         limits: &Limits,
     ) -> Result<(), Refusal> {
         let triad = self.form.triad(fit.solver.theta());
-        let relative_rms = fit.rms() / mean_radius(&triad, self.norm);
+        let radius = mean_radius(&triad, self.norm);
+        let relative_rms = fit.rms() / radius;
         accept::check_observations(coverage, P, limits)?;
         // Before what depends on the noise: a residual that is no noise would be blamed on the poses.
         if fit.report.termination.was_successful() {
             accept::check_residual(relative_rms, limits)?;
         }
-        accept::check_report(&fit.report, limits)?;
-        accept::check_nonlinearity(bend, limits)?;
+        accept::check_report(&fit.report)?;
+        let error = accept::relative_error(&triad.gain, std, radius);
+        accept::check_precision(error, limits)?;
+        accept::check_nonlinearity(bend, error, limits)?;
         accept::check_plausibility(&triad, nominal, relative_rms, limits)
     }
 }
@@ -214,14 +215,6 @@ impl<const P: usize> NormFit<P> {
     /// Rms residual with the degrees of freedom left; NaN without any.
     pub fn rms(&self) -> f64 {
         self.solver.variance().map_or(f64::NAN, f64::sqrt)
-    }
-
-    /// Covariance of the parameters with inflated standard errors; infinite where the Jacobian is singular.
-    pub fn covariance(&self, inflation: &SVector<f64, P>) -> SMatrix<f64, P, P> {
-        let scale = SMatrix::from_diagonal(inflation);
-        self.solver
-            .covariance()
-            .map_or_else(|| SMatrix::repeat(f64::INFINITY), |classical| scale * classical * scale)
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a calibration came to: for each sensor a fit with its figures, accepted or refused with a reason.
 
 use imucal_core::{
-    accept::{Quantity, Refusal},
+    accept::{self, Quantity, Refusal},
     model::rig::ReferencePose,
     observation::ShellPoint,
     solver::Termination,
@@ -233,6 +233,14 @@ impl FitSummary {
         };
         let scale: Vec<f64> = self.covariance_of.iter().map(|entry| factor(*entry)).collect();
         DMatrix::from_fn(scale.len(), scale.len(), |i, j| self.covariance[(i, j)] * scale[i] * scale[j])
+    }
+
+    /// Expected error of a calibrated vector of this length, calibrated unit, as a share of it; see
+    /// [`relative_error`](accept::relative_error).
+    pub fn relative_error(&self, norm: f64) -> f64 {
+        let std = Triad { gain: self.gain_std, bias: self.bias_std };
+        let size = (self.triad.gain.norm_squared() / 3.0).sqrt();
+        accept::relative_error(&self.triad.gain, &std, norm / size)
     }
 
     /// A magnetometer without a known field keeps the recording's unit: its gain has determinant 1.

@@ -219,9 +219,10 @@ fn refused(
         Refusal::NoRest | Refusal::TooFewObservations { .. } => {
             "hold the table still for 2 s or more in 24 poses, faces and oblique ones"
         }
-        Refusal::PoorCoverage { .. } | Refusal::IllConditioned { .. } | Refusal::NotRedundant { .. } => {
-            "add poses upside down and oblique ones; turn all three gimbals"
-        }
+        Refusal::PoorCoverage { .. }
+        | Refusal::IllConditioned { .. }
+        | Refusal::Imprecise { .. }
+        | Refusal::NotRedundant { .. } => "add poses upside down and oblique ones; turn all three gimbals",
         Refusal::Implausible { .. } => {
             "check [units], [rig] axes, the encoders' unit and signs, and [site] of the recording's TOML"
         }
@@ -244,7 +245,8 @@ fn judge(fit: &RigFit, summary: &FitSummary, coverage: &Coverage<f64>, norm: f64
         let need = fit.free() / 3 + 1;
         return Err(Refusal::TooFewObservations { have: fit.residuals / 3, need });
     }
-    accept::check_report(&fit.report, &limits)?;
+    accept::check_report(&fit.report)?;
+    accept::check_precision(summary.relative_error(norm), &limits)?;
     accept::check_plausibility(&summary.triad, true, fit.rms / norm, &limits)
 }
 

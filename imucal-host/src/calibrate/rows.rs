@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use imucal_core::{
     model::{Model, RowSink},
-    solver::triangular::Triangular,
+    solver::{LevenbergMarquardt, condition::weakest_direction, triangular::Triangular},
 };
-use nalgebra::{DMatrix, SVector};
+use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// Residuals and derivatives in the model's order.
 #[derive(Clone, Debug)]
@@ -41,6 +41,26 @@ impl<const P: usize> Rows<P> {
     pub fn derivatives(&self, count: usize, free: &[usize]) -> DMatrix<f64> {
         DMatrix::from_fn(count, free.len(), |row, k| self.jacobian[row][free[k]])
     }
+}
+
+/// The standard error along the weakest direction of a fit over its classical one, all else held:
+/// √(uᵀ C₀⁻¹ u / uᵀ C⁻¹ u); 1 where a covariance is singular.
+pub fn weakest_inflation<const P: usize>(
+    solver: &LevenbergMarquardt<f64, P>,
+    covariance: &SMatrix<f64, P, P>,
+) -> f64 {
+    let along = |covariance: &SMatrix<f64, P, P>, unit: &SVector<f64, P>| {
+        // Entries of different units would spoil the inverse.
+        let std = covariance.diagonal().map(f64::sqrt);
+        let correlation = SMatrix::<f64, P, P>::from_fn(|i, j| covariance[(i, j)] / (std[i] * std[j]));
+        let unit = unit.component_div(&std);
+        Some(unit.dot(&nalgebra::Cholesky::new(correlation)?.solve(&unit)))
+    };
+    let inflation = || {
+        let unit = weakest_direction(solver.factor().r())?;
+        Some((along(&solver.covariance()?, &unit)? / along(covariance, &unit)?).sqrt())
+    };
+    inflation().filter(|inflation| inflation.is_finite()).unwrap_or(1.0)
 }
 
 /// J (JᵀJ)⁻¹: by how much each residual moves each parameter of a fit of least squares. `None` where J is not of full

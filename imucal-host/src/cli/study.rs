@@ -3,7 +3,7 @@
 use clap::{Args, Subcommand};
 
 use super::{Ending, output};
-use crate::study::{coverage, recovery, units};
+use crate::study::{coverage, recovery, trust, units};
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
@@ -31,6 +31,15 @@ enum Study {
         #[arg(long, value_name = "N", default_value_t = 1000)]
         seed: u64,
     },
+    /// Hand recordings good and bad: whether what is accepted is as good as it says
+    Trust {
+        /// Healthy recordings of each of the grid's 60 cells
+        #[arg(long, value_name = "N", default_value_t = 20)]
+        each: u64,
+        /// Everything random follows from it
+        #[arg(long, value_name = "N", default_value_t = 1)]
+        seed: u64,
+    },
     /// Two simulated units on the simulated rig, before and after calibration by each model
     Units {
         /// Everything random follows from it
@@ -43,6 +52,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     match arguments.study {
         Study::Coverage { runs, seed } => output::text(&coverage::report(runs, seed))?,
         Study::Recovery { runs, seed } => output::text(&recovery::report(seed, runs)?)?,
+        Study::Trust { each, seed } => {
+            let (text, kept) = trust::report(each, seed);
+            output::text(&text)?;
+            return Ok(if kept { Ending::Done } else { Ending::Refused });
+        }
         Study::Units { seed } => output::text(&units::report(seed)?)?,
     }
     Ok(Ending::Done)

@@ -19,7 +19,7 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 use statrs::function::gamma::{gamma_lr, ln_gamma};
 
-use super::{Noise, Span, whitening::Whitening};
+use super::{Noise, Span, restricted::Restricted, whitening::Whitening};
 
 /// Ratios ρ that are weighed, each twice the one before.
 const RATIOS: u32 = 13;
@@ -91,17 +91,10 @@ fn weigh(
     jacobian: &DMatrix<f64>,
     known: bool,
 ) -> Option<Weighed> {
-    let (rows, free) = jacobian.shape();
     let data = whitening.whiten(residuals)?;
-    let qr = whitening.whiten(jacobian)?.qr();
-    let log_det_fit = 2.0 * qr.r().diagonal().iter().map(|d| d.abs().ln()).sum::<f64>();
-    let explained = qr.q().tr_mul(&data).norm_squared();
-    let left = (data.norm_squared() - explained).max(f64::MIN_POSITIVE);
-    let moment = |power: f64| log_moment(0.5 * (rows - free) as f64 - power, 0.5 * left, known);
-    Some(Weighed {
-        log_likelihood: -0.5 * (whitening.log_determinant() + log_det_fit) + moment(0.0),
-        scale: (moment(1.0) - moment(0.0)).exp(),
-    })
+    let found = Restricted::of(&data, whitening.whiten(jacobian)?, whitening.log_determinant());
+    let moment = |power: f64| log_moment(0.5 * found.freedom as f64 - power, 0.5 * found.left, known);
+    Some(Weighed { log_likelihood: found.log_volume + moment(0.0), scale: (moment(1.0) - moment(0.0)).exp() })
 }
 
 /// ln ∫ s^−2a exp(−x/s²) p(s²) ds².

@@ -27,9 +27,13 @@ pub fn times(spans: &[Span]) -> Vec<f64> {
     times
 }
 
-/// Covariance of the means of unit flicker over spans that do not overlap.
+/// Covariance of the means of unit flicker over spans that do not overlap, s.
 pub fn covariance(spans: &[Span]) -> DMatrix<f64> {
-    let times = times(spans);
+    covariance_over(spans, &times(spans))
+}
+
+/// The same with correlation times of one's own, in the spans' unit.
+pub fn covariance_over(spans: &[Span], times: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(spans.len(), spans.len(), |i, j| {
         let both =
             |time: &f64| if i == j { within(&spans[i], *time) } else { between(&spans[i], &spans[j], *time) };

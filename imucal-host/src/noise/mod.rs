@@ -21,8 +21,11 @@ use nalgebra::{DMatrix, Vector3};
 
 pub mod estimate;
 pub mod flicker;
+pub mod interval;
+mod restricted;
 pub mod white;
 pub mod whitening;
+pub mod within;
 
 pub use estimate::Residuals;
 pub use whitening::Whitening;

@@ -12,7 +12,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 /// τ, s.
-const AVERAGED: f64 = 0.5;
+pub(super) const AVERAGED: f64 = 0.5;
 /// Fewer differences than this know the density to worse than a quarter.
 const LEAST: usize = 48;
 /// An axis cannot be quieter than this share of the noisiest: rounding has swallowed its noise.
@@ -42,7 +42,7 @@ pub fn density(
 }
 
 /// Means over successive intervals of a rest; `None` where samples are missing.
-fn means(
+pub(super) fn means(
     time: &[f64],
     values: &[Vector3<f64>],
     usable: &[bool],

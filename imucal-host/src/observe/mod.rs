@@ -3,5 +3,6 @@
 pub mod cloud;
 pub mod motion;
 pub mod pose;
+pub mod quantum;
 pub mod rest;
 pub mod turn;

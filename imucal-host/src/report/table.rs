@@ -173,7 +173,7 @@ fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {
     if fit.inflation > 1.05 {
         writeln!(
             text,
-            "  neighbouring residuals are alike: standard errors are up to {:.1} times those of independent ones",
+            "  standard errors are up to {:.1} times those of independent residuals of known variance",
             fit.inflation
         )?;
     }

@@ -95,7 +95,7 @@ impl Noise {
     /// White noise of accelerometer, gyroscope and magnetometer against the usual.
     pub(super) fn white(self) -> [f64; 3] {
         match self {
-            Self::NoisyAccelerometer => [8.0, 0.25, 1.0],
+            Self::NoisyAccelerometer => [4.0, 0.25, 1.0],
             Self::NoisyGyroscope => [0.25, 8.0, 1.0],
             Self::White | Self::Flicker | Self::CoarseSteps => [1.0; 3],
         }

@@ -37,8 +37,9 @@ const BIAS: [f64; 3] = [1.0, 0.05, 10.0];
 /// Where 1/f noise crosses white noise, Hz: from to.
 const CORNER: (f64, f64) = (0.03, 0.5);
 /// Correlation times of the processes that 1/f noise is the sum of, s: the shortest, and how many, each four times the
-/// one before. The longest is that of a day.
-const FLICKER: (f64, i32) = (0.1, 11);
+/// one before. Slower than the last, 1600 s, nothing moves: the triad's truth is the mean of many recordings, not that of
+/// this one, by so much.
+const FLICKER: (f64, i32) = (0.1, 8);
 /// A step of the converter against the white noise of a sample: fine, and coarse from to.
 const FINE_STEP: f64 = 0.25;
 /// See [`FINE_STEP`].
