@@ -184,6 +184,7 @@ fn with_form<const P: usize>(input: &AccInput<'_>, model: AccModel, form: Parame
                 verdict: Ok(()),
                 evidence: Some(Evidence::Shell {
                     points: fit.points,
+                    places: fit.used.clone(),
                     norm: gravity,
                     diagonal: model == AccModel::T6,
                     triad: summary.triad,

@@ -128,6 +128,7 @@ fn fit(cloud: &Cloud, input: &MagInput<'_>) -> Result<Judged, Refusal> {
         diagonal: false,
         triad: problem.form.triad(fit.solver.theta()),
         std: Box::new(problem.form.triad(&errors.covariance.diagonal().map(f64::sqrt))),
+        places: fit.used.iter().map(|k| cloud.rows[*k]).collect(),
         points: fit.points,
     };
     Ok((summary, verdict.map(|()| evidence)))

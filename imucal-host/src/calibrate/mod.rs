@@ -6,7 +6,10 @@ use rayon::prelude::*;
 
 use crate::{
     noise::Noise,
-    observe::rest::{RestDetector, Samples},
+    observe::{
+        held,
+        rest::{RestDetector, Samples},
+    },
     recording::{
         Recording, SensorKind, Triple,
         integrity::{self, Integrity},
@@ -19,11 +22,13 @@ pub mod acc;
 pub mod alignment;
 pub mod compare;
 pub mod directions;
+pub mod examination;
 pub mod gain_remark;
 pub mod gyr;
 pub mod gyr_ladder;
 pub mod gyr_motions;
 pub mod gyr_path;
+pub mod gyr_residual;
 pub mod gyr_rig;
 pub mod gyr_rig_fit;
 pub mod handedness;
@@ -32,14 +37,17 @@ pub mod lag;
 pub mod mag;
 pub mod mag_reference;
 pub mod norm_fit;
+pub mod norm_residual;
 pub mod outcome;
 pub mod outlier;
 pub mod reference_fit;
+pub mod residual_driver;
 pub mod rest_bias;
 pub mod rest_noise;
 pub mod rig;
 pub mod rig_fit;
 pub mod rows;
+pub mod score_test;
 pub mod search;
 pub mod segmentation;
 pub mod serial;
@@ -47,6 +55,7 @@ pub mod shell_errors;
 pub mod suspicion;
 pub mod turn_errors;
 pub mod turn_sense;
+pub mod turning_rest;
 
 use acc::AccInput;
 pub use acc::AccModel;
@@ -116,6 +125,7 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         let outcome = on_rig.unwrap_or_else(|| {
             let rests = calibration.segmentation.as_ref().map_or(&[][..], |found| &found.rests);
             let interval = recording.median_interval().unwrap_or(1.0);
+            let usable = counted_once(mag, &usable, rests, &mut calibration.warnings);
             let input =
                 MagInput { time: &recording.time, sensor: mag, usable: &usable, interval, rests, field };
             let mut outcome = mag::calibrate(&input);
@@ -130,7 +140,44 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
     }
     progress("checking the order and signs of the axes");
     handedness::check(recording, &mut calibration);
+    progress("testing the residuals");
+    examination::examine(recording, &integrity, &mut calibration);
+    few_left_over(&mut calibration);
     calibration
+}
+
+/// Warns of rests that are hardly more than parameters: what they follow is then in the parameters.
+fn few_left_over(calibration: &mut Calibration) {
+    let Some(outcome) = calibration.sensor(SensorKind::Acc) else { return };
+    let Some(fit) = outcome.passed().filter(|_| outcome.evidence.is_some()) else { return };
+    if fit.observations < 2 * fit.parameters {
+        let (rests, parameters) = (fit.observations, fit.parameters);
+        let warning = format!(
+            "acc: {rests} rests for {parameters} parameters leave {} degrees of freedom, in which few faults show; record {} \
+             rests or more",
+            rests - parameters,
+            2 * parameters + 2
+        );
+        calibration.warnings.push(warning);
+    }
+}
+
+/// The usable rows; without those that repeat the row before, where samples are held in motion.
+fn counted_once(
+    mag: &Triple,
+    usable: &[bool],
+    rests: &[std::ops::Range<usize>],
+    warnings: &mut Vec<String>,
+) -> Vec<bool> {
+    let share = held::share(&mag.values, usable, rests);
+    if share <= examination::HELD {
+        return usable.to_vec();
+    }
+    warnings.push(format!(
+        "mag: {:.0} % of its rows in motion repeat the row before; each sample counts once",
+        100.0 * share
+    ));
+    held::once(&mag.values, usable)
 }
 
 /// Turns a magnetometer into the accelerometer's axes, where there is one that passed and the rests tell the rotation.

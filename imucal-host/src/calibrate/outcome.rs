@@ -68,6 +68,8 @@ pub enum Evidence {
     Shell {
         /// Points used, nominal SI.
         points: Vec<ShellPoint<f64>>,
+        /// Each point's rest, among the segmentation's, or row of a cloud.
+        places: Vec<usize>,
         /// Radius of the calibrated sphere.
         norm: f64,
         /// Only the gain's diagonal was estimated.

@@ -33,7 +33,7 @@ use super::{
 use crate::noise::interval::{Errors, Parts, Scale};
 
 /// See ρ, with prior weights.
-const RATIOS: [(f64, f64); 4] = [(1.0, 0.7), (4.0, 0.15), (16.0, 0.1), (64.0, 0.05)];
+const RATIOS: [(f64, f64); 4] = [(1.0, 0.85), (4.0, 0.1), (16.0, 0.04), (64.0, 0.01)];
 
 /// A turn and which rests it is between.
 #[derive(Clone, Copy, Debug)]
@@ -123,7 +123,7 @@ pub fn errors(
     let of_directions = directions.propagated(&by_direction);
     let of_rates = of_rates(&turns, &rests, directions, rates);
     let parts =
-        Parts { parts: [&of_directions, &of_rates], ratios: &RATIOS, scale: Scale::AtLeastOne, five: false };
+        Parts { parts: [&of_directions, &of_rates], ratios: &RATIOS, scale: Scale::Near, five: false };
     parts.errors(&residuals, &jacobian, &influence(&jacobian)?)
 }
 

@@ -32,10 +32,15 @@ enum Study {
         seed: u64,
     },
     /// Hand recordings good and bad: whether what is accepted is as good as it says
+    ///
+    /// Ends with 1 where a limit is broken.
     Trust {
         /// Healthy recordings of each of the grid's 60 cells
         #[arg(long, value_name = "N", default_value_t = 20)]
         each: u64,
+        /// Recordings of each kind of fault
+        #[arg(long, value_name = "N", default_value_t = 10)]
+        faulty: u64,
         /// Everything random follows from it
         #[arg(long, value_name = "N", default_value_t = 1)]
         seed: u64,
@@ -52,8 +57,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     match arguments.study {
         Study::Coverage { runs, seed } => output::text(&coverage::report(runs, seed))?,
         Study::Recovery { runs, seed } => output::text(&recovery::report(seed, runs)?)?,
-        Study::Trust { each, seed } => {
-            let (text, kept) = trust::report(each, seed);
+        Study::Trust { each, faulty, seed } => {
+            let (text, kept) = trust::report(each, faulty, seed);
             output::text(&text)?;
             return Ok(if kept { Ending::Done } else { Ending::Refused });
         }

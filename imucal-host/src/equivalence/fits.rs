@@ -78,10 +78,10 @@ impl FitEquivalence {
 pub fn compare(recording: &Recording, outcome: &SensorOutcome) -> Option<FitEquivalence> {
     let summary = outcome.passed()?;
     match outcome.evidence.as_ref()? {
-        Evidence::Shell { points, norm, diagonal: false, triad, std } => {
+        Evidence::Shell { points, norm, diagonal: false, triad, std, .. } => {
             shell(outcome.kind, points, *norm, (triad, std), UPPER_TRIANGULAR)
         }
-        Evidence::Shell { points, norm, diagonal: true, triad, std } => {
+        Evidence::Shell { points, norm, diagonal: true, triad, std, .. } => {
             shell(outcome.kind, points, *norm, (triad, std), DIAGONAL)
         }
         Evidence::Turns(turns) => gyroscope(recording, turns, summary),

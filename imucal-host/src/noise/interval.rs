@@ -33,6 +33,8 @@ const FIVE: f64 = 0.9999;
 const HALVINGS: usize = 40;
 /// Sizes s² above one, each so many times the one before, and the largest.
 const SIZES: (f64, f64) = (1.2, 1e6);
+/// How many times larger than the noise its bounds may be, squared.
+const BOUNDS: f64 = 16.0;
 /// Prior probability that noise which is no less than known is just as known.
 const KNOWN: f64 = 0.75;
 /// What is less probable than this does not move a 97.5 % point.
@@ -45,6 +47,9 @@ pub enum Scale {
     Free,
     /// Noise is no less than V₀: three quarters at s² = 1, the others log-uniform from there to 10⁶.
     AtLeastOne,
+    /// The same, but V₀ contains bounds, which noise may be below: three eighths at s² = 1 are log-uniform from 1/16 to one
+    /// instead.
+    Near,
 }
 
 /// Noise of two parts.
@@ -184,9 +189,16 @@ impl Parts<'_> {
         if self.scale == Scale::Free {
             return (-0.5 * freedom * left.ln(), vec![(left / freedom, 1.0)]);
         }
-        let count = (SIZES.1.ln() / SIZES.0.ln()).ceil() as i32;
-        let prior = |k: i32| if k == 0 { KNOWN } else { (1.0 - KNOWN) / f64::from(count) };
-        let logs: Vec<(f64, f64)> = (0..=count)
+        let steps = |factor: f64| (factor.ln() / SIZES.0.ln()).ceil() as i32;
+        let above = steps(SIZES.1);
+        let below = if self.scale == Scale::Near { steps(BOUNDS) } else { 0 };
+        let prior = |k: i32| match k {
+            ..0 => 0.5 * KNOWN / f64::from(below),
+            0 if below > 0 => 0.5 * KNOWN,
+            0 => KNOWN,
+            _ => (1.0 - KNOWN) / f64::from(above),
+        };
+        let logs: Vec<(f64, f64)> = (-below..=above)
             .map(|k| {
                 let size = SIZES.0.powi(k);
                 (size, prior(k).ln() - 0.5 * freedom * size.ln() - 0.5 * left / size)

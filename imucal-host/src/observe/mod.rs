@@ -1,8 +1,10 @@
 //! From samples to observations: rests, turns between them, and clouds.
 
 pub mod cloud;
+pub mod held;
 pub mod motion;
 pub mod pose;
 pub mod quantum;
 pub mod rest;
+pub mod rest_halves;
 pub mod turn;

@@ -100,8 +100,7 @@ fn turn_rows(time: &[f64], before: &Range<usize>, after: &Range<usize>) -> Range
     first..last
 }
 
-/// Compresses the motion between two rests. Rates are taken less the bias path, and each is held from half-way
-/// to the sample before it to half-way to the one after (the trapezoidal rule).
+/// Compresses the motion between two rests; see [`compress_rows`].
 ///
 /// # Errors
 /// [`TurnGap`], with the row, where the motion was not wholly recorded.
@@ -114,7 +113,31 @@ pub fn compress(
     bias: &BiasPath,
 ) -> Result<TurnData, TurnGap> {
     let (rest_before, before, rest_after, after) = rests;
-    let rows = turn_rows(time, before, after);
+    compress_rows(
+        time,
+        gyr,
+        usable,
+        interval,
+        turn_rows(time, before, after),
+        (rest_before, rest_after),
+        bias,
+    )
+}
+
+/// Compresses the rows of a turn between two rests, by their indices. Rates are taken less the bias path, and each is
+/// held from half-way to the sample before it to half-way to the one after (the trapezoidal rule).
+///
+/// # Errors
+/// [`TurnGap`], with the row, where the motion was not wholly recorded.
+pub fn compress_rows(
+    time: &[f64],
+    gyr: &[Vector3<f64>],
+    usable: &[bool],
+    interval: f64,
+    rows: Range<usize>,
+    (rest_before, rest_after): (usize, usize),
+    bias: &BiasPath,
+) -> Result<TurnData, TurnGap> {
     // A dropout is bridged by its neighbours; what was clipped or stuck is not what was turned.
     let measured: Vec<usize> = rows.clone().filter(|k| gyr[*k].iter().all(|w| w.is_finite())).collect();
     if let Some(row) = measured.iter().find(|k| !usable[**k]) {

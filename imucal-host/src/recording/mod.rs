@@ -20,7 +20,7 @@ pub mod gravity;
 pub mod header_fault;
 pub mod imu_tk;
 pub mod integrity;
-mod interval;
+pub(crate) mod interval;
 pub mod manifest;
 pub mod manifest_check;
 mod manifest_keys;

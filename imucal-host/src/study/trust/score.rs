@@ -65,7 +65,7 @@ fn errors(fit: &FitSummary, truth: &Triad<f64>) -> Vec<f64> {
 }
 
 /// The truth in the axes that the fit is in: a norm alone tells an upper triangular gain.
-fn in_gauge_of(fit: &FitSummary, truth: &Triad<f64>) -> Triad<f64> {
+pub(super) fn in_gauge_of(fit: &FitSummary, truth: &Triad<f64>) -> Triad<f64> {
     let upper = fit.covariance_of.iter().all(|entry| ![3, 6, 7].contains(entry));
     if !upper {
         return *truth;
