@@ -55,7 +55,7 @@ fn the_loop_of_the_readme_ends_where_it_began_after_each_power_cycle() {
         program::run(PROGRAM, &[], &arguments)
     };
     let path = recording.display().to_string();
-    run(&["identify"], &[]).with(0).printing(&["record 0: Empty"]);
+    run(&["identify"], &[]).with(0).printing(&["record 0: none is stored"]);
     run(&["stream", &path], &[("--out", at("early.csv"))]).with(1).telling(&["no record is stored"]);
     run(&["calibrate", &path], &[]).with(0).printing(&[
         "T9",
@@ -63,7 +63,7 @@ fn the_loop_of_the_readme_ends_where_it_began_after_each_power_cycle() {
         "equal bit for bit",
         "stored as record 1",
     ]);
-    run(&["identify"], &[]).with(0).printing(&["record 1: Unconfirmed"]);
+    run(&["identify"], &[]).with(0).printing(&["record 1: in use, without a serial"]);
     run(&["get"], &[("--out", at("unit.bin"))]).with(0);
 
     // A second's worth of the recording, or QEMU's UART would take minutes.

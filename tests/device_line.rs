@@ -193,7 +193,7 @@ fn over_a_serial_port_a_record_is_put_got_and_used_by_one_program_after_another(
     bench
         .run("device identify", &format!("{device}@115200"))
         .with(0)
-        .printing(&["emulated", "record 0: Empty"]);
+        .printing(&["emulated", "record 0: none is stored"]);
     bench.run("device stream small.csv --out early.csv", &device).with(1).telling(&["no record is stored"]);
     bench.run("device put cal.bin", &device).with(0).printing(&["stored as record 1"]);
     bench.run("device get --out got.bin", &device).with(0);

@@ -49,6 +49,7 @@ fn plausible(triple: &Triple, kind: SensorKind) -> StoredTriad {
         condition: 1.0,
         coverage: 1.0,
         field_norm: None,
+        provenance: None,
         temperature: None,
     }
 }

@@ -22,10 +22,10 @@ use firmware_example::{
 use imucal_core::{
     corrector::Corrector,
     link::{
-        Fault, Guard, Header, Identity, Key, MAX_FRAME, Nonces, Origin, Reply, Request, Seal, encode,
-        refuse_version,
+        Fault, Guard, Header, Identity, Key, MAX_FRAME, Nonces, Origin, RecordState, Reply, Request, Seal,
+        encode, refuse_version,
     },
-    record::{self, SensorIdentity},
+    record::{self, Defect, Figures, SensorIdentity},
 };
 use imucal_host::device::{DeviceError, Session};
 use nalgebra::Vector3;
@@ -162,7 +162,18 @@ fn the_numbers_of_the_document_are_those_of_the_code() {
         let (fault, _) = postcard::take_from_bytes::<Fault>(&bytes).expect("a fault");
         assert_eq!(&name(format!("{fault:?}")), expected);
     }
+    for number in 0..4 {
+        let bytes = [&[number][..], &[0; 20]].concat();
+        let (defect, _) = postcard::take_from_bytes::<Defect>(&bytes).expect("a defect");
+        let expected = format!("{number} {} (", name(format!("{defect:?}")));
+        assert!(document().contains(&expected), "{expected}");
+    }
     // And the next number is none.
+    assert!(postcard::take_from_bytes::<Defect>(&[4, 0, 0, 0]).is_err());
+    assert!(postcard::take_from_bytes::<Figures>(&[12]).is_ok_and(|(last, _)| last == Figures::FieldNorm));
+    assert!(postcard::take_from_bytes::<Figures>(&[13]).is_err());
+    assert!(postcard::take_from_bytes::<RecordState>(&[7]).is_ok_and(|(last, _)| last == RecordState::Lost));
+    assert!(postcard::take_from_bytes::<RecordState>(&[8]).is_err());
     assert!(
         postcard::take_from_bytes::<Request<'_>>(&[[requests.len() as u8; 1].as_slice(), &[0; 80]].concat())
             .is_err()

@@ -1,6 +1,7 @@
 //! What a board brings: four small traits, none of which waits.
 
 use embedded_storage::nor_flash::NorFlash;
+use imucal_core::record::RawUnit;
 
 /// A line to the host, byte by byte.
 pub trait ByteLink {
@@ -30,6 +31,10 @@ pub struct Sample {
 pub trait SampleSource {
     /// The next sample, if one has come.
     fn sample(&mut self) -> Option<Sample>;
+
+    /// Raw units, in the order of [`Sample::raw`]: no record for another is taken. `None` where there is no such sensor,
+    /// whose samples come by the link in the record's own unit.
+    fn units(&self) -> [Option<RawUnit>; 3];
 }
 
 /// A board that brings samples only by its link.
@@ -39,6 +44,10 @@ pub struct NoSensor;
 impl SampleSource for NoSensor {
     fn sample(&mut self) -> Option<Sample> {
         None
+    }
+
+    fn units(&self) -> [Option<RawUnit>; 3] {
+        [None; 3]
     }
 }
 

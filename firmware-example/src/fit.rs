@@ -32,8 +32,7 @@ pub fn write(out: &mut impl Write, memory: &mut FitMemory) -> fmt::Result {
     let mut fitting = Fitting::new(memory);
     for seed in 1..=SETS {
         let sensor = SensorIdentity::default();
-        let mut record =
-            CalibrationRecord { sensor, date: Date::from_days(20_000), acc: None, gyr: None, mag: None };
+        let mut record = CalibrationRecord::empty(sensor, Date::from_days(20_000));
         for model in FitModel::ALL {
             one(out, &mut fitting, drill::task(model), seed, &mut record)?;
         }

@@ -176,3 +176,20 @@ fn a_toml_with_a_gain_nobody_can_apply_is_refused() {
         assert_unusable(&folder, "bad.toml", 1, 1, &["bad.toml", "acc", "gain", "calibrate again"]);
     }
 }
+
+#[test]
+fn a_calibration_that_no_sensor_can_have_is_refused_with_its_figure() {
+    let folder = Folder::with_calibration();
+    let toml = folder.text("cal.toml");
+    let line = |start: &str| toml.lines().find(|line| line.starts_with(start)).expect("a line of the triad");
+    for (start, spoiled, told) in [
+        ("coverage = ", "coverage = 1.5", "the coverage is 1.500, expected 0 to 1.000"),
+        ("rms = ", "rms = -1.0", "the rms residual is -1.000"),
+        ("bias = ", "bias = [1e12, 0.0, 0.0]", "the bias is 1.000e12"),
+        ("unit_in = ", "unit_in = \"rad/s\"", "no such sensor has the unit rad/s"),
+        ("unit_in = ", "unit_in = \"g\"", "expected 3.269 to 29.421"),
+    ] {
+        folder.write("bad.toml", toml.replacen(line(start), spoiled, 1));
+        assert_unusable(&folder, "bad.toml", 1, 1, &["bad.toml", "acc", told, "calibrate again"]);
+    }
+}

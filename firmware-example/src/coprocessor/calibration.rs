@@ -3,7 +3,9 @@
 use imucal_core::{
     corrector::{Compensator, Corrector},
     link::{Fault, RecordState},
-    record::{self, CalibrationRecord, Date, DecodeError, Match, Sensor, SensorIdentity, TriadRecord},
+    record::{
+        self, CalibrationRecord, Date, DecodeError, Match, RawUnit, Sensor, SensorIdentity, TriadRecord,
+    },
 };
 use nalgebra::Vector3;
 
@@ -11,6 +13,8 @@ use nalgebra::Vector3;
 pub(super) struct Calibration {
     /// The unit at hand.
     pub(super) unit: SensorIdentity,
+    /// Of the board's own samples.
+    units: [Option<RawUnit>; 3],
     record: CalibrationRecord,
     correctors: [Option<Compensator<f32>>; 3],
     /// What is in flash.
@@ -21,21 +25,17 @@ pub(super) struct Calibration {
 
 impl Calibration {
     /// Of a unit, before its flash was looked at.
-    pub(super) fn new(unit: SensorIdentity) -> Self {
-        let record = CalibrationRecord {
-            sensor: unit.clone(),
-            date: Date::from_days(0),
-            acc: None,
-            gyr: None,
-            mag: None,
-        };
-        Self { unit, record, correctors: [None; 3], state: RecordState::Empty, unsaved: false }
+    pub(super) fn new(unit: SensorIdentity, units: [Option<RawUnit>; 3]) -> Self {
+        let record = CalibrationRecord::empty(unit.clone(), Date::from_days(0));
+        Self { unit, units, record, correctors: [None; 3], state: RecordState::Empty, unsaved: false }
     }
 
     /// Uses a record, if it is this unit's; says what it is.
     #[inline(never)]
     pub(super) fn load(&mut self, bytes: &[u8]) -> RecordState {
-        let record = match record::decode(bytes) {
+        // By reference: each copy of a record takes 0.7 KiB of stack.
+        let decoded = record::decode(bytes);
+        let record = match &decoded {
             Ok(record) => record,
             Err(DecodeError::UnsupportedVersion { .. }) => return RecordState::NewerFormat,
             Err(_) => return RecordState::Unusable,
@@ -45,7 +45,10 @@ impl Calibration {
             Ok(Match::Unknown) => RecordState::Unconfirmed,
             Err(_) => return RecordState::OtherSensor,
         };
-        self.put_in_use(&record);
+        if self.other_unit(record).is_some() {
+            return RecordState::Unusable;
+        }
+        self.put_in_use(record);
         state
     }
 
@@ -61,11 +64,38 @@ impl Calibration {
     /// Why a record is not this unit's to use, if it is not.
     #[inline(never)]
     pub(super) fn refusal(&self, bytes: &[u8]) -> Option<Fault> {
-        match record::decode(bytes) {
-            Ok(record) => record.made_for(&self.unit.serial).is_err().then_some(Fault::OtherSensor),
+        let decoded = record::decode(bytes);
+        match &decoded {
+            Ok(record) if record.made_for(&self.unit.serial).is_err() => Some(Fault::OtherSensor),
+            Ok(record) => self.other_unit(record),
             Err(DecodeError::UnsupportedVersion { .. }) => Some(Fault::NewerFormat),
+            Err(DecodeError::Unusable(defect)) => Some(Fault::Implausible(*defect)),
             Err(_) => Some(Fault::BadRecord),
         }
+    }
+
+    /// The first triad of a record for another unit than the board puts out.
+    fn other_unit(&self, record: &CalibrationRecord) -> Option<Fault> {
+        record.triads().find_map(|(sensor, triad)| self.check_unit(sensor, triad.unit_in).err())
+    }
+
+    /// The board puts out samples of that unit, or none of that sensor.
+    ///
+    /// # Errors
+    ///
+    /// [`Fault::OtherUnit`].
+    pub(super) fn check_unit(&self, sensor: Sensor, unit_in: RawUnit) -> Result<(), Fault> {
+        match self.units.get(sensor as usize) {
+            Some(Some(expected)) if *expected != unit_in => {
+                Err(Fault::OtherUnit { sensor, expected: *expected })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// There is a calibration in use, of whatever sensor.
+    pub(super) fn is_in_use(&self) -> bool {
+        self.correctors.iter().any(Option::is_some)
     }
 
     /// What is in flash must not be overwritten unasked.
@@ -74,21 +104,19 @@ impl Calibration {
     }
 
     /// Takes a triad that was fitted here.
+    ///
+    /// # Errors
+    ///
+    /// [`Fault::Implausible`]; what was in use still is.
     #[inline(never)]
-    pub(super) fn adopt(&mut self, sensor: Sensor, triad: &TriadRecord, date: Date) {
-        let corrector = Some(Compensator::new(Corrector::from(triad)));
-        let (slot, place) = match sensor {
-            Sensor::Accelerometer => (&mut self.record.acc, 0),
-            Sensor::Gyroscope => (&mut self.record.gyr, 1),
-            Sensor::Magnetometer => (&mut self.record.mag, 2),
-        };
-        *slot = Some(triad.clone());
-        if let Some(place) = self.correctors.get_mut(place) {
-            *place = corrector;
+    pub(super) fn adopt(&mut self, sensor: Sensor, triad: &TriadRecord, date: Date) -> Result<(), Fault> {
+        triad.check(sensor).map_err(Fault::Implausible)?;
+        self.record.adopt(sensor, triad, &self.unit, date);
+        if let Some(place) = self.correctors.get_mut(sensor as usize) {
+            *place = Some(Compensator::new(Corrector::from(triad)));
         }
-        self.record.date = date;
-        self.record.sensor = self.unit.clone();
         self.unsaved = true;
+        Ok(())
     }
 
     /// The record in use, as bytes.

@@ -18,13 +18,13 @@ mod requests;
 use embedded_storage::nor_flash::NorFlash;
 use imucal_core::{
     link::{Asked, Fault, FitProgress, Frame, FrameError, Guard, Receiver, RecordState, Reply, split},
-    record::{Date, Sensor, SensorIdentity},
+    record::{self, Date, Sensor, SensorIdentity},
 };
 
 use crate::{
     board::{Board, ByteLink, Clock, SampleSource},
     fitting::{Finished, Fitting, Memory},
-    storage::{SLOT, Slots, Writing},
+    storage::{Slots, StorageError, Writing},
 };
 use calibration::Calibration;
 use outgoing::Outgoing;
@@ -144,7 +144,7 @@ impl<
     ) -> Self {
         let Board { link, flash, clock, sensors, stack } = board;
         let slots = Slots::open(flash).ok();
-        let calibration = Calibration::new(unit);
+        let calibration = Calibration::new(unit, sensors.units());
         let device = Device {
             clock,
             sensors,
@@ -217,12 +217,24 @@ impl<
     /// Uses what the flash holds.
     #[inline(never)]
     fn boot(&mut self) {
-        let mut buffer = [0; SLOT];
-        let bytes = self.slots.as_mut().and_then(|slots| slots.read(&mut buffer).ok()).unwrap_or_default();
-        if !bytes.is_empty() {
-            self.calibration.state = self.calibration.load(bytes);
-        }
         self.job = Job::None;
+        let Some(slots) = &mut self.slots else { return };
+        if slots.is_newer() {
+            self.calibration.state = RecordState::NewerFormat;
+            return;
+        }
+        let mut buffer = [0; record::MAX_LEN];
+        let state = match slots.read(&mut buffer) {
+            Ok([]) => RecordState::Empty,
+            Ok(bytes) => self.calibration.load(bytes),
+            Err(StorageError::TooLong) => RecordState::NewerFormat,
+            Err(_) => RecordState::Unusable,
+        };
+        self.calibration.state = match state {
+            RecordState::InUse | RecordState::Unconfirmed if slots.lost().is_some() => RecordState::Previous,
+            RecordState::Empty if slots.lost().is_some() => RecordState::Lost,
+            state => state,
+        };
     }
 
     /// Sends an answer that has waited for the link.
@@ -252,11 +264,9 @@ impl<
     #[inline(never)]
     fn judge(&mut self, asked: Asked, date: Date) {
         self.finished = self.fitting.finish().ok();
-        if let Some((sensor, triad)) = self.finished.as_ref().and_then(|finished| finished.accepted.as_ref())
-        {
-            self.calibration.adopt(*sensor, triad, date);
-        }
-        self.end(asked, Due::Report);
+        let accepted = self.finished.as_ref().and_then(|finished| finished.accepted.as_ref());
+        let adopted = accepted.map_or(Ok(()), |(sensor, triad)| self.calibration.adopt(*sensor, triad, date));
+        self.end(asked, adopted.map_or_else(Due::Fault, |()| Due::Report));
     }
 
     /// Apart from who waits for bytes: a request takes its memory only while it is worked at.
@@ -375,7 +385,7 @@ impl<
     /// A record is whole in flash: it is in use from now on.
     #[inline(never)]
     fn stored(&mut self, asked: Asked, sequence: u32) {
-        let mut buffer = [0; SLOT];
+        let mut buffer = [0; record::MAX_LEN];
         let bytes = self.slots.as_mut().and_then(|slots| slots.read(&mut buffer).ok());
         self.calibration.state = bytes.map_or(RecordState::Unusable, |bytes| self.calibration.load(bytes));
         self.calibration.unsaved = false;

@@ -2,7 +2,7 @@
 
 use embedded_storage::nor_flash::NorFlash;
 use imucal_core::{
-    link::{Asked, Fault, FitTask, Identity, Observation, RecordState, Reply, Request, Status, Values},
+    link::{Asked, Fault, FitTask, Identity, Observation, Reply, Request, Status, Values},
     record::{self, Date, Sensor},
 };
 
@@ -10,7 +10,7 @@ use super::{Device, Due, Job, Stream};
 use crate::{
     board::{Clock, SampleSource},
     fitting::Fitting,
-    storage::SLOT,
+    storage::StorageError,
 };
 
 /// Version of the firmware.
@@ -100,12 +100,18 @@ impl<
 
     #[inline(never)]
     fn get_record(&mut self, asked: Asked) -> Result<(), Fault> {
-        let mut buffer = [0; SLOT];
+        let mut buffer = [0; record::MAX_LEN];
         let slots = self.slots.as_mut().ok_or(Fault::Flash)?;
+        if slots.is_newer() {
+            return Err(Fault::NewerFormat);
+        }
         if slots.newest().is_none() {
             return Err(Fault::NoRecord);
         }
-        let bytes = slots.read(&mut buffer).map_err(|_| Fault::Flash)?;
+        let bytes = slots.read(&mut buffer).map_err(|error| match error {
+            StorageError::TooLong => Fault::NewerFormat,
+            _ => Fault::Flash,
+        })?;
         self.send(asked, &Reply::Record(bytes));
         Ok(())
     }
@@ -132,7 +138,7 @@ impl<
 
     #[inline(never)]
     fn store(&mut self, asked: Asked, replace: bool) -> Result<(), Fault> {
-        if self.calibration.state == RecordState::Empty && !self.calibration.unsaved {
+        if !self.calibration.is_in_use() {
             return Err(Fault::NoRecord);
         }
         let mut buffer = [0xFF; record::MAX_LEN];
@@ -144,12 +150,17 @@ impl<
         if self.calibration.is_occupied() && !replace {
             return Err(Fault::Occupied);
         }
-        let slots = self.slots.as_ref().ok_or(Fault::Flash)?;
-        self.job = Job::Storing(asked, slots.begin(bytes).map_err(|_| Fault::BadRecord)?);
+        let slots = self.slots.as_mut().ok_or(Fault::Flash)?;
+        let writing = slots.begin(bytes).map_err(|error| match error {
+            StorageError::TooLong => Fault::BadRecord,
+            _ => Fault::Flash,
+        })?;
+        self.job = Job::Storing(asked, writing);
         Ok(())
     }
 
     fn start_fit(&mut self, asked: Asked, task: FitTask) -> Result<(), Fault> {
+        self.calibration.check_unit(task.model.sensor(), task.unit_in)?;
         self.fitting.begin(task)?;
         self.send(asked, &self.progress());
         Ok(())

@@ -9,7 +9,7 @@ use firmware_example::{
 };
 use imucal_core::{
     link::{Guard, Header, MAX_FRAME, Origin, Receiver, Reply, Request, encode, split},
-    record::SensorIdentity,
+    record::{RawUnit, SensorIdentity},
 };
 
 use crate::nor::Nor;
@@ -49,6 +49,8 @@ pub struct Counting {
     pub count: f32,
     /// They put samples out.
     pub on: bool,
+    /// In these units.
+    pub units: [Option<RawUnit>; 3],
 }
 
 /// Sensors whose samples wait in a queue, which is in our hands.
@@ -59,6 +61,10 @@ impl SampleSource for Queued {
     fn sample(&mut self) -> Option<Sample> {
         self.0.borrow_mut().pop_front()
     }
+
+    fn units(&self) -> [Option<RawUnit>; 3] {
+        [None; 3]
+    }
 }
 
 impl SampleSource for Counting {
@@ -66,6 +72,10 @@ impl SampleSource for Counting {
         self.count += 1.0;
         let raw = [Some([self.count; 3]), Some([self.count; 3]), None];
         self.on.then_some(Sample { raw, temperature: 25.0 })
+    }
+
+    fn units(&self) -> [Option<RawUnit>; 3] {
+        self.units
     }
 }
 

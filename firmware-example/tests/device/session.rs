@@ -1,12 +1,12 @@
 //! What a host may do with a co-processor, in peace.
 
-use firmware_example::{RECORD, drill, scene::Noise};
+use firmware_example::{RECORD, drill, scene::Noise, storage::layout::SLOT};
 use imucal_core::{
     corrector::Corrector,
-    link::{BATCH, Fault, FitModel, Observation, RecordState, Reply, Request, Values},
+    link::{BATCH, Fault, FitModel, FitTask, Observation, RecordState, Reply, Request, Values},
     model::{norm::NormModel, parameterisation::UPPER_TRIANGULAR},
     observation::ShellPoint,
-    record::{self, Date, Sensor},
+    record::{self, CalibrationRecord, Date, Defect, Figures, RawUnit, Sensor},
     solver::LevenbergMarquardt,
     triad::Triad,
 };
@@ -109,6 +109,141 @@ fn a_stored_record_of_another_sensor_is_kept_unused_until_it_is_to_be_replaced()
     assert!(bench.ask(&Request::GetRecord, |reply| matches!(reply, Reply::Record(bytes) if *bytes == kept)));
     assert_eq!(bench.ask(&Request::PutRecord { record: RECORD, replace: true }, fault), None);
     assert_eq!(state(&mut bench), RecordState::InUse);
+}
+
+/// The record that the images carry, changed.
+fn with(change: impl Fn(&mut CalibrationRecord)) -> CalibrationRecord {
+    let mut record = record::decode(RECORD).expect("golden");
+    change(&mut record);
+    record
+}
+
+fn get(bench: &mut Bench<'_>) -> Vec<u8> {
+    bench.ask(&Request::GetRecord, |reply| match reply {
+        Reply::Record(bytes) => bytes.to_vec(),
+        other => panic!("{other:?}"),
+    })
+}
+
+#[test]
+fn a_record_that_no_sensor_can_have_is_refused_with_its_figure_and_changes_nothing() {
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    assert_eq!(bench.ask(&put(RECORD), fault), None);
+    // The coverage of the accelerometer, behind the rest of its figures: no encoder writes that.
+    let coverage = record::decode(RECORD).expect("golden").acc.expect("it has one").quality.coverage;
+    let spoiled = altered(|bytes| {
+        let at = bytes.windows(4).position(|window| window == coverage.to_le_bytes()).expect("its coverage");
+        bytes[at..at + 4].copy_from_slice(&1.5f32.to_le_bytes());
+    });
+    let sensor = Sensor::Accelerometer;
+    let defect = Defect::OutOfRange { sensor, figures: Figures::Coverage, value: 1.5, least: 0.0, most: 1.0 };
+    assert_eq!(bench.ask(&put(&spoiled), fault), Some(Fault::Implausible(defect)));
+    assert_eq!((state(&mut bench), get(&mut bench)), (RecordState::InUse, RECORD.to_vec()));
+}
+
+#[test]
+fn a_record_for_another_unit_than_the_board_s_is_refused_and_not_used() {
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    assert_eq!(bench.ask(&put(RECORD), fault), None);
+    // The flash has moved to a board whose accelerometer puts out SI.
+    let si = RawUnit::MetrePerSecondSquared;
+    let board = Counting { units: [Some(si), None, None], ..Counting::default() };
+    let mut bench = Bench::new(bench.off(), SERIAL, board, &mut memory);
+    assert_eq!(state(&mut bench), RecordState::Unusable);
+    let other = Fault::OtherUnit { sensor: Sensor::Accelerometer, expected: si };
+    assert_eq!(bench.ask(&put(RECORD), fault), Some(other));
+    // Nor is a fit to samples in counts begun; one to its own unit is.
+    let counts = FitTask { unit_in: RawUnit::Counts, ..drill::task(FitModel::T9) };
+    assert_eq!(bench.ask(&Request::StartFit(counts), fault), Some(other));
+    assert_eq!(bench.ask(&Request::StartFit(drill::task(FitModel::T9)), fault), None);
+}
+
+#[test]
+fn a_fit_that_no_sensor_can_have_is_not_adopted_and_the_calibration_stays() {
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    assert_eq!(bench.ask(&put(RECORD), fault), None);
+    let raw = Values::from_slice(&[[33_000.0, 32_000.0, 31_000.0]]).expect("room");
+    let correct = Request::Correct { sensor: Sensor::Accelerometer, temperature: 31.0, raw };
+    let before = bench.ask(&correct, |reply| format!("{reply:?}"));
+    for per_unit in [1e-42, 1e-9, 1e30] {
+        let task = FitTask { per_unit, ..drill::task(FitModel::T9) };
+        assert_eq!(bench.ask(&Request::StartFit(task), fault), None);
+        feed(&mut bench, &rests(40));
+        assert_eq!(bench.ask(&Request::StepFit { slices: u16::MAX }, fault), None);
+        // Judged again after a lost answer, it is refused again.
+        for _ in 0..2 {
+            let refused = bench.ask(&Request::FinishFit { date: Date::from_days(1) }, fault);
+            assert!(matches!(refused, Some(Fault::Implausible(_))), "{per_unit}: {refused:?}");
+        }
+        assert_eq!(bench.ask(&correct, |reply| format!("{reply:?}")), before);
+    }
+    assert!(bench.ask(&Request::Status, |reply| matches!(reply, Reply::Status(status) if !status.unsaved)));
+}
+
+#[test]
+fn a_fit_of_one_triad_leaves_serial_date_and_temperature_terms_of_the_others() {
+    let mut memory = BenchMemory::new();
+    let unknown = with(|record| record.sensor.serial.clear());
+    let mut buffer = [0; record::MAX_LEN];
+    let bytes = record::encode(&unknown, &mut buffer).expect("room").to_vec();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    assert_eq!(bench.ask(&put(&bytes), fault), None);
+    assert_eq!(bench.ask(&Request::StartFit(drill::task(FitModel::E9)), fault), None);
+    drill::observe(FitModel::E9, 40, &mut Noise(1), |observation| {
+        let index = bench.device.fit().expect("begun").observations;
+        let observations = heapless::Vec::from_slice(&[observation]).expect("one");
+        assert_eq!(bench.ask(&Request::Feed { index, observations }, fault), None);
+    });
+    assert_eq!(bench.ask(&Request::StepFit { slices: u16::MAX }, fault), None);
+    assert_eq!(bench.ask(&Request::FinishFit { date: Date::from_days(20_100) }, fault), None);
+    assert_eq!(bench.ask(&Request::Store { replace: false }, fault), None);
+    let stored = record::decode(&get(&mut bench)).expect("a record");
+    assert!(stored.acc.as_ref().expect("kept").temperature.is_some());
+    assert_eq!(stored.acc, unknown.acc);
+    let of = |sensor| (stored.serial_of(sensor), stored.date_of(sensor));
+    assert_eq!(of(Sensor::Accelerometer), ("", unknown.date));
+    assert_eq!(of(Sensor::Magnetometer), (SERIAL, Date::from_days(20_100)));
+}
+
+#[test]
+fn nothing_is_stored_where_nothing_is_in_use() {
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    assert_eq!(bench.ask(&Request::Store { replace: true }, fault), Some(Fault::NoRecord));
+    let nor = bench.off();
+    assert_eq!(nor.operations, 0);
+    // Nor in the place of a record that cannot be used.
+    let mut bench = Bench::new(nor, "00300018", Counting::default(), &mut memory);
+    assert_eq!(bench.ask(&put(&of_another()), fault), None);
+    let mut bench = Bench::new(bench.off(), SERIAL, Counting::default(), &mut memory);
+    assert_eq!(bench.ask(&Request::Store { replace: true }, fault), Some(Fault::NoRecord));
+    assert_eq!(get(&mut bench), of_another());
+}
+
+#[test]
+fn a_record_that_has_lost_bits_is_reported_whether_one_before_it_is_there_or_not() {
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    assert_eq!(bench.ask(&put(RECORD), fault), None);
+    let mut one = bench.off();
+    let mut bench = Bench::new(one.clone(), SERIAL, Counting::default(), &mut memory);
+    let later = with(|record| record.date = Date::from_days(30_000));
+    let mut buffer = [0; record::MAX_LEN];
+    assert_eq!(bench.ask(&put(record::encode(&later, &mut buffer).expect("room")), fault), None);
+    let mut two = bench.off();
+    one.bytes[64 + 100] ^= 1;
+    two.bytes[64 + SLOT + 100] ^= 1;
+
+    let mut bench = Bench::new(two, SERIAL, Counting::default(), &mut memory);
+    assert_eq!((state(&mut bench), get(&mut bench)), (RecordState::Previous, RECORD.to_vec()));
+    assert_eq!(bench.ask(&put(RECORD), |reply| format!("{reply:?}")), "Stored { sequence: 3 }");
+    assert_eq!(state(&mut bench), RecordState::InUse);
+    let mut bench = Bench::new(one, SERIAL, Counting::default(), &mut memory);
+    assert_eq!(state(&mut bench), RecordState::Lost);
+    assert_eq!(bench.ask(&Request::GetRecord, fault), Some(Fault::NoRecord));
 }
 
 fn rests(count: usize) -> Vec<ShellPoint<f32>> {

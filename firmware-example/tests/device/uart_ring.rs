@@ -9,7 +9,10 @@ use firmware_example::{
     coprocessor::Coprocessor,
     ring::Ring,
 };
-use imucal_core::link::{Guard, Receiver, Reply, Request, split};
+use imucal_core::{
+    link::{Guard, Receiver, Reply, Request, split},
+    record::RawUnit,
+};
 
 use crate::{
     bad_link::records,
@@ -87,6 +90,10 @@ impl SampleSource for Imu {
         self.next += INTERVAL;
         pass(&self.time, READ);
         Some(Sample { raw: [Some([33_000.0; 3]), Some([32_000.0; 3]), None], temperature: 25.0 })
+    }
+
+    fn units(&self) -> [Option<RawUnit>; 3] {
+        [Some(RawUnit::Counts), Some(RawUnit::Counts), None]
     }
 }
 

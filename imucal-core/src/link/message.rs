@@ -4,7 +4,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::{FitProgress, FitReport, FitTask, Observation};
-use crate::record::{Date, Sensor, SensorIdentity};
+use crate::record::{Date, Defect, RawUnit, Sensor, SensorIdentity};
 
 /// Observations of one message at the most.
 pub const BATCH: usize = 12;
@@ -176,7 +176,7 @@ pub struct Capacity {
     pub particles: u16,
 }
 
-/// What became of the stored record at the start, or since.
+/// What became of the stored record at the start, or since. The order of the variants is the format: append only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RecordState {
@@ -192,6 +192,10 @@ pub enum RecordState {
     NewerFormat,
     /// It was stored whole, but cannot be used.
     Unusable,
+    /// The one stored last has lost bits since; the one before it is in use.
+    Previous,
+    /// The one stored last has lost bits since, and there is none before it.
+    Lost,
 }
 
 /// How a device is.
@@ -219,7 +223,7 @@ pub struct Status {
 }
 
 /// Why a request was not done. Nothing has changed, but that observations before the one refused are taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Fault {
@@ -254,7 +258,7 @@ pub enum Fault {
     NotReady,
     /// No record is in use for this sensor.
     NoRecord,
-    /// The record is damaged, or not usable.
+    /// The record is damaged.
     BadRecord,
     /// The record's format is newer than this firmware.
     NewerFormat,
@@ -272,6 +276,15 @@ pub enum Fault {
     WrongSeal,
     /// The device is locked.
     Locked,
+    /// A record, or a fit that is otherwise accepted, that no sensor can have. What was in use still is.
+    Implausible(Defect),
+    /// A record or a fit for samples in another unit than the board puts out.
+    OtherUnit {
+        /// Whose.
+        sensor: Sensor,
+        /// What the board puts out.
+        expected: RawUnit,
+    },
 }
 
 #[cfg(test)]

@@ -5,10 +5,13 @@ use core::fmt;
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
 use super::payload::serialize;
-use super::{CalibrationRecord, Defect};
+use super::{CalibrationRecord, Defect, Provenance};
 
-/// Major and minor version of the format this library writes.
-pub const VERSION: (u8, u8) = (1, 0);
+/// Major version of the format, and the newest minor, that this library reads and writes.
+pub const VERSION: (u8, u8) = (1, 1);
+
+/// The minor that appended the triads' provenance.
+pub(super) const WITH_PROVENANCE: u8 = 1;
 
 const MAGIC: [u8; 4] = *b"IMUC";
 const HEADER: usize = MAGIC.len() + 2 + 2;
@@ -37,11 +40,12 @@ mod longest {
     const TEMPERATURE: usize = F32 + 3 * F32 + 3 * F32;
     const QUALITY: usize = 9 * F32 + 3 * F32 + F32 + (TAG + F32) + U32 + U8 + F32 + F32 + (TAG + F32);
     const TRIAD: usize = 9 * F32 + 3 * F32 + TAG + TAG + text(8) + (TAG + TEMPERATURE) + QUALITY;
-    pub const RECORD: usize = text(32) + text(32) + U32 + 3 * (TAG + TRIAD);
+    const PROVENANCE: usize = text(32) + U32;
+    pub const RECORD: usize = text(32) + text(32) + U32 + 3 * (TAG + TRIAD) + 3 * (TAG + PROVENANCE);
 }
 
 /// Why a record was not written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum EncodeError {
@@ -57,7 +61,7 @@ pub enum EncodeError {
 }
 
 /// Why no record was read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DecodeError {
@@ -101,13 +105,8 @@ pub enum DecodeError {
 /// ```
 /// use imucal_core::record::{self, CalibrationRecord, Date, MAX_LEN, SensorIdentity};
 ///
-/// let record = CalibrationRecord {
-///     sensor: SensorIdentity { name: "MTx".parse()?, serial: "00300017".parse()? },
-///     date: Date::from_unix(1_700_000_000),
-///     acc: None,
-///     gyr: None,
-///     mag: None,
-/// };
+/// let sensor = SensorIdentity { name: "MTx".parse()?, serial: "00300017".parse()? };
+/// let record = CalibrationRecord::empty(sensor, Date::from_unix(1_700_000_000));
 /// let mut page = [0xFF; MAX_LEN];
 /// record::encode(&record, &mut page)?;
 /// assert_eq!(record::decode(&page)?, record);
@@ -118,7 +117,7 @@ pub fn encode<'b>(record: &CalibrationRecord, buffer: &'b mut [u8]) -> Result<&'
     let have = buffer.len();
     // Serialising has no way to fail; were there one, the longest record asks for the largest buffer.
     let room = buffer.get_mut(HEADER..).unwrap_or_default();
-    let payload = serialize(record, room).unwrap_or(longest::RECORD);
+    let (minor, payload) = serialize(record, room).unwrap_or((VERSION.1, longest::RECORD));
     let need = HEADER + payload + CHECKSUM;
     let short = EncodeError::BufferTooSmall { have, need };
 
@@ -127,7 +126,7 @@ pub fn encode<'b>(record: &CalibrationRecord, buffer: &'b mut [u8]) -> Result<&'
     let header = checked.first_chunk_mut::<HEADER>().ok_or(short)?;
     let [a, b] = (payload as u16).to_le_bytes();
     let [m, u, c, l] = MAGIC;
-    *header = [m, u, c, l, VERSION.0, VERSION.1, a, b];
+    *header = [m, u, c, l, VERSION.0, minor, a, b];
     *checksum = CRC.checksum(checked).to_le_bytes();
     Ok(whole)
 }
@@ -160,13 +159,25 @@ pub fn decode(bytes: &[u8]) -> Result<CalibrationRecord, DecodeError> {
     }
 
     let payload = checked.get(HEADER..).ok_or(truncated(need))?;
-    let (record, appended) =
+    let (mut record, mut appended) =
         postcard::take_from_bytes::<CalibrationRecord>(payload).map_err(|_| DecodeError::Malformed)?;
+    if minor >= WITH_PROVENANCE {
+        appended = take_provenance(&mut record, appended)?;
+    }
     if minor <= VERSION.1 && !appended.is_empty() {
         return Err(DecodeError::Malformed);
     }
     record.check().map_err(DecodeError::Unusable)?;
     Ok(record)
+}
+
+/// Reads what minor 1 appended; gives what follows.
+#[inline(never)]
+fn take_provenance<'a>(record: &mut CalibrationRecord, appended: &'a [u8]) -> Result<&'a [u8], DecodeError> {
+    let (provenance, rest) =
+        postcard::take_from_bytes::<[Option<Provenance>; 3]>(appended).map_err(|_| DecodeError::Malformed)?;
+    record.provenance = provenance;
+    Ok(rest)
 }
 
 impl fmt::Display for EncodeError {

@@ -50,19 +50,29 @@ impl fmt::Display for WrongSensor<'_> {
 impl core::error::Error for WrongSensor<'_> {}
 
 impl CalibrationRecord {
-    /// Was the record made for the unit with this serial? Names are not compared, for they are written in many ways.
+    /// Was the record, each of its triads, made for the unit with this serial? Names are not compared, for they are
+    /// written in many ways.
     ///
     /// # Errors
     ///
     /// [`WrongSensor`] where both serials are known and differ. To apply the record nevertheless is the caller's
     /// decision; [`Match::Unknown`] asks him to warn.
-    pub fn made_for<'a>(&'a self, serial: &'a str) -> Result<Match, WrongSensor<'a>> {
-        let recorded = self.sensor.serial.as_str();
-        match (recorded, serial) {
-            ("", _) | (_, "") => Ok(Match::Unknown),
-            (recorded, connected) if recorded == connected => Ok(Match::Confirmed),
-            (recorded, connected) => Err(WrongSensor { recorded, connected }),
+    pub fn made_for<'a>(&'a self, connected: &'a str) -> Result<Match, WrongSensor<'a>> {
+        let mut found = matched(&self.sensor.serial, connected)?;
+        for (sensor, _) in self.triads() {
+            if matched(self.serial_of(sensor), connected)? == Match::Unknown {
+                found = Match::Unknown;
+            }
         }
+        Ok(found)
+    }
+}
+
+fn matched<'a>(recorded: &'a str, connected: &'a str) -> Result<Match, WrongSensor<'a>> {
+    match (recorded, connected) {
+        ("", _) | (_, "") => Ok(Match::Unknown),
+        _ if recorded == connected => Ok(Match::Confirmed),
+        _ => Err(WrongSensor { recorded, connected }),
     }
 }
 
@@ -73,13 +83,8 @@ mod tests {
     use std::string::ToString;
 
     fn of(serial: &str) -> CalibrationRecord {
-        CalibrationRecord {
-            sensor: SensorIdentity { name: "MTx".parse().unwrap(), serial: serial.parse().unwrap() },
-            date: Date::from_days(0),
-            acc: None,
-            gyr: None,
-            mag: None,
-        }
+        let sensor = SensorIdentity { name: "MTx".parse().unwrap(), serial: serial.parse().unwrap() };
+        CalibrationRecord::empty(sensor, Date::from_days(0))
     }
 
     #[test]

@@ -16,7 +16,7 @@
 //! * **n** frames the payload, so that an older reader can step over fields appended after its time.
 //! * **payload**: [`CalibrationRecord`] in postcard 1, fields in the order of declaration. `f32` is 4 bytes,
 //!   integers wider than a byte and lengths are LEB128 varints, an `Option` is a byte 0 or 1 and then the value, a
-//!   unit is a byte, text is a length and UTF-8. Arrays carry no length.
+//!   unit is a byte, text is a length and UTF-8. Arrays carry no length. `provenance` is there from minor 1 on.
 //! * **CRC-32** (ISO-HDLC: polynomial 0x04C11DB7 reflected, initial value and final xor 0xFFFF_FFFF, as in zlib)
 //!   over everything before it. It finds damage, not forgery.
 //!
@@ -26,7 +26,13 @@
 //! * The **minor** rises when fields are appended to [`CalibrationRecord`] (never to a struct inside it), or variants
 //!   to [`RawUnit`]. An older reader steps over appended fields and refuses, as malformed, only a record that uses a
 //!   variant it does not know. A newer reader still reads every older minor of its major.
+//! * A record is written in the lowest minor that holds it: one whose triads have one provenance is 1.0, byte for byte.
 //! * The golden bytes of each version stay in `tests/golden` and are decoded for ever.
+//!
+//! # What is refused
+//!
+//! [`CalibrationRecord::check`] judges every record that is read or written: units, gain, bias, temperature terms and
+//! figures of merit against what sensors are like. Its limits stand in `plausibility.rs`.
 //!
 //! A record holds what belongs to the sensor. What belongs to the rig (levelling tilt, gimbal iron) is not stored.
 
@@ -34,11 +40,14 @@ mod codec;
 mod date;
 mod identity;
 mod payload;
+mod plausibility;
+mod provenance;
 mod validity;
 
 pub use codec::{DecodeError, EncodeError, MAX_LEN, VERSION, decode, encode};
 pub use date::Date;
 pub use identity::{Match, SensorIdentity, WrongSensor};
+pub use provenance::Provenance;
 pub use validity::{Defect, Figures};
 
 use heapless::String;
@@ -58,7 +67,7 @@ pub type ModelName = String<8>;
 pub struct CalibrationRecord {
     /// The unit that was calibrated.
     pub sensor: SensorIdentity,
-    /// The day it was calibrated, UTC.
+    /// The day of the last calibration that the record took, UTC.
     pub date: Date,
     /// Accelerometer.
     pub acc: Option<TriadRecord>,
@@ -66,9 +75,18 @@ pub struct CalibrationRecord {
     pub gyr: Option<TriadRecord>,
     /// Magnetometer.
     pub mag: Option<TriadRecord>,
+    /// Of each triad in the order of [`Sensor::ALL`], where it comes from; `None` where that is as `sensor` and `date`
+    /// say. Appended in minor 1.
+    #[serde(skip)]
+    pub provenance: [Option<Provenance>; 3],
 }
 
 impl CalibrationRecord {
+    /// A record without a triad.
+    pub fn empty(sensor: SensorIdentity, date: Date) -> Self {
+        Self { sensor, date, acc: None, gyr: None, mag: None, provenance: [const { None }; 3] }
+    }
+
     /// The calibration of one triad; `None` where the record has none.
     pub fn triad(&self, sensor: Sensor) -> Option<&TriadRecord> {
         match sensor {

@@ -5,11 +5,20 @@
 
 use postcard::{Result, ser_flavors::Flavor, serialize_with_flavor};
 
-use super::CalibrationRecord;
+use super::{CalibrationRecord, codec::WITH_PROVENANCE};
 
-/// Writes as much of the payload as fits into `room`; gives the length of all of it.
-pub(super) fn serialize(record: &CalibrationRecord, room: &mut [u8]) -> Result<usize> {
-    serialize_with_flavor(record, Counting { room, length: 0 })
+/// Writes as much of the payload as fits into `room`; gives the minor version that it takes and the length of all of
+/// it.
+pub(super) fn serialize(record: &CalibrationRecord, room: &mut [u8]) -> Result<(u8, usize)> {
+    let first = serialize_with_flavor(record, Counting { room: &mut *room, length: 0 })?;
+    if record.provenance.iter().all(Option::is_none) {
+        return Ok((0, first));
+    }
+    let rest = room.get_mut(first..).unwrap_or_default();
+    Ok((
+        WITH_PROVENANCE,
+        first + serialize_with_flavor(&record.provenance, Counting { room: rest, length: 0 })?,
+    ))
 }
 
 struct Counting<'b> {

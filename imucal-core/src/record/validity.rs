@@ -2,25 +2,45 @@
 
 use core::fmt;
 
-use super::{CalibrationRecord, Sensor, TriadRecord};
+use serde::{Deserialize, Serialize};
 
-/// A group of figures of a [`TriadRecord`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+use super::{CalibrationRecord, RawUnit, Sensor};
+
+/// Figures of a [`TriadRecord`](super::TriadRecord). The order of the variants is the messages' format: append only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Figures {
-    /// The 3×3 gain.
+    /// The 3×3 gain; out of range, the length of one of its columns: calibrated units of an axis' raw unit.
     Gain,
+    /// Length of the gain's longest column against that of the shortest.
+    AxisRatio,
     /// The bias.
     Bias,
-    /// Reference and slopes of the temperature terms.
-    Temperature,
-    /// Standard errors and other marks of the fit.
-    Quality,
+    /// Reference temperature.
+    Reference,
+    /// Growth of the bias a kelvin.
+    BiasSlope,
+    /// Growth of the scale a kelvin.
+    ScaleSlope,
+    /// Standard errors of the gain.
+    GainStd,
+    /// Standard errors of the bias.
+    BiasStd,
+    /// Root mean square residual.
+    Rms,
+    /// The same of observations held out.
+    HeldOutRms,
+    /// Condition of the Jacobian.
+    Condition,
+    /// Share of directions seen.
+    Coverage,
+    /// Magnitude of the field.
+    FieldNorm,
 }
 
-/// Why a record cannot be used, although it is intact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Why a record cannot be used, although it is intact. The order of the variants is the messages' format: append only.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Defect {
@@ -31,33 +51,96 @@ pub enum Defect {
         /// Where.
         figures: Figures,
     },
-    /// a gain whose columns are dependent: see [`is_singular`](crate::triad::Triad::is_singular).
+    /// A gain whose columns are dependent: see [`is_singular`](crate::triad::Triad::is_singular).
     Singular {
         /// Whose.
         sensor: Sensor,
     },
+    /// A unit that such a sensor has not.
+    ForeignUnit {
+        /// Whose.
+        sensor: Sensor,
+        /// The unit, of raw or of calibrated values.
+        unit: RawUnit,
+    },
+    /// No sensor and no fit is like that.
+    OutOfRange {
+        /// Whose.
+        sensor: Sensor,
+        /// Where.
+        figures: Figures,
+        /// The figure, in the unit that the record has it in.
+        value: f32,
+        /// The least that would pass.
+        least: f32,
+        /// The most that would pass.
+        most: f32,
+    },
+}
+
+impl Defect {
+    /// Whose figures cannot be used.
+    pub fn sensor(&self) -> Sensor {
+        match self {
+            Self::NotFinite { sensor, .. }
+            | Self::Singular { sensor }
+            | Self::ForeignUnit { sensor, .. }
+            | Self::OutOfRange { sensor, .. } => *sensor,
+        }
+    }
+}
+
+impl Figures {
+    /// Their name in a sentence.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gain => "gain",
+            Self::AxisRatio => "ratio of the axes' gains",
+            Self::Bias => "bias",
+            Self::Reference => "reference temperature",
+            Self::BiasSlope => "bias slope",
+            Self::ScaleSlope => "scale slope",
+            Self::GainStd => "gain's standard error",
+            Self::BiasStd => "bias' standard error",
+            Self::Rms => "rms residual",
+            Self::HeldOutRms => "held-out rms residual",
+            Self::Condition => "condition",
+            Self::Coverage => "coverage",
+            Self::FieldNorm => "field's magnitude",
+        }
+    }
 }
 
 impl fmt::Display for Defect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (sensor, what) = match self {
-            Self::NotFinite { sensor, figures } => (
-                sensor,
-                match figures {
-                    Figures::Gain => ": the gain is not finite",
-                    Figures::Bias => ": the bias is not finite",
-                    Figures::Temperature => ": the temperature terms are not finite",
-                    Figures::Quality => ": the figures of quality are not finite",
-                },
-            ),
-            Self::Singular { sensor } => (sensor, ": the gain is singular"),
-        };
-        f.write_str(sensor.symbol())?;
-        f.write_str(what)
+        write!(f, "{}: ", self.sensor().symbol())?;
+        match self {
+            Self::NotFinite { figures, .. } => write!(f, "the {} is not finite", figures.name()),
+            Self::Singular { .. } => f.write_str("the gain is singular"),
+            Self::ForeignUnit { unit, .. } => write!(f, "no such sensor has the unit {}", unit.symbol()),
+            Self::OutOfRange { figures, value, least, most, .. } => {
+                let [value, least, most] = [value, least, most].map(|figure| Written(*figure));
+                write!(f, "the {} is {value}, expected {least} to {most}", figures.name())
+            }
+        }
     }
 }
 
 impl core::error::Error for Defect {}
+
+/// A figure to four digits, with a power of ten where it is large or small.
+struct Written(f32);
+
+impl fmt::Display for Written {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = if self.0 < 0.0 { -self.0 } else { self.0 };
+        match size {
+            0.0 => f.write_str("0"),
+            0.1..1e5 => write!(f, "{:.3}", self.0),
+            _ => write!(f, "{:.3e}", self.0),
+        }
+    }
+}
 
 impl CalibrationRecord {
     /// Can the record be used? [`encode`](super::encode) and [`decode`](super::decode) both ask.
@@ -71,38 +154,4 @@ impl CalibrationRecord {
         check(Sensor::Gyroscope)?;
         check(Sensor::Magnetometer)
     }
-}
-
-impl TriadRecord {
-    #[inline(never)]
-    fn check(&self, sensor: Sensor) -> Result<(), Defect> {
-        let not_finite = |figures| Err(Defect::NotFinite { sensor, figures });
-        if !finite(self.gain.as_flattened()) {
-            return not_finite(Figures::Gain);
-        }
-        if !finite(&self.bias) {
-            return not_finite(Figures::Bias);
-        }
-        if self.temperature.as_ref().is_some_and(|terms| !terms.is_finite()) {
-            return not_finite(Figures::Temperature);
-        }
-        let quality = &self.quality;
-        if !finite(quality.gain_std.as_flattened())
-            || !finite(&quality.bias_std)
-            || !finite(&[quality.rms, quality.condition, quality.coverage])
-            || !finite(quality.held_out_rms.as_slice())
-            || !finite(quality.field_norm.as_slice())
-        {
-            return not_finite(Figures::Quality);
-        }
-        if self.triad::<f32>().is_singular() {
-            return Err(Defect::Singular { sensor });
-        }
-        Ok(())
-    }
-}
-
-#[inline(never)]
-fn finite(figures: &[f32]) -> bool {
-    figures.iter().all(|figure| figure.is_finite())
 }

@@ -1,9 +1,13 @@
-//! A record and its bytes, put together without the encoder.
+//! Records and their bytes, put together without the encoder: one of each minor version.
 
-use imucal_core::record::{CalibrationRecord, Date, FitQuality, RawUnit, SensorIdentity, TriadRecord};
+use imucal_core::record::{
+    CalibrationRecord, Date, FitQuality, Provenance, RawUnit, SensorIdentity, TriadRecord,
+};
 use imucal_core::temperature::TemperatureTerms;
 
 pub const GOLDEN: &[u8] = include_bytes!("../golden/record-1.0.bin");
+/// The same whose magnetometer was calibrated earlier, on a unit that did not say its serial.
+pub const GOLDEN_1_1: &[u8] = include_bytes!("../golden/record-1.1.bin");
 
 /// Figures of a real unit, one sensor with temperature terms and one without.
 pub fn golden_record() -> CalibrationRecord {
@@ -18,9 +22,8 @@ pub fn golden_record() -> CalibrationRecord {
         coverage: 0.91,
         field_norm: None,
     };
+    let sensor = SensorIdentity { name: "Xsens MTi".parse().unwrap(), serial: "00300017".parse().unwrap() };
     CalibrationRecord {
-        sensor: SensorIdentity { name: "Xsens MTi".parse().unwrap(), serial: "00300017".parse().unwrap() },
-        date: Date::from_days(20_000),
         acc: Some(TriadRecord {
             gain: [[0.0024130, -8.23e-6, -2.242e-5], [0.0, 0.0024270, -5.153e-5], [0.0, 0.0, 0.0024118]],
             bias: [33123.838, 33275.163, 32364.494],
@@ -34,7 +37,6 @@ pub fn golden_record() -> CalibrationRecord {
             }),
             quality,
         }),
-        gyr: None,
         mag: Some(TriadRecord {
             gain: [[1.1, 0.01, 0.02], [0.01, 0.9, -0.03], [0.02, -0.03, 1.0123]],
             bias: [12.5, -40.0, 7.25],
@@ -44,11 +46,30 @@ pub fn golden_record() -> CalibrationRecord {
             temperature: None,
             quality: FitQuality { held_out_rms: None, field_norm: Some(475.0), ..quality },
         }),
+        ..CalibrationRecord::empty(sensor, Date::from_days(20_000))
     }
 }
 
-/// The same bytes, put together from the layout drawing without the library's encoder or serde.
+pub fn golden_record_1_1() -> CalibrationRecord {
+    let earlier = Provenance { serial: "".parse().unwrap(), date: Date::from_days(19_000) };
+    CalibrationRecord { provenance: [None, None, Some(earlier)], ..golden_record() }
+}
+
+/// The bytes of minor 0, put together from the layout drawing without the library's encoder or serde.
 pub fn by_hand() -> Vec<u8> {
+    framed(1, 0, &payload())
+}
+
+/// Those of minor 1.
+pub fn by_hand_1_1() -> Vec<u8> {
+    let mut payload = payload();
+    payload.extend([0, 0, 1]); // nothing of its own for accelerometer and gyroscope
+    payload.push(0); // no serial
+    payload.extend([0xB8, 0x94, 0x01]); // 19 000 days
+    framed(1, 1, &payload)
+}
+
+fn payload() -> Vec<u8> {
     let floats = |out: &mut Vec<u8>, figures: &[f32]| {
         figures.iter().for_each(|f| out.extend(f.to_le_bytes()));
     };
@@ -93,8 +114,7 @@ pub fn by_hand() -> Vec<u8> {
     floats(&mut payload, &[17.3, 0.91]);
     payload.push(1);
     floats(&mut payload, &[475.0]);
-
-    framed(1, 0, &payload)
+    payload
 }
 
 pub fn framed(major: u8, minor: u8, payload: &[u8]) -> Vec<u8> {
@@ -114,6 +134,12 @@ fn crc32(bytes: &[u8]) -> u32 {
     })
 }
 
+/// Of minor 0.
 pub fn golden_payload() -> &'static [u8] {
     &GOLDEN[8..GOLDEN.len() - 4]
+}
+
+/// Of minor 1.
+pub fn golden_payload_1_1() -> &'static [u8] {
+    &GOLDEN_1_1[8..GOLDEN_1_1.len() - 4]
 }

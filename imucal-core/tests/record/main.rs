@@ -1,16 +1,18 @@
 //! The record's format, from outside: its bytes, its versions, and what becomes of damaged ones.
 //!
-//! The golden bytes were assembled by [`golden::by_hand`] from the layout drawing in `imucal_core::record`, not by the
-//! encoder. Each version keeps its file for ever; `cargo test -p imucal-core --test record -- --ignored`
+//! The golden bytes were assembled in [`golden`] from the layout drawing in `imucal_core::record`, not by the encoder. Each version keeps its file for ever; `cargo test -p imucal-core --test record -- --ignored`
 //! writes that of a new one, and refuses to touch one that exists.
 
 mod golden;
 mod properties;
 
-use golden::{GOLDEN, by_hand, framed, golden_payload, golden_record};
+use golden::{
+    GOLDEN, GOLDEN_1_1, by_hand, by_hand_1_1, framed, golden_payload, golden_payload_1_1, golden_record,
+    golden_record_1_1,
+};
 use imucal_core::record::{
-    CalibrationRecord, Date, DecodeError, Defect, EncodeError, Figures, FitQuality, MAX_LEN, RawUnit, Sensor,
-    SensorIdentity, TriadRecord, VERSION, decode, encode,
+    CalibrationRecord, Date, DecodeError, Defect, EncodeError, Figures, FitQuality, MAX_LEN, Match,
+    Provenance, RawUnit, Sensor, SensorIdentity, TriadRecord, VERSION, decode, encode,
 };
 
 #[test]
@@ -19,18 +21,21 @@ fn write_golden_bytes() {
     use std::io::Write;
     let path = format!("{}/tests/golden/record-{}.{}.bin", env!("CARGO_MANIFEST_DIR"), VERSION.0, VERSION.1);
     let mut file = std::fs::File::create_new(path).expect("golden bytes exist and are never written again");
-    file.write_all(&by_hand()).unwrap();
+    file.write_all(&by_hand_1_1()).unwrap();
 }
 
 #[test]
 fn the_golden_bytes_are_those_of_the_layout_drawing() {
     assert_eq!(GOLDEN, by_hand());
+    assert_eq!(GOLDEN_1_1, by_hand_1_1());
 }
 
 #[test]
 fn the_golden_bytes_are_read_and_written_unchanged() {
     assert_eq!(decode(GOLDEN), Ok(golden_record()));
     assert_eq!(encode(&golden_record(), &mut [0; MAX_LEN]), Ok(GOLDEN));
+    assert_eq!(decode(GOLDEN_1_1), Ok(golden_record_1_1()));
+    assert_eq!(encode(&golden_record_1_1(), &mut [0; MAX_LEN]), Ok(GOLDEN_1_1));
 }
 
 #[test]
@@ -82,18 +87,21 @@ fn another_major_is_refused_even_if_intact() {
 
 #[test]
 fn a_newer_minor_with_appended_fields_is_read() {
-    let mut payload = golden_payload().to_vec();
+    let mut payload = golden_payload_1_1().to_vec();
     payload.extend([1, 2, 3, 4, 5]);
     payload.resize(3000, 0x55);
-    assert_eq!(decode(&framed(1, VERSION.1 + 1, &payload)), Ok(golden_record()));
-    assert_eq!(decode(&framed(1, 255, golden_payload())), Ok(golden_record()));
+    assert_eq!(decode(&framed(1, VERSION.1 + 1, &payload)), Ok(golden_record_1_1()));
+    assert_eq!(decode(&framed(1, 255, golden_payload_1_1())), Ok(golden_record_1_1()));
 }
 
 #[test]
-fn bytes_after_the_last_field_of_this_minor_are_a_faulty_writer() {
-    let mut payload = golden_payload().to_vec();
-    payload.push(0);
-    assert_eq!(decode(&framed(1, VERSION.1, &payload)), Err(DecodeError::Malformed));
+fn bytes_after_the_last_field_of_a_minor_are_a_faulty_writer() {
+    for (minor, payload) in [(0, golden_payload()), (1, golden_payload_1_1())] {
+        let payload = [payload, &[0]].concat();
+        assert_eq!(decode(&framed(1, minor, &payload)), Err(DecodeError::Malformed));
+    }
+    // What minor 1 appends is missing.
+    assert_eq!(decode(&framed(1, 1, golden_payload())), Err(DecodeError::Malformed));
 }
 
 #[test]
@@ -135,13 +143,13 @@ fn figures_that_are_not_finite_are_refused_both_ways() {
         |acc| acc.temperature.as_mut().unwrap().reference = f32::NAN,
         temperature,
         &[f32::NAN],
-        at(Figures::Temperature),
+        at(Figures::Reference),
     );
     refused_both_ways(
         |acc| acc.quality.gain_std[0][0] = f32::NEG_INFINITY,
         temperature + 28,
         &[f32::NEG_INFINITY],
-        at(Figures::Quality),
+        at(Figures::GainStd),
     );
 }
 
@@ -149,7 +157,6 @@ fn figures_that_are_not_finite_are_refused_both_ways() {
 fn a_singular_gain_is_refused_both_ways() {
     let gain = 9 + 1 + 8 + 1 + 3 + 1;
     let defect = Defect::Singular { sensor: Sensor::Accelerometer };
-    refused_both_ways(|acc| acc.gain = [[0.0; 3]; 3], gain, &[0.0; 9], defect);
     let flat = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0];
     refused_both_ways(
         |acc| acc.gain = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]],
@@ -159,28 +166,80 @@ fn a_singular_gain_is_refused_both_ways() {
     );
 }
 
+#[test]
+fn figures_that_no_sensor_has_are_refused_both_ways() {
+    let sensor = Sensor::Accelerometer;
+    let gain = 9 + 1 + 8 + 1 + 3 + 1;
+    let out = |figures, value, least, most| Defect::OutOfRange { sensor, figures, value, least, most };
+    let zero = out(Figures::Gain, 0.0, 1e-9, 1e3);
+    refused_both_ways(|acc| acc.gain = [[0.0; 3]; 3], gain, &[0.0; 9], zero);
+    let rms = gain + 48 + 2 + 3 + 1 + 28 + 48;
+    let negative = out(Figures::Rms, -1.0, 0.0, 100.0);
+    refused_both_ways(|acc| acc.quality.rms = -1.0, rms, &[-1.0], negative);
+    let coverage = rms + 4 + 1 + 4 + 3 + 4;
+    let twice = out(Figures::Coverage, 2.0, 0.0, 1.0);
+    refused_both_ways(|acc| acc.quality.coverage = 2.0, coverage, &[2.0], twice);
+}
+
+#[test]
+fn a_triad_that_is_adopted_leaves_the_others_as_they_were_made() {
+    let mut record = golden_record();
+    let unit = SensorIdentity { serial: "00300018".parse().unwrap(), ..record.sensor.clone() };
+    let gyr = TriadRecord { unit_in: RawUnit::RadianPerSecond, ..record.mag.clone().unwrap() };
+    record.adopt(Sensor::Gyroscope, &gyr, &unit, Date::from_days(20_100));
+    let (before, day) = (golden_record(), Date::from_days(20_000));
+    assert_eq!((&record.acc, &record.mag), (&before.acc, &before.mag));
+    for sensor in [Sensor::Accelerometer, Sensor::Magnetometer] {
+        assert_eq!((record.serial_of(sensor), record.date_of(sensor)), ("00300017", day));
+    }
+    let gyroscope = (record.serial_of(Sensor::Gyroscope), record.date_of(Sensor::Gyroscope));
+    assert_eq!(gyroscope, ("00300018", Date::from_days(20_100)));
+    // A triad of another unit makes the record another unit's.
+    assert!(record.made_for("00300018").is_err() && record.made_for("00300017").is_err());
+
+    // Calibrated over again, each on the same unit: nothing of its own is left.
+    for sensor in [Sensor::Accelerometer, Sensor::Magnetometer] {
+        let triad = record.triad(sensor).unwrap().clone();
+        record.adopt(sensor, &triad, &unit, Date::from_days(20_100));
+    }
+    assert_eq!(record.provenance, [const { None }; 3]);
+    assert_eq!(record.made_for("00300018"), Ok(Match::Confirmed));
+}
+
+#[test]
+fn a_triad_of_unknown_origin_keeps_the_record_unconfirmed() {
+    let record = golden_record_1_1();
+    assert_eq!(record.made_for("00300017"), Ok(Match::Unknown));
+    assert!(record.made_for("00300018").is_err());
+}
+
 /// No field could be longer.
 fn longest_record() -> CalibrationRecord {
     let golden = golden_record();
-    let triad = Some(TriadRecord {
-        model: "12345678".parse().unwrap(),
-        quality: FitQuality {
-            observations: u32::MAX,
-            held_out_rms: Some(1.0),
-            field_norm: Some(1.0),
-            ..golden.acc.as_ref().unwrap().quality
-        },
-        ..golden.acc.unwrap()
-    });
+    let triad = |unit_out| {
+        Some(TriadRecord {
+            model: "12345678".parse().unwrap(),
+            quality: FitQuality {
+                observations: u32::MAX,
+                held_out_rms: Some(1.0),
+                field_norm: Some(1.0),
+                ..golden.acc.as_ref().unwrap().quality
+            },
+            unit_out,
+            ..golden.acc.clone().unwrap()
+        })
+    };
+    let provenance = Provenance { serial: "p".repeat(32).parse().unwrap(), date: Date::from_days(u32::MAX) };
     CalibrationRecord {
         sensor: SensorIdentity {
             name: "n".repeat(32).parse().unwrap(),
             serial: "s".repeat(32).parse().unwrap(),
         },
         date: Date::from_days(u32::MAX),
-        acc: triad.clone(),
-        gyr: triad.clone(),
-        mag: triad,
+        acc: triad(RawUnit::MetrePerSecondSquared),
+        gyr: triad(RawUnit::RadianPerSecond),
+        mag: triad(RawUnit::MicroTesla),
+        provenance: [const { None }; 3].map(|_: Option<Provenance>| Some(provenance.clone())),
     }
 }
 

@@ -1,7 +1,8 @@
 //! What holds for every record and for any bytes.
 
 use imucal_core::record::{
-    CalibrationRecord, Date, FitQuality, MAX_LEN, RawUnit, SensorIdentity, TriadRecord, decode, encode,
+    CalibrationRecord, Date, FitQuality, MAX_LEN, Provenance, RawUnit, SensorIdentity, TriadRecord, decode,
+    encode,
 };
 use imucal_core::temperature::TemperatureTerms;
 use proptest::array::{uniform3, uniform9};
@@ -9,24 +10,35 @@ use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
 
-use super::golden::{GOLDEN, framed, golden_payload};
+use super::golden::{GOLDEN_1_1, framed, golden_payload_1_1};
 
-fn figure() -> impl Strategy<Value = f32> {
-    prop::num::f32::NORMAL | prop::num::f32::ZERO | prop::num::f32::SUBNORMAL
+/// Any size within ±`most`.
+fn figure(most: f32) -> impl Strategy<Value = f32> {
+    let size = (-30.0f32..0.0).prop_map(|decade| 10f32.powf(decade));
+    (size, any::<bool>()).prop_map(move |(size, minus)| if minus { -most * size } else { most * size })
 }
 
-/// Any record that can be used: gains with a dominant diagonal, every other figure whatever is finite.
-fn triad() -> impl Strategy<Value = TriadRecord> {
-    let gain = (uniform9(-0.3f32..0.3), -6i32..6).prop_map(|(skew, decade)| {
+fn positive(most: f32) -> impl Strategy<Value = f32> {
+    figure(most).prop_map(f32::abs)
+}
+
+/// Any triad that can be: gains from counts with a dominant diagonal, every other figure within its limits.
+fn triad(unit_out: RawUnit) -> impl Strategy<Value = TriadRecord> {
+    let gain = (uniform9(-0.3f32..0.3), -6i32..2).prop_map(|(skew, decade)| {
         let entry = |i: usize| (skew[i] + if i.is_multiple_of(4) { 1.0 } else { 0.0 }) * 10f32.powi(decade);
         [[entry(0), entry(1), entry(2)], [entry(3), entry(4), entry(5)], [entry(6), entry(7), entry(8)]]
     });
-    let temperature = (figure(), uniform3(figure()), uniform3(figure())).prop_map(
+    let temperature = (-40f32..125.0, uniform3(figure(1e5)), uniform3(figure(0.01))).prop_map(
         |(reference, bias_slope, scale_slope)| TemperatureTerms { reference, bias_slope, scale_slope },
     );
     let quality = (
-        (uniform3(uniform3(figure())), uniform3(figure()), figure(), option::of(figure())),
-        (any::<u32>(), any::<u8>(), figure(), figure(), option::of(figure())),
+        (
+            uniform3(uniform3(positive(1e-7))),
+            uniform3(positive(1e4)),
+            positive(10.0),
+            option::of(positive(10.0)),
+        ),
+        (any::<u32>(), any::<u8>(), 1f32..1e6, 0f32..=1.0, option::of(1e-3f32..1e6)),
     )
         .prop_map(
             |(
@@ -46,12 +58,11 @@ fn triad() -> impl Strategy<Value = TriadRecord> {
                 }
             },
         );
-    let unit = || prop::sample::select(RawUnit::ALL.to_vec());
-    (gain, uniform3(figure()), unit(), unit(), "[A-Z0-9+]{0,8}", option::of(temperature), quality).prop_map(
-        |(gain, bias, unit_in, unit_out, model, temperature, quality)| TriadRecord {
+    (gain, uniform3(figure(4e9)), "[A-Z0-9+]{0,8}", option::of(temperature), quality).prop_map(
+        move |(gain, bias, model, temperature, quality)| TriadRecord {
             gain,
             bias,
-            unit_in,
+            unit_in: RawUnit::Counts,
             unit_out,
             model: model.parse().unwrap(),
             temperature,
@@ -60,11 +71,21 @@ fn triad() -> impl Strategy<Value = TriadRecord> {
     )
 }
 
+fn provenance() -> impl Strategy<Value = Provenance> {
+    ("[ -~]{0,32}", any::<u32>()).prop_map(|(serial, days)| Provenance {
+        serial: serial.parse().unwrap(),
+        date: Date::from_days(days),
+    })
+}
+
 prop_compose! {
     fn record()(name in "[ -~]{0,32}|[µΩé]{0,16}", serial in "[ -~]{0,32}", days in any::<u32>(),
-                acc in option::of(triad()), gyr in option::of(triad()), mag in option::of(triad())) -> CalibrationRecord {
+                acc in option::of(triad(RawUnit::MetrePerSecondSquared)),
+                gyr in option::of(triad(RawUnit::RadianPerSecond)),
+                mag in option::of(triad(RawUnit::MicroTesla)),
+                provenance in uniform3(option::of(provenance()))) -> CalibrationRecord {
         let sensor = SensorIdentity { name: name.parse().unwrap(), serial: serial.parse().unwrap() };
-        CalibrationRecord { sensor, date: Date::from_days(days), acc, gyr, mag }
+        CalibrationRecord { sensor, date: Date::from_days(days), acc, gyr, mag, provenance }
     }
 }
 
@@ -91,11 +112,11 @@ proptest! {
 
     /// Nearly right payloads reach further into the parser than arbitrary ones.
     #[test]
-    fn a_damaged_payload_with_a_valid_checksum_never_panics(at in 0..GOLDEN.len() - 12, byte in any::<u8>(), cut in 0..GOLDEN.len()) {
-        let mut payload = golden_payload().to_vec();
+    fn a_damaged_payload_with_a_valid_checksum_never_panics(at in 0..GOLDEN_1_1.len() - 12, byte in any::<u8>(), cut in 0..GOLDEN_1_1.len()) {
+        let mut payload = golden_payload_1_1().to_vec();
         payload[at] = byte;
         payload.truncate(cut);
-        if let Ok(record) = decode(&framed(1, 0, &payload)) {
+        if let Ok(record) = decode(&framed(1, 1, &payload)) {
             prop_assert!(encode(&record, &mut [0; MAX_LEN]).is_ok());
         }
     }

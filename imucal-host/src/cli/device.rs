@@ -8,7 +8,7 @@ use std::{
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use imucal_core::{
-    link::{FitReport, Key, VERSION},
+    link::{FitReport, Key, RecordState, VERSION},
     record::{self, Date},
 };
 
@@ -199,9 +199,9 @@ fn identify(place: &Place) -> anyhow::Result<Ending> {
         capacity.particles
     );
     say!(
-        "record {}: {:?}{}",
+        "record {}: {}{}",
         status.sequence,
-        status.record,
+        named_state(status.record),
         if status.unsaved { ", unsaved changes" } else { "" }
     );
     if let Some(stack) = status.stack {
@@ -220,6 +220,24 @@ fn unlock(place: &Place) -> anyhow::Result<Ending> {
     place.open()?.unlock()?;
     say!("unlocked: it takes changes again");
     Ok(Ending::Done)
+}
+
+/// What became of the stored record, in words.
+fn named_state(state: RecordState) -> &'static str {
+    match state {
+        RecordState::Empty => "none is stored",
+        RecordState::InUse => "in use",
+        RecordState::Unconfirmed => "in use, without a serial that confirms it",
+        RecordState::OtherSensor => "of another sensor, not in use",
+        RecordState::NewerFormat => "of a newer format, not in use; update the firmware",
+        RecordState::Unusable => "cannot be used; put another",
+        RecordState::Previous => {
+            "WARNING: a later record has lost bits in flash, the one before it is in use; put it again"
+        }
+        RecordState::Lost => {
+            "WARNING: the stored record has lost bits in flash, none is in use; put it again"
+        }
+    }
 }
 
 fn named(text: &str) -> &str {

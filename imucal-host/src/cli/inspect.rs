@@ -31,9 +31,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         }
     };
     say!("{}: intact", arguments.calibration.display());
-    let or_unknown = |text: &str| {
-        if text.is_empty() { "unknown".to_owned() } else { text.to_owned() }
-    };
     say!("sensor {}, serial {}", or_unknown(&stored.sensor.name), or_unknown(&stored.sensor.serial));
     say!("made on {}", stored.date);
     for kind in SensorKind::ALL {
@@ -43,6 +40,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         }
     }
     Ok(Ending::Done)
+}
+
+fn or_unknown(text: &str) -> &str {
+    if text.is_empty() { "unknown" } else { text }
 }
 
 fn print_triad(kind: SensorKind, triad: &StoredTriad) -> anyhow::Result<()> {
@@ -75,5 +76,8 @@ fn print_triad(kind: SensorKind, triad: &StoredTriad) -> anyhow::Result<()> {
         rounded(triad.condition, 1),
         percent(triad.coverage)
     );
+    if let Some(own) = &triad.provenance {
+        say!("  made on {}, serial {}", own.date, or_unknown(&own.serial));
+    }
     Ok(())
 }

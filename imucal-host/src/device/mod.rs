@@ -85,7 +85,7 @@ fn of_fault(fault: &Fault) -> String {
         Fault::NoRecord => {
             "no calibration is in use for this sensor; put a record, or calibrate on board".into()
         }
-        Fault::BadRecord => "the record is damaged or cannot be used".into(),
+        Fault::BadRecord => "the record is damaged".into(),
         Fault::NewerFormat => "the record's format is newer than its firmware; update the firmware".into(),
         Fault::OtherSensor => "the record was made for a sensor of another serial".into(),
         Fault::Occupied => {
@@ -104,6 +104,14 @@ fn of_fault(fault: &Fault) -> String {
         Fault::Locked => {
             "it is locked; switch its power off and on, or unlock it with its key (`imucal device unlock`)".into()
         }
+        Fault::Implausible(defect) => {
+            format!("no sensor can have this calibration: {defect}; check its units, and calibrate again")
+        }
+        Fault::OtherUnit { sensor, expected } => format!(
+            "the calibration is not for the unit that its board puts out: {} comes in {}",
+            sensor.symbol(),
+            expected.symbol()
+        ),
         other => format!("{other:?}"),
     }
 }

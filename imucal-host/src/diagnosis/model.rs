@@ -140,6 +140,7 @@ mod tests {
             condition: 2.0,
             coverage: 1.0,
             field_norm: None,
+            provenance: None,
             temperature: None,
         }
     }

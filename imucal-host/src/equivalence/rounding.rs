@@ -129,6 +129,7 @@ mod tests {
             condition: 1.0,
             coverage: 1.0,
             field_norm: None,
+            provenance: None,
             temperature,
         }
     }

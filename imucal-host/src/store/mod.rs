@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use imucal_core::record::{self, DecodeError, EncodeError};
+use imucal_core::record::{self, DecodeError, Defect, EncodeError};
 use serde::{Deserialize, Serialize};
 
 pub mod form;
@@ -89,9 +89,24 @@ pub struct StoredTriad {
     /// Length of the field where it was not known beforehand, `unit_in`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_norm: Option<f64>,
+    /// Serial of the unit and day of the calibration, where they are not the file's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub provenance: Option<StoredProvenance>,
     /// Linear temperature terms, where they were calibrated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<StoredTemperature>,
+}
+
+/// Where a triad comes from; see [`imucal_core::record::Provenance`].
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StoredProvenance {
+    /// Serial number, empty where unknown.
+    #[serde(default)]
+    pub serial: String,
+    /// Day it was made; in TOML as YYYY-MM-DD.
+    #[serde(with = "record_form::date_text")]
+    pub date: record::Date,
 }
 
 /// Linear temperature terms; see [`imucal_core::temperature`].
@@ -151,14 +166,12 @@ pub enum LoadError {
         found: String,
     },
     /// A stored figure cannot be used.
-    #[error("{path}: {sensor}: found {what}, expected figures that a device can apply; calibrate again")]
+    #[error("{path}: {defect}; correct the units of the recording, and calibrate again")]
     Unusable {
         /// The file.
         path: PathBuf,
-        /// Which sensor.
-        sensor: SensorKind,
-        /// Which figure.
-        what: &'static str,
+        /// Which figure of which sensor, and its limits.
+        defect: Defect,
     },
     /// The file is neither of the two forms.
     #[error(
@@ -274,6 +287,7 @@ impl StoredCalibration {
         } else {
             let record = record::decode(&bytes).map_err(|cause| match cause {
                 DecodeError::BadMagic => LoadError::Foreign { path: path.into() },
+                DecodeError::Unusable(defect) => LoadError::Unusable { path: path.into(), defect },
                 cause => LoadError::Record { path: path.into(), cause },
             })?;
             Ok(Self::from_record(&record))
@@ -290,11 +304,14 @@ impl StoredCalibration {
             return Err(LoadError::Format { path: path.into(), found: format });
         }
         let stored: Self = toml::from_str(text).map_err(explain)?;
-        for kind in SensorKind::ALL {
-            if let Some(what) = stored.triad(kind).and_then(StoredTriad::defect) {
-                return Err(LoadError::Unusable { path: path.into(), sensor: kind, what });
+        // Judged as the device judges it.
+        let record = stored.to_record(path).map_err(|refused| match refused {
+            SaveError::TooLong { field, text, limit, .. } => {
+                wrong(format!("{field} `{text}` is longer than {limit} bytes"))
             }
-        }
+            other => wrong(other.to_string()),
+        })?;
+        record.check().map_err(|defect| LoadError::Unusable { path: path.into(), defect })?;
         Ok(stored)
     }
 
@@ -303,6 +320,12 @@ impl StoredCalibration {
     /// # Errors
     /// [`SaveError`] names the file and why it cannot be written.
     pub fn write_toml(&self, path: &Path, files: &mut OutputSet) -> Result<(), SaveError> {
+        // The TOML keeps a serial that is too long for a record; what is judged are the figures.
+        if let Ok(record) = self.to_record(path) {
+            let refused =
+                |defect| SaveError::Encode { path: path.into(), cause: EncodeError::Unusable(defect) };
+            record.check().map_err(refused)?;
+        }
         // Serialising plain numbers and text into a string cannot fail.
         let text = toml::to_string(self).unwrap_or_default();
         Ok(files.add(path, text.as_bytes())?)
@@ -352,20 +375,8 @@ impl StoredTriad {
             condition: fit.condition,
             coverage: fit.coverage,
             field_norm: fit.field_norm,
+            provenance: None,
             temperature: None,
         }
-    }
-
-    /// What makes the triad unusable, if anything: the device holds it in `f32`.
-    fn defect(&self) -> Option<&'static str> {
-        let finite = |x: &f64| (*x as f32).is_finite();
-        let gain = nalgebra::Matrix3::from_fn(|i, j| self.gain[i][j]);
-        if !gain.iter().all(finite) {
-            return Some("an infinite gain or NaN");
-        }
-        if gain.try_inverse().is_none() {
-            return Some("a singular gain");
-        }
-        (!self.bias.iter().all(finite)).then_some("an infinite bias or NaN")
     }
 }

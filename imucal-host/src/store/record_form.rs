@@ -3,11 +3,13 @@
 use std::path::Path;
 
 use imucal_core::{
-    record::{CalibrationRecord, FitQuality, RawUnit, Sensor, SensorIdentity, TriadRecord},
+    record::{CalibrationRecord, FitQuality, Provenance, RawUnit, Sensor, SensorIdentity, TriadRecord},
     temperature::TemperatureTerms,
 };
 
-use super::{FORMAT, SaveError, StoredCalibration, StoredSensor, StoredTemperature, StoredTriad};
+use super::{
+    FORMAT, SaveError, StoredCalibration, StoredProvenance, StoredSensor, StoredTemperature, StoredTriad,
+};
 use crate::recording::{SensorKind, Unit};
 
 fn narrow<const N: usize>(values: [f64; N]) -> [f32; N] {
@@ -52,6 +54,13 @@ impl StoredCalibration {
     /// [`SaveError::TooLong`] for a name, serial or model that the record has no room for.
     pub fn to_record(&self, path: &Path) -> Result<CalibrationRecord, SaveError> {
         let triad = |stored: &Option<StoredTriad>| stored.as_ref().map(|t| t.to_record(path)).transpose();
+        let provenance = |stored: &Option<StoredTriad>| {
+            let own = stored.as_ref().and_then(|t| t.provenance.as_ref());
+            own.map(|own| {
+                Ok::<_, SaveError>(Provenance { serial: text(path, "serial", &own.serial)?, date: own.date })
+            })
+            .transpose()
+        };
         Ok(CalibrationRecord {
             sensor: SensorIdentity {
                 name: text(path, "sensor name", &self.sensor.name)?,
@@ -61,12 +70,18 @@ impl StoredCalibration {
             acc: triad(&self.acc)?,
             gyr: triad(&self.gyr)?,
             mag: triad(&self.mag)?,
+            provenance: [provenance(&self.acc)?, provenance(&self.gyr)?, provenance(&self.mag)?],
         })
     }
 
     /// What a record holds.
     pub fn from_record(record: &CalibrationRecord) -> Self {
-        let triad = |t: &Option<TriadRecord>| t.as_ref().map(StoredTriad::from_record);
+        let [acc, gyr, mag] = Sensor::ALL.map(|sensor| {
+            let own = record.provenance[sensor as usize].as_ref();
+            let provenance =
+                own.map(|own| StoredProvenance { serial: own.serial.as_str().into(), date: own.date });
+            record.triad(sensor).map(|triad| StoredTriad { provenance, ..StoredTriad::from_record(triad) })
+        });
         Self {
             format: FORMAT.into(),
             recording: String::new(),
@@ -75,9 +90,9 @@ impl StoredCalibration {
                 name: record.sensor.name.as_str().into(),
                 serial: record.sensor.serial.as_str().into(),
             },
-            acc: triad(&record.acc),
-            gyr: triad(&record.gyr),
-            mag: triad(&record.mag),
+            acc,
+            gyr,
+            mag,
         }
     }
 }
@@ -127,6 +142,7 @@ impl StoredTriad {
             condition: quality.condition.into(),
             coverage: quality.coverage.into(),
             field_norm: quality.field_norm.map(f64::from),
+            provenance: None,
             temperature: record.temperature.as_ref().map(|t| StoredTemperature {
                 reference: t.reference.into(),
                 bias_slope: widen(t.bias_slope),
@@ -192,6 +208,7 @@ mod tests {
                 condition: 16.0,
                 coverage: 0.875,
                 field_norm: None,
+                provenance: Some(StoredProvenance { serial: String::new(), date: Date::from_days(20_000) }),
                 temperature: None,
             }),
             gyr: None,

@@ -4,6 +4,7 @@ use core::sync::atomic::{Ordering, compiler_fence};
 
 use bmi160::{AccelerometerPowerMode, Bmi160, GyroscopePowerMode, SlaveAddr};
 use firmware_example::board::{Sample, SampleSource};
+use imucal_core::record::RawUnit;
 use nrf52840_hal::{
     Timer, Twim,
     pac::{Peripherals, TIMER0, TWIM0},
@@ -104,5 +105,9 @@ impl SampleSource for Imu {
             [0, 1, 2].map(|k| words.get(first + k).map_or(0.0, |word| f32::from(i16::from_le_bytes(*word))))
         };
         Some(Sample { raw: [Some(counts(3)), Some(counts(0)), None], temperature: f32::NAN })
+    }
+
+    fn units(&self) -> [Option<RawUnit>; 3] {
+        [Some(RawUnit::Counts), Some(RawUnit::Counts), None]
     }
 }

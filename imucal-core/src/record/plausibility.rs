@@ -1,0 +1,360 @@
+//! What a calibrated sensor can be, wide of every sensor that is built and of every fit that is accepted: what lies
+//! outside is a mistake of units, of a writer, or of memory.
+//!
+//! | figure | limits |
+//! | --- | --- |
+//! | length of a column of the gain, both units known or alike | 1/3 to 3 times what the units say |
+//! | the same, counts or no unit on one side | 1e-9 to 1e3 and 1e-9 to 1e9 |
+//! | longest column against the shortest | 9 |
+//! | bias, its standard error, the field's magnitude, rms residual | 100 m/s², 10 rad/s, 10 mT; 2³² counts |
+//! | rms residual of a gyroscope's fit, an angle | 10 rad |
+//! | bias slope, scale slope | a hundredth of the bias' limit, 0.01, per kelvin |
+//! | reference temperature | −100 to 250 °C |
+//! | standard error of a gain's entry | the gain's longest column |
+//! | condition, coverage | at least 1; 0 to 1 |
+//!
+//! A factor of 3: accepted fits lie within 2 ([`crate::accept::Limits`]), and of the units that are taken for one
+//! another the nearest, g and m/s², lie 9.8 apart. The biases are some ten times the worst of data sheets (±10 % of
+//! full scale of a high-g accelerometer, null of a rate table's gyroscope, a magnetometer's whole range).
+
+use super::{Defect, Figures, FitQuality, RawUnit, Sensor, TriadRecord};
+use crate::temperature::TemperatureTerms;
+
+/// Factor about the nominal gain.
+const NOMINAL: f32 = 3.0;
+/// Longest column of a gain against the shortest.
+const AXIS_RATIO: f32 = NOMINAL * NOMINAL;
+/// Limits of a gain from counts.
+const FROM_COUNTS: (f32, f32) = (1e-9, 1e3);
+/// Limits of a gain where nothing is known of the units.
+const ANY: (f32, f32) = (1e-9, 1e9);
+/// Most that a value without a scale can be: the range of a 32-bit converter.
+const LARGEST_COUNT: f32 = 4_294_967_296.0;
+/// Change of temperature that a slope must bear, K.
+const WARMTH: f32 = 100.0;
+/// Most that a scale grows a kelvin.
+const SCALE_SLOPE: f32 = 0.01;
+/// °C.
+const REFERENCE: (f32, f32) = (-100.0, 250.0);
+/// A condition of exactly one may have been rounded down.
+const CONDITION: f32 = 0.999;
+
+/// Most that a sensor's bias can be: m/s², rad/s, µT.
+fn largest(sensor: Sensor) -> f32 {
+    match sensor {
+        Sensor::Accelerometer => 100.0,
+        Sensor::Gyroscope => 10.0,
+        Sensor::Magnetometer => 1e4,
+    }
+}
+
+/// The sensor that a unit is of and its size, m/s², rad/s or µT; `None` for a unit without a scale.
+///
+/// To four digits, which is plenty to judge by: nothing is converted by it.
+fn scale(unit: RawUnit) -> Option<(Sensor, f32)> {
+    Some(match unit {
+        RawUnit::MetrePerSecondSquared => (Sensor::Accelerometer, 1.0),
+        RawUnit::StandardGravity => (Sensor::Accelerometer, 9.807),
+        RawUnit::MilliGravity => (Sensor::Accelerometer, 9.807e-3),
+        RawUnit::RadianPerSecond => (Sensor::Gyroscope, 1.0),
+        RawUnit::DegreePerSecond => (Sensor::Gyroscope, 0.017_45),
+        RawUnit::MicroTesla => (Sensor::Magnetometer, 1.0),
+        RawUnit::MilliGauss => (Sensor::Magnetometer, 0.1),
+        RawUnit::Gauss => (Sensor::Magnetometer, 100.0),
+        RawUnit::NanoTesla => (Sensor::Magnetometer, 1e-3),
+        RawUnit::Counts | RawUnit::Arbitrary => return None,
+    })
+}
+
+/// Most that a value of a sensor in a unit can be.
+#[inline(never)]
+fn most(sensor: Sensor, unit: RawUnit) -> f32 {
+    scale(unit).map_or(LARGEST_COUNT, |(_, size)| largest(sensor) / size)
+}
+
+/// Limits of a column's length.
+fn gain_limits(from: RawUnit, to: RawUnit) -> (f32, f32) {
+    let nominal = match (scale(from), scale(to)) {
+        _ if from == to => 1.0,
+        (Some((_, from)), Some((_, to))) => from / to,
+        (None, Some(_)) if from == RawUnit::Counts => return FROM_COUNTS,
+        _ => return ANY,
+    };
+    (nominal / NOMINAL, nominal * NOMINAL)
+}
+
+/// Checks the figures of one sensor, and keeps the first defect: a result of each check would double the code.
+struct Check {
+    sensor: Sensor,
+    found: Option<Defect>,
+}
+
+impl Check {
+    /// Every value is finite and within the limits.
+    #[inline(never)]
+    fn within(&mut self, figures: Figures, values: &[f32], least: f32, most: f32) {
+        let sensor = self.sensor;
+        for value in values.iter().copied() {
+            if self.found.is_some() {
+                return;
+            }
+            if !value.is_finite() {
+                self.found = Some(Defect::NotFinite { sensor, figures });
+            } else if value < least || value > most {
+                self.found = Some(Defect::OutOfRange { sensor, figures, value, least, most });
+            }
+        }
+    }
+
+    /// Keeps the defect, if it is the first.
+    fn unless(&mut self, holds: bool, defect: Defect) {
+        if !holds && self.found.is_none() {
+            self.found = Some(defect);
+        }
+    }
+
+    /// The unit is one of the sensor's.
+    #[inline(never)]
+    fn unit(&mut self, unit: RawUnit) {
+        let own = match scale(unit) {
+            Some((sensor, _)) => sensor == self.sensor,
+            None => unit == RawUnit::Counts || self.sensor == Sensor::Magnetometer,
+        };
+        self.unless(own, Defect::ForeignUnit { sensor: self.sensor, unit });
+    }
+
+    /// Lengths of the gain's columns; gives the longest.
+    fn gain(&mut self, triad: &TriadRecord) -> f32 {
+        self.within(Figures::Gain, triad.gain.as_flattened(), f32::MIN, f32::MAX);
+        let (least, most) = gain_limits(triad.unit_in, triad.unit_out);
+        let (mut shortest, mut longest) = (f32::MAX, 0f32);
+        let computed = triad.triad::<f32>();
+        for column in computed.gain.column_iter() {
+            let length = libm::sqrtf(column.norm_squared());
+            self.within(Figures::Gain, &[length], least, most);
+            shortest = if length < shortest { length } else { shortest };
+            longest = if length > longest { length } else { longest };
+        }
+        self.within(Figures::AxisRatio, &[longest / shortest], CONDITION, AXIS_RATIO);
+        self.unless(!computed.is_singular(), Defect::Singular { sensor: self.sensor });
+        longest
+    }
+
+    fn temperature(&mut self, terms: &TemperatureTerms<f32>, bias: f32) {
+        let slope = bias / WARMTH;
+        self.within(Figures::Reference, &[terms.reference], REFERENCE.0, REFERENCE.1);
+        self.within(Figures::BiasSlope, &terms.bias_slope, -slope, slope);
+        self.within(Figures::ScaleSlope, &terms.scale_slope, -SCALE_SLOPE, SCALE_SLOPE);
+    }
+
+    fn quality(&mut self, quality: &FitQuality, gain: f32, bias: f32, rms: f32) {
+        self.within(Figures::GainStd, quality.gain_std.as_flattened(), 0.0, gain);
+        self.within(Figures::BiasStd, &quality.bias_std, 0.0, bias);
+        self.within(Figures::Rms, &[quality.rms], 0.0, rms);
+        self.within(Figures::HeldOutRms, quality.held_out_rms.as_slice(), 0.0, rms);
+        self.within(Figures::Condition, &[quality.condition], CONDITION, f32::MAX);
+        self.within(Figures::Coverage, &[quality.coverage], 0.0, 1.0);
+        self.within(Figures::FieldNorm, quality.field_norm.as_slice(), f32::MIN_POSITIVE, bias);
+    }
+}
+
+impl TriadRecord {
+    /// Can the triad be a calibration of that sensor? The one check of records that are stored, loaded or written,
+    /// and of fits that are adopted.
+    ///
+    /// # Errors
+    ///
+    /// The first [`Defect`].
+    #[inline(never)]
+    pub fn check(&self, sensor: Sensor) -> Result<(), Defect> {
+        let mut check = Check { sensor, found: None };
+        check.unit(self.unit_in);
+        check.unit(self.unit_out);
+        let gain = check.gain(self);
+        let bias = most(sensor, self.unit_in);
+        check.within(Figures::Bias, &self.bias, -bias, bias);
+        if let Some(terms) = &self.temperature {
+            check.temperature(terms, bias);
+        }
+        let rms = match sensor {
+            // An angle, whatever the unit of the calibrated rate.
+            Sensor::Gyroscope => largest(sensor),
+            _ => most(sensor, self.unit_out),
+        };
+        check.quality(&self.quality, gain, bias, rms);
+        check.found.map_or(Ok(()), Err)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    /// A fit as it is accepted.
+    fn triad(unit_in: RawUnit, unit_out: RawUnit, gain: f32) -> TriadRecord {
+        TriadRecord {
+            gain: [[gain, 0.01 * gain, 0.0], [0.0, gain, 0.0], [0.0, 0.0, 0.9 * gain]],
+            bias: [0.0; 3],
+            unit_in,
+            unit_out,
+            model: "T9".parse().unwrap(),
+            temperature: None,
+            quality: FitQuality {
+                gain_std: [[0.0; 3]; 3],
+                bias_std: [0.0; 3],
+                rms: 0.0,
+                held_out_rms: None,
+                observations: 40,
+                parameters: 9,
+                condition: 1.0,
+                coverage: 1.0,
+                field_norm: None,
+            },
+        }
+    }
+
+    /// The units of a sensor, the SI side first, and the size of each.
+    const UNITS: [(Sensor, &[(RawUnit, f64)]); 3] = [
+        (
+            Sensor::Accelerometer,
+            &[
+                (RawUnit::MetrePerSecondSquared, 1.0),
+                (RawUnit::StandardGravity, 9.80665),
+                (RawUnit::MilliGravity, 9.80665e-3),
+            ],
+        ),
+        (
+            Sensor::Gyroscope,
+            &[(RawUnit::RadianPerSecond, 1.0), (RawUnit::DegreePerSecond, core::f64::consts::PI / 180.0)],
+        ),
+        (
+            Sensor::Magnetometer,
+            &[
+                (RawUnit::MicroTesla, 1.0),
+                (RawUnit::MilliGauss, 0.1),
+                (RawUnit::Gauss, 100.0),
+                (RawUnit::NanoTesla, 1e-3),
+            ],
+        ),
+    ];
+
+    #[test]
+    fn gains_that_are_accepted_pass_in_every_unit_and_those_of_another_unit_do_not() {
+        for (sensor, units) in UNITS {
+            for (unit, size) in units {
+                let of = |gain: f64| triad(*unit, units[0].0, gain as f32).check(sensor);
+                for factor in [0.5, 1.0, 2.0] {
+                    assert_eq!(of(factor * size), Ok(()), "{unit:?}");
+                }
+                for (_, other) in units.iter().filter(|(other, _)| other != unit) {
+                    let refused = of(*other).unwrap_err();
+                    assert!(
+                        matches!(refused, Defect::OutOfRange { figures: Figures::Gain, .. }),
+                        "{refused}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_sensor_takes_its_own_units_alone() {
+        for (sensor, units) in UNITS {
+            for unit in RawUnit::ALL {
+                let own = units.iter().any(|(each, _)| *each == unit)
+                    || unit == RawUnit::Counts
+                    || (unit == RawUnit::Arbitrary && sensor == Sensor::Magnetometer);
+                let found = triad(unit, unit, 1.0).check(sensor);
+                assert_eq!(found, if own { Ok(()) } else { Err(Defect::ForeignUnit { sensor, unit }) });
+            }
+        }
+    }
+
+    #[test]
+    fn counts_of_every_converter_pass_and_a_scale_of_no_converter_does_not() {
+        let of = |gain: f32| {
+            triad(RawUnit::Counts, RawUnit::MetrePerSecondSquared, gain).check(Sensor::Accelerometer)
+        };
+        // 24 bits of ±0.2 m/s², 16 bits of ±16 g, 8 bits of ±200 g.
+        for gain in [2.4e-8, 4.8e-3, 15.3] {
+            assert_eq!(of(gain), Ok(()), "{gain}");
+        }
+        for gain in [1e-12, 1e-30, 1e5, 1e30] {
+            assert!(of(gain).is_err(), "{gain}");
+        }
+    }
+
+    #[test]
+    fn each_figure_is_held_to_its_limits_and_named_with_them() {
+        type Spoil = fn(&mut TriadRecord, f32);
+        let spoiled: [(Figures, Spoil, &[f32], &[f32]); 11] = [
+            (Figures::AxisRatio, |t, x| (t.unit_in, t.gain[1][1]) = (RawUnit::Counts, x), &[0.25], &[0.1]),
+            (Figures::Bias, |t, x| t.bias[2] = x, &[-99.0, 99.0], &[-101.0, 101.0]),
+            (Figures::Reference, |t, x| warm(t).reference = x, &[-40.0, 125.0], &[-101.0, 298.15]),
+            (Figures::BiasSlope, |t, x| warm(t).bias_slope[1] = x, &[-0.9, 0.9], &[-1.1, 1.1]),
+            (Figures::ScaleSlope, |t, x| warm(t).scale_slope[0] = x, &[-9e-3], &[-0.02, 0.02]),
+            (Figures::GainStd, |t, x| t.quality.gain_std[0][1] = x, &[0.0, 0.9], &[-1e-9, 1.1]),
+            (Figures::BiasStd, |t, x| t.quality.bias_std[0] = x, &[0.0, 99.0], &[-1e-9, 101.0]),
+            (Figures::Rms, |t, x| t.quality.rms = x, &[0.0, 99.0], &[-1e-9, 101.0]),
+            (Figures::HeldOutRms, |t, x| t.quality.held_out_rms = Some(x), &[0.0], &[-1e-9, 101.0]),
+            (Figures::Condition, |t, x| t.quality.condition = x, &[1.0, 1e6], &[-3.0, 0.0, 0.9]),
+            (Figures::Coverage, |t, x| t.quality.coverage = x, &[0.0, 1.0], &[-1e-9, 1.001]),
+        ];
+        for (figures, spoil, passing, refused) in spoiled {
+            let of = |x: f32| {
+                let mut triad = triad(RawUnit::MetrePerSecondSquared, RawUnit::MetrePerSecondSquared, 1.0);
+                spoil(&mut triad, x);
+                triad.check(Sensor::Accelerometer)
+            };
+            for x in passing {
+                assert_eq!(of(*x), Ok(()), "{figures:?} {x}");
+            }
+            for x in refused {
+                let defect = of(*x).unwrap_err();
+                assert!(
+                    matches!(defect, Defect::OutOfRange { figures: at, .. } if at == figures),
+                    "{defect}"
+                );
+                assert!(defect.to_string().contains(figures.name()), "{defect}");
+            }
+            for x in [f32::NAN, f32::INFINITY] {
+                let at = of(x).unwrap_err();
+                assert!(matches!(at, Defect::NotFinite { .. }), "{figures:?}: {at}");
+            }
+        }
+    }
+
+    fn warm(triad: &mut TriadRecord) -> &mut TemperatureTerms<f32> {
+        triad.temperature.get_or_insert(TemperatureTerms {
+            reference: 25.0,
+            bias_slope: [0.0; 3],
+            scale_slope: [0.0; 3],
+        })
+    }
+
+    #[test]
+    fn a_field_without_magnitude_is_refused_and_one_of_no_planet_too() {
+        let of = |norm| {
+            let mut triad = triad(RawUnit::MilliGauss, RawUnit::MilliGauss, 1.0);
+            triad.quality.field_norm = Some(norm);
+            triad.check(Sensor::Magnetometer)
+        };
+        assert_eq!(of(475.0), Ok(()));
+        for norm in [0.0, -475.0, 1e6] {
+            assert!(of(norm).is_err(), "{norm}");
+        }
+    }
+
+    #[test]
+    fn a_refusal_says_what_was_found_and_what_was_expected() {
+        let refused = triad(RawUnit::DegreePerSecond, RawUnit::RadianPerSecond, 1.0).check(Sensor::Gyroscope);
+        let text = refused.unwrap_err().to_string();
+        assert_eq!(text, "gyr: the gain is 1.000, expected 5.817e-3 to 5.235e-2");
+        let refused = triad(RawUnit::Counts, RawUnit::RadianPerSecond, 1e-12).check(Sensor::Gyroscope);
+        assert_eq!(
+            refused.unwrap_err().to_string(),
+            "gyr: the gain is 1.000e-12, expected 1.000e-9 to 1000.000"
+        );
+    }
+}
