@@ -104,7 +104,8 @@ fn a_million_damaged_records_and_payloads_are_read_or_refused() {
         read += bodies::records(&damaged(&mut rng, whole));
     }
     println!("{RUNS} runs, {read} records read");
-    assert!(read > RUNS / 10 && read < RUNS, "{read}");
+    // Damage that makes a figure no sensor has is refused as well.
+    assert!(read > RUNS / 25 && read < RUNS, "{read}");
 }
 
 #[test]

@@ -64,12 +64,25 @@ pub fn examine(recording: &Recording, integrity: &Integrity, calibration: &mut C
     let scene = Scene { recording, integrity, rests: &rests };
     let accelerometer_rms =
         calibration.sensor(SensorKind::Acc).and_then(SensorOutcome::passed).map(|fit| fit.rms);
+    let square = matches!(
+        calibration.sensor(SensorKind::Acc).and_then(|acc| acc.evidence.as_ref()),
+        Some(Evidence::Shell { diagonal: true, .. })
+    );
     let mut leant_on = None;
     for outcome in &mut calibration.sensors {
         if outcome.status() == Status::Refused {
             continue;
         }
-        let found = scene.suspicions(outcome, accelerometer_rms);
+        let mut found = scene.suspicions(outcome, accelerometer_rms);
+        if square && matches!(outcome.evidence, Some(Evidence::Turns(_))) {
+            // Six parameters were asked for, and what they leave out is left in the turns.
+            calibration.warnings.extend(found.drain(..).map(|found| {
+                format!(
+                    "{}: {}; with six parameters the accelerometer's axes are taken as square, which turns show",
+                    outcome.kind, found.detail
+                )
+            }));
+        }
         outcome.suspicions.extend(found);
         outcome.suspicions.extend(scene.held(outcome.kind));
         let leans = matches!(outcome.evidence, Some(Evidence::Turns(_)))
