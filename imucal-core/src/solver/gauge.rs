@@ -61,6 +61,11 @@ pub fn bit(k: usize) -> u32 {
     u32::try_from(k).ok().and_then(|k| 1u32.checked_shl(k)).unwrap_or(0)
 }
 
+/// The columns, copied: a view of one keeps its assertion on the bounds in an image.
+fn columns<T: Scalar, const P: usize>(r: &SMatrix<T, P, P>) -> impl Iterator<Item = SVector<T, P>> + Clone {
+    r.data.0.iter().map(|column| SVector::from(*column))
+}
+
 /// The column to take next, and its share.
 fn next<T: Scalar, const P: usize>(
     r: &SMatrix<T, P, P>,
@@ -69,7 +74,7 @@ fn next<T: Scalar, const P: usize>(
     class: &impl Fn(usize) -> u8,
 ) -> Option<(usize, T)> {
     let lowest = (0..P).filter(|k| pending & bit(*k) != 0).map(class).min()?;
-    let shares = r.column_iter().zip(rest.column_iter()).map(|(whole, left)| {
+    let shares = columns(r).zip(columns(rest)).map(|(whole, left)| {
         let length = whole.norm_squared().root();
         if length > T::zero() { left.norm_squared().root() / length } else { T::zero() }
     });
@@ -81,14 +86,16 @@ fn next<T: Scalar, const P: usize>(
 
 /// Takes the part along column `k` out of the pending columns. Twice, since once leaves rounding along it.
 fn take<T: Scalar, const P: usize>(rest: &mut SMatrix<T, P, P>, k: usize, pending: u32) {
-    let Some(column) = rest.column_iter().nth(k).map(|column| column.into_owned()) else { return };
+    let Some(column) = columns(rest).nth(k) else { return };
     let direction = column / column.norm_squared().root();
-    for (index, mut other) in rest.column_iter_mut().enumerate() {
+    for (index, other) in rest.data.0.iter_mut().enumerate() {
         if pending & bit(index) != 0 {
+            let mut left = SVector::from(*other);
             for _ in 0..2 {
-                let part = direction.dot(&other);
-                other -= direction * part;
+                let part = direction.dot(&left);
+                left -= direction * part;
             }
+            *other = left.into();
         }
     }
 }
@@ -96,8 +103,8 @@ fn take<T: Scalar, const P: usize>(rest: &mut SMatrix<T, P, P>, k: usize, pendin
 /// The other column with the largest cosine against column `k`.
 fn most_alike<T: Scalar, const P: usize>(r: &SMatrix<T, P, P>, k: usize) -> Option<u8> {
     let mut best = (T::zero(), None);
-    let own = r.column_iter().nth(k)?;
-    for (index, other) in r.column_iter().enumerate().filter(|(index, _)| *index != k) {
+    let own = columns(r).nth(k)?;
+    for (index, other) in columns(r).enumerate().filter(|(index, _)| *index != k) {
         let reach = (own.norm_squared() * other.norm_squared()).root();
         if reach > T::zero() {
             let cosine = (own.dot(&other) / reach).abs();
