@@ -21,8 +21,9 @@ fn every_image_links_without_panic_or_allocator_and_finds_its_answer_right() {
         return;
     }
     for board in BOARDS {
-        for image in ["gate", "correct", "empty", "cost"] {
-            let output = run(board, image);
+        // With the key, so that the gate reaches the seals as well.
+        for (image, features) in [("gate", &["key"][..]), ("correct", &[]), ("empty", &[]), ("cost", &[])] {
+            let output = run_with(board, image, features);
             assert_eq!(output.status.code(), Some(0), "{image} on {}: {output:?}", board.core);
         }
         build(board, "coprocessor", &[]).unwrap_or_else(|refusal| panic!("{refusal}"));
@@ -35,7 +36,8 @@ fn a_deliberate_panic_does_not_link() {
         return;
     }
     for board in BOARDS {
-        let refusal = build(board, "gate", &["control-panic"]).expect_err("the gate lets a panic through");
+        let refusal =
+            build(board, "gate", &["control-panic", "key"]).expect_err("the gate lets a panic through");
         assert!(
             refusal.contains("undefined symbol: imucal_a_panic_path_is_left"),
             "it failed for another reason:\n{refusal}"

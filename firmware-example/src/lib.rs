@@ -7,7 +7,7 @@
 //! | image | does |
 //! | --- | --- |
 //! | `replay` | reads the record, corrects the samples, prints the bits; on a host it prints the host's |
-//! | `gate` | calls everything a device may want of the core |
+//! | `gate` | calls every public function of the core |
 //! | `correct` | reads the record and corrects a sample: the least a device does |
 //! | `fit` | fits every model to simulated sets, judges the fits and writes records, prints the bits as `replay` does |
 //! | `fits` | reads a record, corrects, fits every model and packs a record, without text: what that takes of flash |
@@ -42,6 +42,7 @@ mod soft_float;
 #[cfg(target_os = "none")]
 pub mod stack;
 pub mod storage;
+pub mod surface;
 
 /// A record as it would lie in flash: the golden bytes of the format's version 1.0.
 pub static RECORD: &[u8] = include_bytes!("../../imucal-core/tests/golden/record-1.0.bin");

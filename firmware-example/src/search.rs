@@ -30,7 +30,8 @@ const SAMPLES: u16 = 5;
 const INTERVAL: f32 = 0.02;
 
 /// The generator that a caller brings along: the linear congruential one of *Numerical Recipes*.
-struct Draws(u32);
+#[derive(Clone, Copy, Debug)]
+pub struct Draws(pub u32);
 
 impl TryRng for Draws {
     type Error = Infallible;

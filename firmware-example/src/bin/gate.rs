@@ -1,4 +1,4 @@
-//! Calls everything a device may want of the core, so that the link proves it free of panics and of an allocator.
+//! Calls every public function of the core, so that the link proves it free of panics and of an allocator.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -12,7 +12,7 @@ fn main() -> ! {
 #[cfg(target_os = "none")]
 fn runs() -> bool {
     use core::hint::black_box;
-    use firmware_example::{RECORD, correct, search};
+    use firmware_example::{RECORD, correct, search, surface};
     use imucal_core::{corrector::Compensator, record};
     use nalgebra::Vector3;
 
@@ -30,6 +30,8 @@ fn runs() -> bool {
     if !search::gyroscope(black_box(3)) {
         return false;
     }
+
+    surface::reach_all();
 
     let mut page = [0xFF; record::MAX_LEN];
     record::decode(black_box(RECORD))

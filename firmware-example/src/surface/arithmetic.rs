@@ -1,0 +1,98 @@
+//! Numbers, rotations, triads, temperature and the corrector.
+
+use imucal_core::{
+    corrector,
+    record::{self, Sensor},
+    rotation,
+    scalar::Scalar,
+    temperature::{self, TemperatureTerms},
+    triad::{self, Triad},
+};
+use nalgebra::{Matrix3, Quaternion, Vector3};
+
+use crate::{RECORD, scene};
+
+#[inline(never)]
+pub(super) fn reach_all() {
+    numbers();
+    rotations();
+    triads();
+    warmth();
+    corrections();
+}
+
+#[inline(never)]
+fn numbers() {
+    reach!(f32::of(0.1));
+    reach!(f32::whole(3));
+    reach!(f32::wide(0.1));
+    reach!(f32::root(2.0));
+    reach!(f32::finite(2.0));
+    reach!(f32::same(2.0, 3.0));
+    reach!(f64::of(0.1));
+    reach!(f64::whole(3));
+    reach!(f64::wide(0.1));
+    reach!(f64::root(2.0));
+    reach!(f64::finite(2.0));
+    reach!(f64::same(2.0, 3.0));
+}
+
+#[inline(never)]
+fn rotations() {
+    let phi = Vector3::new(0.1f32, -0.2, 1.3);
+    let mut c: Matrix3<f32> = reach!(rotation::exp(&phi));
+    reach!(rotation::exp_with_jacobian(&phi));
+    reach!(rotation::cross_matrix(&phi));
+    reach!(rotation::image(&c, &phi));
+    reach!(rotation::product(&c, &c));
+    reach!(rotation::sin_cos(0.3f32));
+    reach!(rotation::turn(&mut c, &phi));
+    let q: Quaternion<f32> = reach!(rotation::quaternion(&c));
+    reach!(rotation::quaternion_log(&q));
+    reach!(rotation::matrix(&q));
+    reach!(rotation::log(&c));
+    reach!(rotation::inverse_left_jacobian(&phi));
+}
+
+#[inline(never)]
+fn triads() {
+    let (truth, raw) = (scene::gyroscope().truth, Vector3::new(1.0f32, 2.0, 3.0));
+    let none: Triad<f32> = reach!(triad::Triad::identity());
+    reach!(triad::Triad::correct(&none, &raw));
+    reach!(triad::Triad::predict(&truth, &raw));
+    reach!(triad::Triad::sensitivity(&truth));
+    reach!(triad::Triad::in_unit(&truth, 32_768.0, 415.0));
+    reach!(triad::Triad::is_singular(&truth));
+    reach!(triad::Triad::is_finite(&truth));
+}
+
+fn terms() -> TemperatureTerms<f32> {
+    TemperatureTerms { reference: 25.0, bias_slope: [1e-3, -2e-3, 5e-4], scale_slope: [1e-5, 2e-5, -1e-5] }
+}
+
+#[inline(never)]
+fn warmth() {
+    let (terms, truth, raw) = (terms(), scene::gyroscope().truth, Vector3::new(1.0f32, 2.0, 3.0));
+    reach!(temperature::TemperatureTerms::correct(&terms, &truth, &raw, 31.0));
+    let warm = reach!(temperature::TemperatureTerms::at(&terms, &truth, 31.0));
+    reach!(temperature::TemperatureTerms::predict(&terms, &truth, &raw, 31.0));
+    reach!(temperature::TemperatureTerms::is_finite(&terms));
+    let _wide: TemperatureTerms<f64> = reach!(temperature::TemperatureTerms::cast(&terms));
+    reach!(temperature::Warmth::none(&truth));
+    reach!(temperature::Warmth::correct(&warm, &truth, &raw));
+}
+
+#[inline(never)]
+fn corrections() {
+    let raw = Vector3::new(1.0f32, 2.0, 3.0);
+    let fixed = reach!(corrector::Corrector::new(scene::gyroscope().truth, Some(terms())));
+    reach!(corrector::Corrector::apply(&fixed, &raw));
+    reach!(corrector::Corrector::apply_at(&fixed, &raw, 31.0));
+    let mut following = reach!(corrector::Compensator::new(fixed));
+    reach!(corrector::Compensator::apply_at(&mut following, &raw, 31.0));
+    if let Ok(record) = record::decode(RECORD)
+        && let Some(triad) = record.triad(Sensor::Accelerometer)
+    {
+        let _fixed: corrector::Corrector<f32> = reach!(corrector::Corrector::from(triad));
+    }
+}
