@@ -3,7 +3,7 @@
 use core::fmt::Display;
 
 use imucal_core::record::{
-    self, CalibrationRecord, DecodeError, Defect, EncodeError, Figures, MAX_LEN, RawUnit, Sensor, WrongSensor,
+    self, CalibrationRecord, Defect, EncodeError, Figures, MAX_LEN, RawUnit, Sensor, TriadRecord, WrongSensor,
 };
 
 use super::write;
@@ -29,8 +29,19 @@ fn whole(record: &CalibrationRecord) {
     let _triad = reach!(record::CalibrationRecord::triad(record, Sensor::Magnetometer));
     for (sensor, triad) in reach!(record::CalibrationRecord::triads(record)) {
         reach!(record::Sensor::symbol(sensor));
+        let _usable = reach!(record::TriadRecord::check(triad, sensor));
+        reach!(record::CalibrationRecord::serial_of(record, sensor));
+        reach!(record::CalibrationRecord::date_of(record, sensor));
+        adopt(record, sensor, triad);
         let _triad: imucal_core::triad::Triad<f32> = reach!(record::TriadRecord::triad(triad));
     }
+}
+
+#[inline(never)]
+fn adopt(record: &CalibrationRecord, sensor: Sensor, triad: &TriadRecord) {
+    let mut record = record.clone();
+    let (unit, date) = (record.sensor.clone(), record.date);
+    reach!(record::CalibrationRecord::adopt(&mut record, sensor, triad, &unit, date));
 }
 
 #[inline(never)]
@@ -52,13 +63,12 @@ fn units() {
 
 #[inline(never)]
 fn refusals() {
-    let figures = Figures::Quality;
+    let figures = Figures::Gain;
     let defect = Defect::NotFinite { sensor: Sensor::Gyroscope, figures };
-    write(|f| reach!(record::Defect::fmt(&defect, f)));
+    reach!(record::Defect::sensor(&defect));
+    reach!(record::Figures::name(figures));
     let short = EncodeError::BufferTooSmall { have: 1, need: 2 };
     write(|f| reach!(record::EncodeError::fmt(&short, f)));
-    let damaged = DecodeError::BadCrc { stored: 1, computed: 2 };
-    write(|f| reach!(record::DecodeError::fmt(&damaged, f)));
     let wrong = WrongSensor { recorded: "a", connected: "b" };
     write(|f| reach!(record::WrongSensor::fmt(&wrong, f)));
 }

@@ -65,10 +65,13 @@ fn judged(fit: &LevenbergMarquardt<f32, 9>, shell: &NormModel<'_, f32, 9>) {
     reach!(solver::report::Termination::name(Termination::Stalled));
     let coverage = Coverage { observations: 20, share: 0.5f32, flatness: 0.1, distinct: 12 };
     let bend = reach!(accept::nonlinearity(fit, shell, 1.0f32));
+    let triad: Triad<f32> = Triad::identity();
+    let error = reach!(accept::relative_error(&triad.gain, &triad, 1.0f32));
     let verdicts = [
         reach!(accept::check_observations(&coverage, 9, &limits)),
-        reach!(accept::check_report(&report, &limits)),
-        reach!(accept::check_nonlinearity(bend, &limits)),
+        reach!(accept::check_report(&report)),
+        reach!(accept::check_precision(error, &limits)),
+        reach!(accept::check_nonlinearity(bend, error, &limits)),
         reach!(accept::check_plausibility(&Triad::identity(), true, 0.01f32, &limits)),
         reach!(accept::check_residual(0.01f32, &limits)),
     ];
