@@ -168,7 +168,9 @@ fn a_recording_without_enough_rests_still_gives_its_magnetometer() {
     let Some(calibration) = calibrated("broad-01-undisturbed.csv.gz", &field) else { return };
     assert_eq!(refusal(&calibration, SensorKind::Acc).reason(), "too-few-observations");
     assert_eq!(refusal(&calibration, SensorKind::Gyr).reason(), "too-few-observations");
-    let triad = accepted(&calibration, SensorKind::Mag).raw_triad();
+    // A norm alone: that the field differs from place to place in the room leaves a residual that follows direction.
+    let mag = calibration.sensor(SensorKind::Mag).expect("a magnetometer");
+    let triad = mag.passed().expect("accepted or suspect").raw_triad();
     // Calibrated at the factory: offsets below 1 µT of 50, axes within 3 %.
     assert!(
         triad.bias.norm() < 1.0 && (triad.gain.diagonal() - Vector3::repeat(1.0)).amax() < 0.03,

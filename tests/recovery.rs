@@ -105,7 +105,8 @@ fn errors_of_thirty_recordings_are_as_large_as_their_standard_errors() {
     println!("pooled: {mean:.3}, {std:.3} of {}", pooled.len());
     assert_eq!(pooled.len(), 30 * (9 + 12 + 12), "every parameter of every recording");
     // A thousand scores, hardly correlated from recording to recording: their mean is known to about 0.05 and their
-    // spread to about 0.04. A variance estimated from 21 degrees of freedom widens the accelerometer's by 5 %.
+    // spread to about 0.04. A variance estimated from 21 degrees of freedom widens the accelerometer's by 5 %, and drift
+    // that these minutes of white noise cannot exclude widens the biases' by a third.
     assert!(mean.abs() < 0.15, "{mean}");
-    assert!((std - 1.0).abs() < 0.15, "{std}");
+    assert!((0.75..1.1).contains(&std), "{std}");
 }

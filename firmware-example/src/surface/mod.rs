@@ -2,8 +2,9 @@
 //!
 //! A function that no image calls is in none, and its panic paths with it. `tests/surface.rs` reads the core's
 //! sources and these, and fails where a public function is not reached here. In `f32`, as a device computes; generic
-//! functions are those of some model, which stand for the others. Texts with decimals are left out, those of `Refusal`, `Defect` and `DecodeError`: the compiler's
-//! library keeps panic paths where it writes a number with decimals, so a device names the reason instead.
+//! functions are those of some model, which stand for the others. The texts of `Refusal`, `Defect`, `EncodeError` and
+//! `DecodeError` are left out: the compiler's library keeps panic paths where it writes a number with decimals, so a
+//! device names the reason instead.
 
 use core::fmt::{self, Write};
 
