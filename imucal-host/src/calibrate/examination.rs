@@ -38,7 +38,7 @@ use crate::{
 
 /// Probability that a sensor with white noise is suspected by score tests.
 pub const CHANCE: f64 = 5e-4;
-/// Probability that 1/f noise as strong as [`SLOWER`] exceeds what rests say.
+/// Probability that 1/f noise as strong as `SLOWER` exceeds what rests say.
 pub const CHANCE_OF_EXCESS: f64 = 5e-3;
 /// Standard errors by which an entry moves where it matters.
 pub const MATERIAL: f64 = 2.5;

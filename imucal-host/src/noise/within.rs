@@ -6,7 +6,7 @@
 //!
 //! | symbol | meaning |
 //! | --- | --- |
-//! | ȳ | means over τ = 0.5 s in succession ([`white`](super::white)) |
+//! | ȳ | means over τ = 0.5 s in succession ([`white`]) |
 //! | μ | mean of the rest: any |
 //! | S | density of the white noise: any |
 //! | r | variance of each of the Gauss–Markov processes that 1/f noise is the sum of, over S, 1/s |
@@ -14,7 +14,7 @@
 //!
 //! A fit has few residuals, a rest has many samples: where noise is 1/f, what it does within seconds tells how far it goes
 //! in minutes. Likelihood: restricted, μ and S integrated out (Patterson & Thompson 1971). Not modelled: drift that begins
-//! beyond a rest's length; a share of the prior is kept for that ([`KEPT`]).
+//! beyond a rest's length; a share of the prior is kept for that (`KEPT`).
 
 use std::{collections::BTreeMap, ops::Range};
 
