@@ -1,6 +1,9 @@
 //! The emulated co-processor at the end of its UART, through the program and through its library.
 
-use std::path::PathBuf;
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant},
+};
 
 use imucal_core::{link::FitModel, record::Date};
 use imucal_host::recording::Recording;
@@ -31,6 +34,31 @@ fn both_boards_fit_store_and_correct_as_this_machine_does() {
         assert_eq!(session.store_record(false).unwrap_or_else(|error| panic!("{error}")), 1);
         let stored = session.record().unwrap_or_else(|error| panic!("{error}")).expect("stored");
         assert!(imucal_core::record::decode(&stored).is_ok_and(|record| record.acc.is_some()));
+    }
+}
+
+#[test]
+fn uptime_goes_on_while_nothing_comes() {
+    if !ready() {
+        return;
+    }
+    // Rounds of the timers that would be missed: of 24 bits, four or more.
+    let idle = Duration::from_secs(3);
+    let mut sessions = BOARDS.map(|board| session(board, None));
+    let mut uptime = || {
+        let asked = Instant::now();
+        let all = sessions.each_mut().map(|session| {
+            let status = session.status().unwrap_or_else(|error| panic!("{error}"));
+            Duration::from_millis(status.uptime.into())
+        });
+        (asked, all)
+    };
+    let (before, first) = uptime();
+    std::thread::sleep(idle);
+    let (after, second) = uptime();
+    for (board, (first, second)) in BOARDS.iter().zip(first.into_iter().zip(second)) {
+        let (passed, true_time) = (second.saturating_sub(first), after - before);
+        assert!(passed.abs_diff(true_time) < idle / 3, "{}: {passed:?} of {true_time:?}", board.core);
     }
 }
 

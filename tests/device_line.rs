@@ -190,10 +190,11 @@ fn over_a_serial_port_a_record_is_put_got_and_used_by_one_program_after_another(
     let port = line.split_whitespace().find(|word| Path::new(word).is_absolute());
     let device = format!("serial:{}", port.unwrap_or_else(|| panic!("no port in {line}")));
 
-    bench
-        .run("device identify", &format!("{device}@115200"))
-        .with(0)
-        .printing(&["emulated", "record 0: none is stored"]);
+    bench.run("device identify", &format!("{device}@115200")).with(0).printing(&[
+        "emulated",
+        "record 0: none is stored",
+        "since its power came on",
+    ]);
     bench.run("device stream small.csv --out early.csv", &device).with(1).telling(&["no record is stored"]);
     bench.run("device put cal.bin", &device).with(0).printing(&["stored as record 1"]);
     bench.run("device get --out got.bin", &device).with(0);

@@ -31,6 +31,21 @@ fn every_image_links_without_panic_or_allocator_and_finds_its_answer_right() {
 }
 
 #[test]
+fn each_end_of_a_run_is_told_to_the_next_with_its_address() {
+    if !ready() {
+        return;
+    }
+    let ends = "0 power in nowhere\n1 fault in read\n2 stack overflow in nowhere\n";
+    for board in BOARDS {
+        // The micro:bit of QEMU has no watchdog.
+        let watchdog = if board.machine == "microbit" { "" } else { "3 watchdog in hang\n" };
+        let output = run(board, "restarts");
+        let said = String::from_utf8(output.stdout).expect("the image writes text");
+        assert_eq!((output.status.code(), said), (Some(0), format!("{ends}{watchdog}")), "{}", board.core);
+    }
+}
+
+#[test]
 fn a_deliberate_panic_does_not_link() {
     if !ready() {
         return;

@@ -22,8 +22,8 @@ use firmware_example::{
 use imucal_core::{
     corrector::Corrector,
     link::{
-        Fault, Guard, Header, Identity, Key, MAX_FRAME, Nonces, Origin, RecordState, Reply, Request, Seal,
-        encode, refuse_version,
+        Fault, Guard, Header, Identity, Key, LastReset, MAX_FRAME, Nonces, Origin, RecordState, Reply,
+        Request, ResetCause, Seal, encode, refuse_version,
     },
     record::{self, Defect, Figures, SensorIdentity},
 };
@@ -245,7 +245,8 @@ fn serve(stream: TcpStream, flash: nor::Nor, key: Option<&Key>, boot: u64) -> no
     let closed = Rc::new(Cell::new(false));
     let link = Wire { stream, come: VecDeque::new(), closed: closed.clone() };
     let clock = Uptime(Instant::now());
-    let board = Board { link, flash, clock, sensors: NoSensor, stack: || None };
+    let last_reset = LastReset { cause: ResetCause::PowerOn, address: 0, resets: 0 };
+    let board = Board { link, flash, clock, sensors: NoSensor, stack: || None, last_reset };
     let mut memory = Memory::<40, 12, 8, 48, 3>::new();
     let mut device = Coprocessor::new(board, unit(), Guard::new(key, boot), &mut memory);
     while !closed.get() {

@@ -1,7 +1,7 @@
 //! What a board brings: four small traits, none of which waits.
 
 use embedded_storage::nor_flash::NorFlash;
-use imucal_core::record::RawUnit;
+use imucal_core::{link::LastReset, record::RawUnit};
 
 /// A line to the host, byte by byte.
 pub trait ByteLink {
@@ -14,7 +14,7 @@ pub trait ByteLink {
 
 /// Time.
 pub trait Clock {
-    /// Since the start, ms; comes round after 49 days.
+    /// Since the start, ms; comes round after 49 days. Asked for in every turn: a counter that comes round is followed.
     fn uptime(&mut self) -> u32;
 }
 
@@ -64,4 +64,6 @@ pub struct Board<L: ByteLink, F: NorFlash, C: Clock, S: SampleSource> {
     pub sensors: S,
     /// Stack used at most so far, bytes, where the board looks.
     pub stack: fn() -> Option<u32>,
+    /// How the run before this one ended.
+    pub last_reset: LastReset,
 }

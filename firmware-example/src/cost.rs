@@ -33,7 +33,7 @@ const SAMPLES: usize = 64;
 const BLOCKS: usize = 1000;
 /// See above.
 #[cfg(microbit)]
-const BLOCKS: usize = 100;
+const BLOCKS: usize = 64;
 /// Particles of the swarm.
 #[cfg(mps2)]
 const PARTICLES: usize = 40;

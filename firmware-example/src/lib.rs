@@ -13,6 +13,7 @@
 //! | `fits` | reads a record, corrects, fits every model and packs a record, without text: what that takes of flash |
 //! | `cost` | prints what parts of the core take: instructions and stack |
 //! | `coprocessor` | keeps a record, corrects, fits and stores, at the end of a UART |
+//! | `restarts` | ends its run by each way there is, and says after each reset how the run before ended |
 //! | `log` | says by defmt what it does, over semihosting; with `--features log` |
 //! | `nrf52840` | the co-processor on a real board; with `--features nrf52840` |
 //! | `empty` | start-up code and the record's bytes, to compare the size of `correct` with |
@@ -26,6 +27,7 @@ pub mod correct;
 #[cfg(target_os = "none")]
 pub mod cost;
 pub mod drill;
+pub mod elapsed;
 pub mod fit;
 pub mod fitting;
 #[cfg(target_os = "none")]
@@ -34,6 +36,7 @@ pub mod judgement;
 #[cfg(target_os = "none")]
 pub mod machine;
 pub mod replay;
+pub mod restart;
 pub mod ring;
 pub mod scene;
 pub mod search;

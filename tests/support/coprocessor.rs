@@ -39,7 +39,7 @@ pub fn drilled(model: FitModel, count: usize, seed: u32) -> BoardFit {
     BoardFit { task: drill::task(model), observations }
 }
 
-/// Stack that a board has used, bytes, after a fit of every model, a swarm's search, and a record stored.
+/// Stack that a board has used, bytes, after a fit of every model, a swarm's search, a record stored and one put.
 ///
 /// # Panics
 ///
@@ -54,6 +54,8 @@ pub fn painted_stack(board: Board) -> u32 {
         session.fit(fit, Date::from_days(20_000)).unwrap_or_else(|error| panic!("{error}"));
     }
     session.store_record(false).unwrap_or_else(|error| panic!("{error}"));
+    let record = session.record().unwrap_or_else(|error| panic!("{error}")).expect("stored");
+    session.put_record(&record, false).unwrap_or_else(|error| panic!("{error}"));
     let status = session.status().unwrap_or_else(|error| panic!("{error}"));
     status.stack.expect("the machine looks")
 }

@@ -1,7 +1,7 @@
 //! What an image takes of a board's memory.
 
 use object::elf::{SHF_ALLOC, SHF_WRITE};
-use object::{Object, ObjectSection, SectionFlags};
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags};
 
 use crate::firmware::{Board, build};
 
@@ -40,6 +40,18 @@ impl Footprint {
         }
         footprint
     }
+}
+
+/// The stack that an image has room for, bytes.
+///
+/// # Panics
+///
+/// Where it does not build, or does not say.
+pub fn stack(board: Board, image: &str) -> u32 {
+    let bytes = elf(board, image);
+    let file = object::File::parse(&*bytes).expect("an ELF file");
+    let at = |name| file.symbol_by_name(name).expect("build.rs defines it").address();
+    u32::try_from(at("_stack_start") - at("_stack_end")).expect("32 bits")
 }
 
 /// The ELF file of an image, which is built for this.

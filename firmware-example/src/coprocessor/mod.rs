@@ -17,7 +17,9 @@ mod requests;
 
 use embedded_storage::nor_flash::NorFlash;
 use imucal_core::{
-    link::{Asked, Fault, FitProgress, Frame, FrameError, Guard, Receiver, RecordState, Reply, split},
+    link::{
+        Asked, Fault, FitProgress, Frame, FrameError, Guard, LastReset, Receiver, RecordState, Reply, split,
+    },
     record::{self, Date, Sensor, SensorIdentity},
 };
 
@@ -104,6 +106,7 @@ struct Device<
     clock: C,
     sensors: S,
     stack: fn() -> Option<u32>,
+    last_reset: LastReset,
     /// `None` where the flash cannot be used.
     slots: Option<Slots<F>>,
     outgoing: Outgoing,
@@ -142,13 +145,14 @@ impl<
         guard: Guard<'a>,
         memory: &'a mut Memory<POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
     ) -> Self {
-        let Board { link, flash, clock, sensors, stack } = board;
+        let Board { link, flash, clock, sensors, stack, last_reset } = board;
         let slots = Slots::open(flash).ok();
         let calibration = Calibration::new(unit, sensors.units());
         let device = Device {
             clock,
             sensors,
             stack,
+            last_reset,
             slots,
             outgoing: Outgoing::new(),
             calibration,
@@ -171,6 +175,7 @@ impl<
         if matches!(self.device.job, Job::Booting) {
             self.device.boot();
         }
+        self.device.clock.uptime();
         self.device.outgoing.flush(&mut self.link);
         let mut busy = !self.device.outgoing.is_free();
         busy |= self.device.answer_due();

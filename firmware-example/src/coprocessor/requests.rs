@@ -41,6 +41,10 @@ impl<
                 self.stream = Some(stream).filter(|stream| stream.every > 0);
                 self.done(asked)
             }
+            Request::LastReset => {
+                self.send(asked, &Reply::LastReset(self.last_reset));
+                Ok(())
+            }
             Request::AbortFit => self.abort(asked),
             Request::Lock | Request::Unlock => self.done(asked),
             _ if self.is_busy() => Err(Fault::Busy),

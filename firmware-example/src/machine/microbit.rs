@@ -1,11 +1,16 @@
 //! micro:bit: the nRF51's UART and flash (nRF51 Series Reference Manual 3.0, chapters 6 and 29).
 
+use core::num::NonZeroU32;
+
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
 
-use super::{Register, read_words, wait, wake_by};
-use crate::board::ByteLink;
+use super::{CLEAR_PENDING, Register, read_words, wait, wake_by};
+use crate::{
+    board::{ByteLink, Clock},
+    elapsed::Elapsed,
+};
 
 const START_RECEIVER: Register = Register(0x4000_2000);
 const START_TRANSMITTER: Register = Register(0x4000_2008);
@@ -63,11 +68,55 @@ impl ByteLink for Uart {
     }
 }
 
-/// Waits for a byte.
+const START_TIMER: Register = Register(0x4000_8000);
+const CAPTURE: Register = Register(0x4000_8040);
+const ALARMED: Register = Register(0x4000_8144);
+const ALARM_BY: Register = Register(0x4000_8304);
+const TIMER_BITS: Register = Register(0x4000_8508);
+const TIMER_PRESCALER: Register = Register(0x4000_8510);
+const CAPTURED: Register = Register(0x4000_8540);
+const ALARM: Register = Register(0x4000_8544);
+const TIMER_LINE: u32 = 8;
+/// Longest wait, µs.
+const LONGEST: u32 = 2_000_000;
+
+/// TIMER0 at 1 MHz, which goes on while the core sleeps; the core's own timer stops there.
+#[derive(Debug)]
+pub struct Uptime(Elapsed);
+
+impl Uptime {
+    /// Starts it.
+    pub fn start() -> Self {
+        TIMER_BITS.write(3);
+        TIMER_PRESCALER.write(4);
+        ALARM_BY.write(1 << 17);
+        START_TIMER.write(1);
+        wake_by(TIMER_LINE);
+        const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(1_000).unwrap();
+        Self(Elapsed::new(32, PER_MILLISECOND))
+    }
+}
+
+/// TIMER0's count, µs.
+fn now() -> u32 {
+    CAPTURE.write(1);
+    CAPTURED.read()
+}
+
+impl Clock for Uptime {
+    fn uptime(&mut self) -> u32 {
+        self.0.at(now())
+    }
+}
+
+/// Waits for a byte, two seconds at the most.
 pub fn idle() {
+    ALARM.write(now().wrapping_add(LONGEST));
     if RECEIVED.read() == 0 {
         wait(LINE);
     }
+    ALARMED.write(0);
+    CLEAR_PENDING.write(1 << TIMER_LINE);
 }
 
 const READY: Register = Register(0x4001_E400);

@@ -4,28 +4,40 @@
 //! | --- | --- | --- | --- |
 //! | `mps2-an386` | Cortex-M4F | CMSDK (Arm DDI 0479) | a window of the board's PSRAM under NOR rules, that a file backs |
 //! | `microbit` | Cortex-M0, soft float | nRF51 | the nRF51's own, by its NVMC; lost when QEMU ends |
+//!
+//! What ends a run ([`reset`]) is kept over the reset. The watchdog of `mps2-an386` is run by the tests; of that of the
+//! `microbit` QEMU has no model.
 #![allow(unsafe_code)] // Registers, and memory that no variable owns.
 
-use core::{mem::MaybeUninit, num::NonZeroU32};
+use core::mem::MaybeUninit;
 
-use imucal_core::link::{Guard, Key};
+use imucal_core::link::{Guard, Key, LastReset};
 
 #[cfg(microbit)]
 mod microbit;
 #[cfg(mps2)]
 mod mps2;
+#[cfg(nordic)]
+mod nordic;
+pub mod reset;
 mod stopwatch;
+#[cfg(mps2)]
 mod ticks;
 
 #[cfg(microbit)]
 use microbit::boot_number;
 #[cfg(microbit)]
-pub use microbit::{Flash, Uart, idle};
+pub use microbit::{Flash, Uart, Uptime, idle};
+#[cfg(all(mps2, not(nordic)))]
+pub use mps2::Watchdog;
 #[cfg(mps2)]
 use mps2::boot_number;
 #[cfg(mps2)]
-pub use mps2::{Flash, Uart, idle};
+pub use mps2::{Flash, Uart, Uptime, idle};
+#[cfg(nordic)]
+pub use nordic::Watchdog;
 pub use stopwatch::Stopwatch;
+#[cfg(mps2)]
 pub use ticks::Ticks;
 
 use crate::{
@@ -41,24 +53,24 @@ pub type MachineMemory = Memory<256, 64, 48, 2048, 40>;
 #[cfg(microbit)]
 pub type MachineMemory = Memory<40, 12, 8, 48, 3>;
 
-/// The core's clock, kHz.
-#[cfg(mps2)]
-const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(25_000).unwrap();
-/// See above.
-#[cfg(microbit)]
-const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(64_000).unwrap();
+/// A run that does not feed the watchdog for so long is ended, ms: many times the longest slice of work, and the longest
+/// that [`idle`] lasts.
+pub const PATIENCE: u32 = 10_000;
 
 /// The co-processor on this machine.
 #[cfg(mps2)]
-type Whole = Coprocessor<'static, Uart, Flash, Ticks, NoSensor, 256, 64, 48, 2048, 40>;
+type Whole = Coprocessor<'static, Uart, Flash, Uptime, NoSensor, 256, 64, 48, 2048, 40>;
 /// See above.
 #[cfg(microbit)]
-type Whole = Coprocessor<'static, Uart, Flash, Ticks, NoSensor, 40, 12, 8, 48, 3>;
+type Whole = Coprocessor<'static, Uart, Flash, Uptime, NoSensor, 40, 12, 8, 48, 3>;
 
 /// Runs the co-processor on this machine, for ever.
 pub fn run(name: &str, serial: &str, key: Option<&'static Key>) -> ! {
-    let coprocessor = start(name, serial, Guard::new(key, boot_number()));
+    let last = reset::last();
+    let coprocessor = start(name, serial, Guard::new(key, boot_number()), last);
+    let watchdog = Watchdog::start(PATIENCE);
     loop {
+        watchdog.feed();
         if !coprocessor.poll() {
             idle();
         }
@@ -67,7 +79,7 @@ pub fn run(name: &str, serial: &str, key: Option<&'static Key>) -> ! {
 
 /// Puts the co-processor where it stays: on the stack it would lie below all that follows.
 #[inline(never)]
-fn start(name: &str, serial: &str, guard: Guard<'static>) -> &'static mut Whole {
+fn start(name: &str, serial: &str, guard: Guard<'static>, last_reset: LastReset) -> &'static mut Whole {
     static mut MEMORY: MachineMemory = MachineMemory::new();
     static mut WHOLE: MaybeUninit<Whole> = MaybeUninit::uninit();
     // SAFETY: `run` is called once, and nothing else knows the variables.
@@ -79,9 +91,10 @@ fn start(name: &str, serial: &str, guard: Guard<'static>) -> &'static mut Whole 
     let board = Board {
         link: Uart::start(),
         flash: Flash::new(),
-        clock: Ticks::start(PER_MILLISECOND),
+        clock: Uptime::start(),
         sensors: NoSensor,
         stack: || u32::try_from(crate::stack::deepest().0).ok(),
+        last_reset,
     };
     whole.write(Coprocessor::new(board, unit, guard, memory))
 }
@@ -119,7 +132,7 @@ fn wake_by(line: u32) {
     ENABLE.write(1 << line);
 }
 
-/// Waits for an interrupt of that line; not at all, if one is pending.
+/// Waits for an interrupt; not at all, if one is pending. Those of that line are then pending no more.
 fn wait(line: u32) {
     cortex_m::asm::wfi();
     CLEAR_PENDING.write(1 << line);

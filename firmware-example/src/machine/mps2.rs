@@ -1,11 +1,16 @@
 //! mps2-an386: CMSDK UART 0, and flash in the board's PSRAM.
 
+use core::num::NonZeroU32;
+
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
 
-use super::{Register, read_words, wait, wake_by};
-use crate::board::ByteLink;
+use super::{Register, Stopwatch, read_words, wait, wake_by};
+use crate::{
+    board::{ByteLink, Clock},
+    elapsed::Elapsed,
+};
 
 const DATA: Register = Register(0x4000_4000);
 const STATE: Register = Register(0x4000_4004);
@@ -45,10 +50,81 @@ impl ByteLink for Uart {
     }
 }
 
-/// Waits for a byte.
+/// TIMER0, which is looked at whenever the core's own timer has come round and ended a wait, three times in two seconds.
+#[derive(Debug)]
+pub struct Uptime {
+    timer: Stopwatch,
+    elapsed: Elapsed,
+}
+
+impl Uptime {
+    /// Starts both timers.
+    pub fn start() -> Self {
+        const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(25_000).unwrap();
+        ALARM_ROUND.write(0x00FF_FFFF);
+        // By the core's clock, with an interrupt: all are masked, and there is no handler.
+        ALARM.write(0b111);
+        Self { timer: Stopwatch::start(), elapsed: Elapsed::new(32, PER_MILLISECOND) }
+    }
+}
+
+impl Clock for Uptime {
+    fn uptime(&mut self) -> u32 {
+        self.elapsed.at(self.timer.ticks())
+    }
+}
+
+const ALARM: Register = Register(0xE000_E010);
+const ALARM_ROUND: Register = Register(0xE000_E014);
+const INTERRUPT_CONTROL: Register = Register(0xE000_ED04);
+const CLEAR_TICK: u32 = 1 << 25;
+
+/// Waits for a byte, or for the core's timer to come round.
 pub fn idle() {
     wait(RECEIVED);
     CLEAR.write(0b10);
+    INTERRUPT_CONTROL.write(CLEAR_TICK);
+}
+
+#[cfg(not(nordic))]
+const MPU_CONTROL: Register = Register(0xE000_ED94);
+#[cfg(not(nordic))]
+const MPU_BASE: Register = Register(0xE000_ED9C);
+#[cfg(not(nordic))]
+const MPU_SIZE: Register = Register(0xE000_EDA0);
+
+/// Closes the 64 KiB below RAM, so that a stack that is full leaves memory here too: on this machine something unnamed
+/// takes what is written there. The nRF52840 has nothing there.
+#[cfg(not(nordic))]
+pub(super) fn close_below_stack() {
+    MPU_BASE.write(0x1FFF_0000 | 1 << 4);
+    // No access, 2^16 bytes, enabled.
+    MPU_SIZE.write(15 << 1 | 1);
+    // All else as without it.
+    MPU_CONTROL.write(0b101);
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}
+
+/// The CMSDK's watchdog (Arm DDI 0479, 4.4), at 25 MHz. It interrupts by the NMI, whose handler ends the run; were that
+/// to hang too, it would reset after as long again.
+#[cfg(not(nordic))]
+#[derive(Debug)]
+pub struct Watchdog(());
+
+#[cfg(not(nordic))]
+impl Watchdog {
+    /// Starts it; `milliseconds`: up to 171 000.
+    pub fn start(milliseconds: u32) -> Self {
+        Register(0x4000_8000).write(milliseconds.saturating_mul(25_000));
+        Register(0x4000_8008).write(0b11);
+        Self(())
+    }
+
+    /// Puts the reset off.
+    pub fn feed(&self) {
+        Register(0x4000_800C).write(1);
+    }
 }
 
 /// Start of the PSRAM, which QEMU lets a file back.

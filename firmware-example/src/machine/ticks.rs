@@ -5,22 +5,19 @@ use core::num::NonZeroU32;
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 
 use super::Register;
-use crate::board::Clock;
+use crate::{board::Clock, elapsed::Elapsed};
 
-/// The timer counts down from here and round.
+/// Bits of the timer, which counts down.
+const BITS: u32 = 24;
+/// It counts down from here and round.
 const TOP: u32 = 0x00FF_FFFF;
 /// The timer's value.
 const VALUE: Register = Register(0xE000_E018);
 
-/// The core's timer, followed by looking at it: at least three times a second, else time is lost.
+/// The core's timer, for a board that never sleeps: it is looked at more than once a round, which at 64 MHz is a quarter
+/// of a second.
 #[derive(Debug)]
-pub struct Ticks {
-    /// Ticks of a millisecond.
-    per_millisecond: NonZeroU32,
-    last: u32,
-    rest: u32,
-    milliseconds: u32,
-}
+pub struct Ticks(Elapsed);
 
 impl Ticks {
     /// Starts the timer; `per_millisecond` is the core's frequency, kHz.
@@ -31,17 +28,12 @@ impl Ticks {
         timer.set_reload(TOP);
         timer.clear_current();
         timer.enable_counter();
-        Self { per_millisecond, last: TOP, rest: 0, milliseconds: 0 }
+        Self(Elapsed::new(BITS, per_millisecond))
     }
 }
 
 impl Clock for Ticks {
     fn uptime(&mut self) -> u32 {
-        let now = VALUE.read();
-        self.rest += self.last.wrapping_sub(now) & TOP;
-        self.last = now;
-        self.milliseconds = self.milliseconds.wrapping_add(self.rest / self.per_millisecond);
-        self.rest %= self.per_millisecond;
-        self.milliseconds
+        self.0.at(TOP - VALUE.read())
     }
 }

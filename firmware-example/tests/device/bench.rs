@@ -8,7 +8,9 @@ use firmware_example::{
     fitting::Memory,
 };
 use imucal_core::{
-    link::{Guard, Header, MAX_FRAME, Origin, Receiver, Reply, Request, encode, split},
+    link::{
+        Guard, Header, LastReset, MAX_FRAME, Origin, Receiver, Reply, Request, ResetCause, encode, split,
+    },
     record::{RawUnit, SensorIdentity},
 };
 
@@ -89,6 +91,9 @@ pub fn framed(session: u32, id: u32, request: &Request<'_>) -> Vec<u8> {
     encode(&header, request, None, &mut [0; MAX_FRAME]).expect("a request fits").to_vec()
 }
 
+/// How the bench's device ended its last run.
+pub const LAST_RESET: LastReset = LastReset { cause: ResetCause::Watchdog, address: 0x0001_2345, resets: 3 };
+
 /// Serial of the record that the images carry.
 pub const SERIAL: &str = "00300017";
 
@@ -122,8 +127,14 @@ impl<'a> Bench<'a> {
         memory: &'a mut BenchMemory,
     ) -> Self {
         let wire = Wire::default();
-        let board =
-            Board { link: wire.clone(), flash: nor, clock: Ticks::default(), sensors, stack: || None };
+        let board = Board {
+            link: wire.clone(),
+            flash: nor,
+            clock: Ticks::default(),
+            sensors,
+            stack: || None,
+            last_reset: LAST_RESET,
+        };
         let device = Coprocessor::new(board, unit(serial), guard, memory);
         Self { device, wire, receiver: Receiver::default(), session: 0, next: 1 }
     }

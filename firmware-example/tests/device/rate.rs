@@ -16,7 +16,7 @@ use imucal_core::{
 };
 
 use crate::{
-    bench::{Queued, SERIAL, Ticks, Wire, framed, unit},
+    bench::{LAST_RESET, Queued, SERIAL, Ticks, Wire, framed, unit},
     nor::Nor,
 };
 
@@ -56,6 +56,7 @@ impl<'a> Stand<'a> {
             clock: Ticks::default(),
             sensors: sensors.clone(),
             stack: || None,
+            last_reset: LAST_RESET,
         };
         let device = Coprocessor::new(board, unit(SERIAL), Guard::new(None, 1), memory);
         let (receiver, waited) = (Receiver::default(), (0, 0));

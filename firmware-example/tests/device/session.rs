@@ -13,7 +13,7 @@ use imucal_core::{
 use nalgebra::Vector3;
 
 use crate::{
-    bench::{Bench, BenchMemory, Counting, SERIAL},
+    bench::{Bench, BenchMemory, Counting, LAST_RESET, SERIAL},
     nor::Nor,
 };
 
@@ -355,4 +355,11 @@ fn a_stream_sends_every_so_many_samples_under_the_id_that_asked_for_it() {
     // Where another answer went, a sample is left out.
     let whole = numbers.windows(2).all(|pair| (pair[1] - pair[0]) % 3 == 0);
     assert!(numbers.len() > 120 && whole, "{numbers:?}");
+}
+
+#[test]
+fn a_device_says_how_its_last_run_ended() {
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    assert!(bench.ask(&Request::LastReset, |reply| *reply == Reply::LastReset(LAST_RESET)));
 }

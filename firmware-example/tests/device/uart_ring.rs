@@ -16,7 +16,7 @@ use imucal_core::{
 
 use crate::{
     bad_link::records,
-    bench::{BenchMemory, SERIAL, Ticks, framed, unit},
+    bench::{BenchMemory, LAST_RESET, SERIAL, Ticks, framed, unit},
     nor::{Nor, NorError, PAGE},
 };
 
@@ -143,6 +143,7 @@ fn received(count: usize, kept: Kept) -> usize {
         clock: Ticks::default(),
         sensors: Imu { time: time.clone(), next: 0.0 },
         stack: || None,
+        last_reset: LAST_RESET,
     };
     let mut memory = BenchMemory::new();
     let mut device = Coprocessor::new(board, unit(SERIAL), Guard::new(None, 1), &mut memory);

@@ -81,6 +81,8 @@ pub enum Request<'a> {
     /// Take changes again. Answered by [`Reply::Done`]; of a device without a key, by [`Fault::Locked`] where it is
     /// locked.
     Unlock,
+    /// How did the last run end? Answered by [`Reply::LastReset`].
+    LastReset,
 }
 
 impl Request<'_> {
@@ -93,7 +95,8 @@ impl Request<'_> {
             | Self::GetRecord
             | Self::Correct { .. }
             | Self::Stream { .. }
-            | Self::Lock => false,
+            | Self::Lock
+            | Self::LastReset => false,
             Self::PutRecord { .. }
             | Self::StartFit(_)
             | Self::Feed { .. }
@@ -140,6 +143,8 @@ pub enum Reply<'a> {
     Done,
     /// Not done.
     Fault(Fault),
+    /// To [`Request::LastReset`].
+    LastReset(LastReset),
 }
 
 /// Who a device is.
@@ -196,6 +201,41 @@ pub enum RecordState {
     Previous,
     /// The one stored last has lost bits since, and there is none before it.
     Lost,
+}
+
+/// How the run before this one ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct LastReset {
+    /// By what.
+    pub cause: ResetCause,
+    /// Address of the instruction that it ended at, as far as it is known; otherwise 0.
+    pub address: u32,
+    /// Resets since the power came on.
+    pub resets: u32,
+}
+
+/// What ends a run. The order of the variants is the format: append only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum ResetCause {
+    /// The power was off: nothing is known.
+    PowerOn,
+    /// A reset that nothing in the device announced: by a pin or a debugger.
+    Unannounced,
+    /// An access to memory that is not there, or an instruction that is none.
+    Fault,
+    /// The stack was full.
+    StackOverflow,
+    /// The watchdog was not fed.
+    Watchdog,
+}
+
+impl ResetCause {
+    /// All, in the order of the format.
+    pub const ALL: [Self; 5] =
+        [Self::PowerOn, Self::Unannounced, Self::Fault, Self::StackOverflow, Self::Watchdog];
 }
 
 /// How a device is.

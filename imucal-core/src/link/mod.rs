@@ -74,7 +74,9 @@ pub use frame::{
 };
 pub use guard::{Asked, Guard};
 pub use key::{Key, SEAL, Seal};
-pub use message::{BATCH, Capacity, Fault, Identity, RecordState, Reply, Request, Status, Values};
+pub use message::{
+    BATCH, Capacity, Fault, Identity, LastReset, RecordState, Reply, Request, ResetCause, Status, Values,
+};
 pub use session::{Nonces, WINDOW};
 
 /// Version of the messages that this library writes and reads.

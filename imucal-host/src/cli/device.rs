@@ -8,7 +8,7 @@ use std::{
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use imucal_core::{
-    link::{FitReport, Key, RecordState, VERSION},
+    link::{FitReport, Key, LastReset, RecordState, ResetCause, VERSION},
     record::{self, Date},
 };
 
@@ -207,6 +207,11 @@ fn identify(place: &Place) -> anyhow::Result<Ending> {
     if let Some(stack) = status.stack {
         say!("stack used so far: {stack} B");
     }
+    let seconds = status.uptime / 1_000;
+    match session.last_reset()? {
+        Some(last) => say!("up for {seconds} s since {}", named_reset(&last)),
+        None => say!("up for {seconds} s"),
+    }
     Ok(Ending::Done)
 }
 
@@ -238,6 +243,20 @@ fn named_state(state: RecordState) -> &'static str {
             "WARNING: the stored record has lost bits in flash, none is in use; put it again"
         }
     }
+}
+
+/// What a run began with, in words.
+fn named_reset(last: &LastReset) -> String {
+    let cause = match last.cause {
+        ResetCause::PowerOn => return "its power came on".into(),
+        ResetCause::Unannounced => "a reset by a pin or a debugger",
+        ResetCause::Fault => "WARNING: a fault",
+        ResetCause::StackOverflow => "WARNING: an overflow of its stack",
+        ResetCause::Watchdog => "WARNING: its watchdog ended a run that hung",
+        _ => "a reset of a kind that this program does not know",
+    };
+    let at = if last.address == 0 { String::new() } else { format!(" at {:#010x}", last.address) };
+    format!("{cause}{at}; resets since the power came on: {}", last.resets)
 }
 
 fn named(text: &str) -> &str {

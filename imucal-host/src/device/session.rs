@@ -6,8 +6,8 @@ use std::{
 };
 
 use imucal_core::link::{
-    Fault, Frame, FrameError, Header, Identity, Key, MAX_FRAME, Nonces, Origin, Receiver, Reply, Request,
-    Seal, Status, encode, split,
+    Fault, Frame, FrameError, Header, Identity, Key, LastReset, MAX_FRAME, Nonces, Origin, Receiver, Reply,
+    Request, Seal, Status, encode, split,
 };
 
 use super::{Address, DeviceError, line::Line};
@@ -101,6 +101,21 @@ impl Session {
             Reply::Status(status) => Some(*status),
             _ => None,
         })
+    }
+
+    /// How the device's last run ended; `None` of firmware that does not say.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn last_reset(&mut self) -> Result<Option<LastReset>, DeviceError> {
+        let last = self.ask(&Request::LastReset, "how its last run ended", |reply| match reply {
+            Reply::LastReset(last) => Some(*last),
+            _ => None,
+        });
+        match last {
+            Err(DeviceError::Refused { fault: Fault::Malformed, .. }) => Ok(None),
+            last => last.map(Some),
+        }
     }
 
     /// The stored record's bytes; `None` where none is stored.

@@ -27,7 +27,13 @@ mod uart;
 mod board {
     use core::num::NonZeroU32;
 
-    use firmware_example::{board::Board, coprocessor::Coprocessor, fitting::Memory, machine::Ticks, stack};
+    use firmware_example::{
+        board::Board,
+        coprocessor::Coprocessor,
+        fitting::Memory,
+        machine::{PATIENCE, Ticks, Watchdog, reset},
+        stack,
+    };
     use imucal_core::{link::Guard, record::SensorIdentity};
     use nrf52840_hal::{
         Clocks, Rng, Twim,
@@ -65,6 +71,7 @@ mod board {
             let region = core::slice::from_raw_parts_mut(REGION.0 as *mut u8, REGION.1);
             (&mut *(&raw mut MEMORY), &mut *(&raw mut UART), &mut *(&raw mut IMU), region)
         };
+        let last_reset = reset::last();
         let Some(chip) = Peripherals::take() else { cortex_m::peripheral::SCB::sys_reset() };
         let _crystal = Clocks::new(chip.CLOCK).enable_ext_hfosc();
         let pins = p0::Parts::new(chip.P0);
@@ -95,9 +102,12 @@ mod board {
             clock: Ticks::start(PER_MILLISECOND),
             sensors,
             stack: || u32::try_from(stack::deepest().0).ok(),
+            last_reset,
         };
         let mut coprocessor = Coprocessor::new(board, unit, guard, memory);
+        let watchdog = Watchdog::start(PATIENCE);
         loop {
+            watchdog.feed();
             coprocessor.poll();
         }
     }
