@@ -90,6 +90,9 @@ impl Candidates {
             } else if !elsewhere && ELSEWHERE.contains(&effect.id.as_str()) {
                 let why = "it shows against a calibration made elsewhere (--model)";
                 candidates.untestable.push((effect, why));
+            } else if !setting.gimbals && !setting.hand && effect.id.ends_with(".bandwidth") {
+                let why = "a reference attitude has noise and a filter of its own: nothing parts a sensor's low-pass from them";
+                candidates.untestable.push((effect, why));
             } else if !setting.gimbals && needs_gimbals(effect, kinds) {
                 candidates.untestable.push((effect, "no gimbals turn the sensor"));
             } else {

@@ -12,6 +12,7 @@ use crate::{
 };
 
 mod axis_swap;
+mod carried_about;
 mod gimbal_order;
 mod noise_burst;
 mod pairs;
@@ -74,17 +75,54 @@ pub struct Conventions {
     pub remarks: Vec<String>,
     /// Code of the turn, as `axis_swap` counts them, that all triads share: that of the mount.
     pub turned: Option<usize>,
+    /// A sensor that cannot be compared with the movement, since that does not hold what it was given.
+    pub beyond_movement: Option<SensorKind>,
     /// How the encoders contradict every sensor: no baseline fits before that is mended.
     pub contradiction: Option<String>,
+}
+
+/// Share of a sensor's variance that no gain and bias explain where the row of t shows the movement of t + `offset`, s;
+/// `None` where nothing tells.
+pub fn unexplained(
+    recording: &Recording,
+    integrity: &Integrity,
+    kind: SensorKind,
+    motion: &dyn Motion,
+    offset: f64,
+) -> Option<f64> {
+    let rows = rows(recording);
+    let truth = truth(recording, motion, &rows, offset);
+    Some(Pairs::of(recording, integrity, kind, &rows, &truth)?.trusted().moments().unexplained())
+}
+
+/// Rows that are compared with the truth.
+fn rows(recording: &Recording) -> Vec<usize> {
+    let stride = recording.rows().div_ceil(ROWS).max(1);
+    (stride / 2..recording.rows()).step_by(stride).collect()
+}
+
+fn truth(recording: &Recording, motion: &dyn Motion, rows: &[usize], offset: f64) -> Vec<Truth> {
+    rows.iter().map(|row| motion.truth(recording.time[*row] + offset, &|_| ())).collect()
 }
 
 /// Checks a recording against a movement that was told from it or besides it.
 pub fn check(recording: &Recording, integrity: &Integrity, motion: &dyn Motion) -> Conventions {
     let mut found = Conventions::default();
-    let stride = recording.rows().div_ceil(ROWS).max(1);
-    let rows: Vec<usize> = (stride / 2..recording.rows()).step_by(stride).collect();
-    let truth: Vec<Truth> = rows.iter().map(|row| motion.truth(recording.time[*row], &|_| ())).collect();
-    let pairs = SensorKind::ALL.map(|kind| Pairs::of(recording, integrity, kind, &rows, &truth));
+    let rows = rows(recording);
+    let truth = truth(recording, motion, &rows, 0.0);
+    // Gravity and the gyroscope tell no heading: there is no field to compare a magnetometer with.
+    let by_rests = motion.encoders(0.0).is_none() && recording.reference.is_none();
+    let is_compared = |kind: SensorKind| !(by_rests && kind == SensorKind::Mag);
+    let mut pairs = SensorKind::ALL.map(|kind| {
+        let pairs = is_compared(kind).then(|| Pairs::of(recording, integrity, kind, &rows, &truth));
+        pairs.flatten()
+    });
+    let carried = carried_about::check(recording, integrity, &rows, &truth, &pairs);
+    if let Some(remark) = carried {
+        found.remarks.push(remark);
+        found.beyond_movement = Some(SensorKind::Acc);
+        pairs[SensorKind::Acc as usize] = None;
+    }
     match gimbal_order::remark(recording, integrity, motion, &rows, &truth, &pairs) {
         // Against a wrong movement no sensor's axes mean anything.
         Some(remark) => found.contradiction = Some(remark),
@@ -99,6 +137,9 @@ pub fn check(recording: &Recording, integrity: &Integrity, motion: &dyn Motion) 
     }
     for sensor in &integrity.sensors {
         let Some(triple) = recording.sensor(sensor.sensor) else { continue };
+        if found.beyond_movement == Some(sensor.sensor) {
+            continue;
+        }
         saturation::check(triple, sensor, &mut found);
         stuck_samples::check(triple, sensor, &mut found);
         if motion.encoders(0.0).is_none() {

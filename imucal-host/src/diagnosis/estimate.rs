@@ -20,6 +20,11 @@ const SCANNED: f64 = 5.0;
 
 /// Parameters of each effect of the best set, shapes among them.
 pub fn amounts(explained: &Explained<'_>) -> Option<Vec<Vec<Amount>>> {
+    amounts_of(explained, &explained.best.set)
+}
+
+/// Parameters of some effects of the fit, likewise.
+pub fn amounts_of(explained: &Explained<'_>, asked: &[&'static Effect]) -> Option<Vec<Vec<Amount>>> {
     let (linear, set) = (&explained.linear, &explained.best.set);
     let reference = linear.scene.reference(explained.fit.doses.clone(), &linear.scene.fine)?;
     let dose = |effect: &Effect| explained.fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, effect));
@@ -52,7 +57,8 @@ pub fn amounts(explained: &Explained<'_>) -> Option<Vec<Vec<Amount>>> {
         let at = columns.iter().position(|c| c.is_of(effect) && c.parameter == parameter)?;
         Some(covariance[(at, at)].sqrt() * effect.parameters[parameter].prior_scale)
     };
-    set.iter()
+    asked
+        .iter()
         .map(|effect| {
             let values = &dose(effect)?.values;
             let amount = |(at, value): (usize, &f64)| Amount {

@@ -9,7 +9,7 @@ use super::{
     convention::{self, Conventions, Finding},
     hand::Held,
     model::Model,
-    revisits,
+    reference_clock, revisits,
 };
 use crate::{
     effect::{Act, DataRun, Effect, axis_swap},
@@ -39,6 +39,8 @@ pub struct Footing {
     pub movement: Box<dyn Recorded>,
     /// The rests that it was told from, where neither a rig nor a reference tells it.
     pub held: Option<Held>,
+    /// What a reference was moved by in time to follow the samples, s: see [`reference_clock::coarse`].
+    pub moved: f64,
     /// Rows of each sensor that can be used, by [`SensorKind::ALL`].
     pub usable: [Vec<bool>; 3],
     /// Triads to start from, nominal SI to SI: those of the model, or such as put axes and units right.
@@ -60,12 +62,15 @@ impl Footing {
     pub fn new(recording: &Recording, model: Option<&StoredCalibration>) -> Result<Self, String> {
         let model = model.map(|model| Model::new(recording, model)).transpose()?.unwrap_or_default();
         let integrity = integrity::inspect(recording);
-        let (movement, held) = movement(recording, &integrity, &model)?;
+        let Told { movement, held, moved } = movement(recording, &integrity, &model)?;
         let conventions = convention::check(recording, &integrity, &*movement);
         if let Some(contradiction) = conventions.contradiction {
             return Err(contradiction);
         }
         let mut usable = SensorKind::ALL.map(|kind| usable_rows(recording, &integrity, &conventions, kind));
+        if let Some(kind) = conventions.beyond_movement {
+            usable[kind as usize].fill(false);
+        }
         for usable in &mut usable {
             usable.iter_mut().zip(movement.known()).for_each(|(usable, known)| *usable &= known);
         }
@@ -100,7 +105,7 @@ impl Footing {
         remarks.extend(revisits::remark(&*movement));
         remarks.extend(shortcomings(recording));
         let findings = conventions.findings;
-        Ok(Self { movement, held, usable, triads, model, findings, remarks })
+        Ok(Self { movement, held, moved, usable, triads, model, findings, remarks })
     }
 }
 
@@ -196,21 +201,24 @@ pub fn axes(recording: &Recording) -> Result<[Axis; 3], String> {
     })
 }
 
+/// A movement and what tells it.
+struct Told {
+    movement: Box<dyn Recorded>,
+    held: Option<Held>,
+    moved: f64,
+}
+
 /// The recorded movement, or why there is none.
-fn movement(
-    recording: &Recording,
-    integrity: &Integrity,
-    model: &Model,
-) -> Result<(Box<dyn Recorded>, Option<Held>), String> {
+fn movement(recording: &Recording, integrity: &Integrity, model: &Model) -> Result<Told, String> {
     let site = &recording.manifest.site;
-    let mut place = Place {
+    let place = Place {
         latitude_deg: site.latitude_deg.unwrap_or(0.0),
         height: site.height_m.unwrap_or(0.0),
         gravity: site.gravity().unwrap_or(STANDARD_GRAVITY),
         field_n: site.field_ned_ut.unwrap_or_default().into(),
     };
     let temperature = recording.temperature.clone().unwrap_or_else(|| vec![25.0; recording.rows()]);
-    let mut held = None;
+    let (mut held, mut moved) = (None, 0.0);
     let movement: Box<dyn Recorded> = match (recording.gimbal.as_deref(), recording.reference.as_deref()) {
         (Some(gimbal), _) => {
             let axes = axes(recording)?;
@@ -225,11 +233,20 @@ fn movement(
         }
         (None, Some(reference)) => {
             let attitudes = motion::of_reference(reference);
-            if site.field_ned_ut.is_none() {
-                place.field_n = field(recording, integrity, &attitudes, model).unwrap_or_default();
-            }
-            let tracked = Tracked::new(&recording.time, &attitudes, temperature, place);
-            Box::new(tracked.ok_or("no row has a reference attitude")?)
+            let tracked = |attitudes: &Attitudes| {
+                let mut place = place;
+                if site.field_ned_ut.is_none() {
+                    place.field_n = field(recording, integrity, attitudes, model).unwrap_or_default();
+                }
+                let tracked = Tracked::new(&recording.time, attitudes, temperature.clone(), place);
+                tracked.ok_or("no row has a reference attitude")
+            };
+            let as_read = tracked(&attitudes)?;
+            moved = reference_clock::coarse(recording, integrity, &as_read);
+            Box::new(match moved {
+                0.0 => as_read,
+                _ => tracked(&motion::later(&recording.time, &attitudes, -moved))?,
+            })
         }
         (None, None) => {
             let told = Held::new(recording, integrity, model, temperature, place)?;
@@ -246,7 +263,7 @@ fn movement(
     if !movement.moving().iter().any(|moves| *moves) {
         return Err("the rig stands still: nothing tells an effect from a bias".to_owned());
     }
-    Ok((movement, held))
+    Ok(Told { movement, held, moved })
 }
 
 /// The field in the frame of a reference, µT: the median of what the magnetometer shows there, component by component.

@@ -219,6 +219,22 @@ impl<'s> Linear<'s> {
         Some(Self::of(self.scene, self.candidates, self.scan.clone(), fit, design, weighing, shapes))
     }
 
+    /// The same problem with a term of the baseline as an effect, the last of `candidates`, of these values.
+    pub fn with_effect<'c>(
+        &'c self,
+        candidates: &'c Candidates,
+        fit: &Fit,
+        effect: &'static Effect,
+        values: Vec<f64>,
+    ) -> Linear<'c> {
+        let mut design = self.design.clone();
+        restore(&mut design, [&Dose { effect, values }].into_iter());
+        let neutral = Shaped::alone(effect.neutral(self.scene.duration()));
+        let shapes = self.shapes.iter().cloned().chain([neutral]).collect();
+        let weighing = Weighing::new(self.scene, self.weighing.given.clone());
+        Linear::of(self.scene, candidates, self.scan.clone(), fit, design, weighing, shapes)
+    }
+
     /// Parameters at which a candidate's signature was taken.
     pub fn shape_of(&self, effect: &Effect) -> Vec<f64> {
         self.candidates.shape(&self.shapes, effect)

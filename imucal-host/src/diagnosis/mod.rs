@@ -30,6 +30,7 @@ mod moves;
 pub mod nodes;
 pub mod noise;
 pub mod orientation;
+pub mod reference_clock;
 pub mod refit;
 pub mod revisits;
 mod scan;
@@ -54,6 +55,8 @@ use self::{
     finding::{Cause, Place as Driven},
     following::Following,
     footing::Footing,
+    linear::{Judged, Linear},
+    reference_clock::Clock,
     scene::Scene,
     search::Explained,
 };
@@ -97,7 +100,7 @@ pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str
     let candidates = Candidates::new(&setting, &options.without);
     let explained = search::search(&scene, &candidates, progress);
     let answered = explained.as_ref().and_then(|explained| {
-        let (diagnosis, explainable) = answer(recording, explained, progress)?;
+        let (diagnosis, explainable) = answer(recording, explained, footing.moved, progress)?;
         let mut diagnosis = with_faults(beyond_model(diagnosis, &footing.model), &footing);
         fault::tell(&mut diagnosis, &fault::faults(recording, &footing.findings, explained), explainable);
         Some(diagnosis)
@@ -173,6 +176,7 @@ fn untestable(recording: &Recording, why: String) -> Diagnosis {
 fn answer(
     recording: &Recording,
     explained: &Explained<'_>,
+    moved: f64,
     progress: &dyn Fn(&str),
 ) -> Option<(Diagnosis, f64)> {
     let (linear, best) = (&explained.linear, &explained.best);
@@ -189,21 +193,7 @@ fn answer(
     let standings: Vec<credible::Standing> =
         best.set.par_iter().map(|cause| credible::standing(linear, best, cause)).collect::<Option<_>>()?;
     progress("alternatives judged");
-    let amounts = estimate::amounts(explained)?;
-    let mut causes: Vec<Cause> = Vec::new();
-    for (((effect, standing), amounts), share) in
-        best.set.iter().zip(&standings).zip(amounts).zip(&closed.each)
-    {
-        causes.push(Cause {
-            effect: effect.id.clone(),
-            probability: standing.probability,
-            equivalents: standing.equivalents.iter().map(|other| other.id.clone()).collect(),
-            material: estimate::is_material(effect, &amounts),
-            parameters: amounts,
-            gap_closed: Some(share.value),
-            gap_closed_ci95: Some(share.interval),
-        });
-    }
+    let mut causes = causes(explained, &standings, &closed)?;
     let remarks = match linear.scene.swings {
         Some(_) => Vec::new(),
         None => {
@@ -212,14 +202,14 @@ fn answer(
             remarks
         }
     };
+    let apart = reference_clock::candidates(linear.candidates);
+    let remainder = left.map_or(0.0, |f| f.size);
+    let clock = match &apart {
+        Some(apart) => reference_clock::clock(explained, apart, moved, remainder)?,
+        None => None,
+    };
     causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    let mut credible_set: Vec<String> = Vec::new();
-    let suspects = if best.set.is_empty() { credible::suspects(linear, best)? } else { Vec::new() };
-    for effect in standings.iter().flat_map(|standing| &standing.set).chain(&suspects) {
-        if !credible_set.contains(&effect.id) {
-            credible_set.push(effect.id.clone());
-        }
-    }
+    let mut credible_set = credible_set(linear, best, &standings)?;
     let pairs: Vec<(&'static Effect, &'static Effect)> = best
         .set
         .iter()
@@ -236,13 +226,14 @@ fn answer(
         credible_set
             .retain(|id| causes.iter().any(|cause| cause.effect == *id || cause.equivalents.contains(id)));
     }
-    let verdict = match (remarks.is_empty(), found) {
+    let is_judged = remarks.is_empty();
+    let own = match (is_judged, found) {
         (true, _) => verdict(&causes, left, &closed),
         (false, true) => Verdict::Partly,
         (false, false) => Verdict::Unknown,
     };
-    let diagnosis = Diagnosis {
-        verdict,
+    let mut diagnosis = Diagnosis {
+        verdict: own,
         remarks,
         gap: gap::table(linear, &best.set, &best.noise)?,
         places: places(if found { &before } else { &after }, gap::size(linear, &best.set, &best.noise)?),
@@ -256,7 +247,65 @@ fn answer(
         next_experiment,
         ..untestable(recording, String::new())
     };
-    Some((diagnosis, closed.explainable))
+    let Some(clock) = clock else { return Some((diagnosis, closed.explainable)) };
+    let explainable = clock.closed.explainable;
+    let places_before = following::following(&clock.linear, &[], &best.noise, &drivers)?;
+    diagnosis.gap = gap::table(&clock.linear, &clock.set, &best.noise)?;
+    diagnosis.places = places(&places_before, gap::size(&clock.linear, &clock.set, &best.noise)?);
+    if !found {
+        let alone = std::slice::from_ref(&clock.cause);
+        diagnosis.verdict = if is_judged { verdict(alone, left, &clock.closed) } else { Verdict::Partly };
+    }
+    with_clock(&mut diagnosis, clock);
+    Some((diagnosis, explainable))
+}
+
+/// The effects of the best set with their estimates and what each closes of the gap.
+fn causes(
+    explained: &Explained<'_>,
+    standings: &[credible::Standing],
+    closed: &gap::Closed,
+) -> Option<Vec<Cause>> {
+    let set = explained.best.set.iter().zip(estimate::amounts(explained)?);
+    let mut causes = Vec::new();
+    for (((effect, amounts), standing), share) in set.zip(standings).zip(&closed.each) {
+        causes.push(Cause {
+            effect: effect.id.clone(),
+            probability: standing.probability,
+            equivalents: standing.equivalents.iter().map(|other| other.id.clone()).collect(),
+            material: estimate::is_material(effect, &amounts),
+            parameters: amounts,
+            gap_closed: Some(share.value),
+            gap_closed_ci95: Some(share.interval),
+        });
+    }
+    Some(causes)
+}
+
+/// Ids of the effects that the data leave possible, each once.
+fn credible_set(linear: &Linear<'_>, best: &Judged, standings: &[credible::Standing]) -> Option<Vec<String>> {
+    let suspects = if best.set.is_empty() { credible::suspects(linear, best)? } else { Vec::new() };
+    let mut ids: Vec<String> = Vec::new();
+    for effect in standings.iter().flat_map(|standing| &standing.set).chain(&suspects) {
+        if !ids.contains(&effect.id) {
+            ids.push(effect.id.clone());
+        }
+    }
+    Some(ids)
+}
+
+/// Names the offset of a reference's clock first: the other causes were judged with it in the baseline, and what they
+/// close is now a share of the gap that it is a part of.
+fn with_clock(diagnosis: &mut Diagnosis, clock: Clock<'_>) {
+    for cause in &mut diagnosis.causes {
+        let mut shares = clock.set.iter().zip(&clock.closed.each);
+        let share = shares.find(|(effect, _)| effect.id == cause.effect).map(|(_, share)| *share);
+        (cause.gap_closed, cause.gap_closed_ci95) = (share.map(|s| s.value), share.map(|s| s.interval));
+    }
+    diagnosis.gap_closed_total = Some(clock.closed.total.value);
+    diagnosis.gap_closed_total_ci95 = Some(clock.closed.total.interval);
+    diagnosis.credible_set.insert(0, clock.cause.effect.clone());
+    diagnosis.causes.insert(0, clock.cause);
 }
 
 fn is_followed(following: &Following, tests: usize) -> bool {

@@ -82,7 +82,10 @@ impl<'a> Scene<'a> {
         if recording.reference.is_some() && motion.swings().is_none() {
             unsteady::leave_out(recording, &usable, &blocks, &mut counts);
         }
-        let kinds = SensorKind::ALL.into_iter().filter(|kind| recording.sensor(*kind).is_some()).collect();
+        // On a rig a sensor without a usable row stays: its samples may be told from another unit.
+        let is_used = |kind: SensorKind| motion.swings().is_some() || usable[kind as usize].contains(&true);
+        let is_there = |kind: &SensorKind| recording.sensor(*kind).is_some() && is_used(*kind);
+        let kinds = SensorKind::ALL.into_iter().filter(is_there).collect();
         let apart = if motion.swings().is_some() { NODES.0 } else { NODES.1 };
         let fine = |block: &Block| {
             let still = block.rest.is_some() && motion.swings().is_some();

@@ -17,7 +17,9 @@ use super::{
 use crate::{
     effect::find,
     recording::{Recording, SensorKind},
-    simulator::{Dose, DriftKind, NoiseLevel, Programme, Simulation, UnitKind},
+    simulator::{
+        Dose, DriftKind, NoiseLevel, Programme, SimulatedUnit, Simulation, Tumble, UnitKind, record,
+    },
 };
 
 fn simulation(seed: u64) -> Simulation {
@@ -316,4 +318,27 @@ fn the_evidence_of_an_effect_allows_for_one_amplitude_that_stands_alone() {
     });
     let expected = (each.iter().sum::<f64>() / 8.0).ln();
     assert!((projected.log_bayes_factor(&[&[0, 1, 2]]) - expected).abs() < 1e-9);
+}
+
+#[test]
+fn a_hand_recording_that_ends_within_a_move_has_no_gap() {
+    let unit = SimulatedUnit { interval: 0.02, ..SimulatedUnit::mtx() };
+    let mut recording = record("cut.csv", &Tumble::new(30, 0), &unit, 1);
+    // The last turn but one begins at 150 s.
+    let rows = recording.time.partition_point(|time| *time < 150.1 - 1e-9);
+    recording.time.truncate(rows);
+    for triple in [&mut recording.acc, &mut recording.gyr, &mut recording.mag].into_iter().flatten() {
+        triple.values.truncate(rows);
+    }
+    recording.mag = None;
+    assert_eq!(diagnose(&recording, &Options::default(), &|_| ()).verdict, Verdict::None);
+}
+
+#[test]
+fn a_hand_recording_s_field_is_compared_with_no_heading() {
+    let unit = SimulatedUnit { interval: 0.02, ..SimulatedUnit::mtx() };
+    let mut recording = record("field.csv", &Tumble::new(20, 2), &unit, 3);
+    recording.manifest.site.field_ned_ut = Some([25.0, 2.0, 39.0]);
+    let diagnosis = diagnose(&recording, &Options::default(), &|_| ());
+    assert_eq!(diagnosis.verdict, Verdict::None, "{:?}", diagnosis.remarks);
 }

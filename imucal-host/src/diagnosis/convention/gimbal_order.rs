@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// A triad follows where K v + b leaves no more than this share of its variance.
-const FOLLOWS: f64 = 0.1;
+pub(super) const FOLLOWS: f64 = 0.1;
 /// Rows that are replayed.
 const ROWS: usize = 250;
 /// Rates are told from readings this far before and after, s.
