@@ -14,7 +14,7 @@ use imucal_host::{
 };
 
 const HEALTHY: usize = 40;
-const AFFLICTED: usize = 24;
+const AFFLICTED: usize = 36;
 /// A set of any nonce must do; this one has been drawn once and for all, so that the test has one outcome.
 const NONCE: &str = "20261122";
 
@@ -27,6 +27,29 @@ fn is_beyond_chance(share: &Share) -> bool {
         Some(Goal::Within(least, most)) => high < least || low > most,
         None => false,
     }
+}
+
+/// A figure of so few trials that no outcome would be beyond chance must have one right at least; one of no trial says
+/// nothing.
+fn is_refused(share: &Share) -> bool {
+    let worst = match share.must {
+        Some(Goal::AtLeast(_) | Goal::Within(..)) => 0,
+        Some(Goal::AtMost(_)) => share.trials,
+        None => return false,
+    };
+    is_beyond_chance(share) || share.hits == worst
+}
+
+#[test]
+fn a_figure_of_any_number_of_trials_can_be_refused() {
+    let share = |hits, trials, must| Share { name: "", hits, trials, must: Some(must), aim: None };
+    for trials in 0..100 {
+        assert!(is_refused(&share(0, trials, Goal::AtLeast(0.7))), "none of {trials}");
+        assert!(trials == 0 || !is_refused(&share(trials, trials, Goal::AtLeast(0.7))), "all of {trials}");
+        assert!(is_refused(&share(trials, trials, Goal::AtMost(0.05))), "all of {trials}");
+    }
+    // By Clopper and Pearson 0 of 3 may still be 70.8 %, and 1 of 6 no more than 64.1 %.
+    assert!(!is_refused(&share(1, 3, Goal::AtLeast(0.7))) && is_refused(&share(1, 6, Goal::AtLeast(0.7))));
 }
 
 #[test]
@@ -43,7 +66,7 @@ fn a_small_set_of_sealed_trials_is_answered_no_worse_than_the_contract_allows() 
     println!("{}", score.table());
     judged.iter().filter(|judged| judged.is_missed()).for_each(|judged| println!("{}", judged.line()));
     for share in &score.shares {
-        assert!(!is_beyond_chance(share), "{}: {} of {}", share.name, share.hits, share.trials);
+        assert!(!is_refused(share), "{}: {} of {}", share.name, share.hits, share.trials);
     }
     assert!(judged.iter().all(|judged| judged.answer.verdict.is_some()), "a diagnosis came to no end");
 }
