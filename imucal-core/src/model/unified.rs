@@ -374,6 +374,44 @@ mod tests {
         assert!(largest_jacobian_error(&model, &terms.theta(&base)) < 1e-8);
     }
 
+    /// Residuals and rows, as a solver is given them.
+    #[derive(Default)]
+    struct Rows<const JACOBIAN: bool>(std::vec::Vec<(f64, SVector<f64, UNIFIED>)>);
+
+    impl<const JACOBIAN: bool> RowSink<f64, UNIFIED> for Rows<JACOBIAN> {
+        const JACOBIAN: bool = JACOBIAN;
+
+        fn row(&mut self, residual: f64, jacobian: &SVector<f64, UNIFIED>) {
+            self.0.push((residual, *jacobian));
+        }
+    }
+
+    #[test]
+    fn residuals_are_the_same_without_a_jacobian_and_a_held_parameter_has_a_row_of_its_own() {
+        let poses = [GimbalPose::new(Vector3::new(0.1, 0.2, -0.3), &Vector3::new(0.4, -1.1, 2.3))];
+        let base = UnifiedParameters::nominal(Vector3::new(0.2, 0.1, -1.0));
+        let terms = Terms::new(core::array::from_fn::<u8, UNIFIED, _>(|k| k as u8));
+        let held = 5;
+        let model = UnifiedModel { poses: &poses, axes: AXES, base, terms, held: 1 << held };
+        let mut theta = terms.theta(&base);
+        theta[held] += 0.01;
+        let (mut with, mut without) = (Rows::<true>::default(), Rows::<false>::default());
+        model.rows(&theta, &mut with);
+        model.rows(&theta, &mut without);
+        assert_eq!((with.0.len(), without.0.len()), (4, 4));
+        for ((one, _), (other, _)) in with.0.iter().zip(&without.0) {
+            assert!((one - other).abs() < 1e-15, "{one} {other}");
+        }
+        let output = UnifiedParameters::from_vector(&theta).predict(&poses[0].rotations(&AXES));
+        for axis in 0..3 {
+            assert!((with.0[axis].0 - (output - poses[0].value)[axis]).abs() < 1e-15);
+            assert_eq!(with.0[axis].1[held], 0.0);
+        }
+        assert!((with.0[3].0 - 0.01).abs() < 1e-15);
+        let own = SVector::<f64, UNIFIED>::from_fn(|k, _| f64::from(u8::from(k == held)));
+        assert_eq!(with.0[3].1, own);
+    }
+
     #[test]
     fn a_tilted_base_shows_gravity_as_the_paper_s_reconstruction_has_it() {
         let g = 9.8;

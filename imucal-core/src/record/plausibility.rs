@@ -259,6 +259,19 @@ mod tests {
     }
 
     #[test]
+    fn a_gain_to_a_unit_that_is_not_the_si_side_is_held_to_their_ratio() {
+        let of = |gain: f32| {
+            triad(RawUnit::MilliGravity, RawUnit::StandardGravity, gain).check(Sensor::Accelerometer)
+        };
+        for gain in [5e-4, 1e-3, 2e-3] {
+            assert_eq!(of(gain), Ok(()), "{gain}");
+        }
+        for gain in [1e-4, 9.6e-2, 1.0] {
+            assert!(of(gain).is_err(), "{gain}");
+        }
+    }
+
+    #[test]
     fn every_sensor_takes_its_own_units_alone() {
         for (sensor, units) in UNITS {
             for unit in RawUnit::ALL {

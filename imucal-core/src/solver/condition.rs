@@ -116,7 +116,7 @@ fn orthogonalise<T: Scalar>(first: &mut [T], second: &mut [T]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Matrix5, SMatrix};
+    use nalgebra::{Matrix3, Matrix5, SMatrix, Vector3};
     use proptest::prelude::*;
 
     proptest! {
@@ -129,6 +129,21 @@ mod tests {
             let expected = values.max() / values.min();
             prop_assert!((normalised_condition(&a) / expected - 1.0).abs() < 1e-9 * expected);
         }
+    }
+
+    #[test]
+    fn the_weakest_direction_is_that_of_an_independent_svd() {
+        // Upper triangular, with columns of very different lengths.
+        let r = Matrix3::new(2.0, 30.0, 0.1, 0.0, 5.0, 0.4, 0.0, 0.0, 0.05);
+        let lengths = Vector3::from_fn(|k, _| r.column(k).norm());
+        let unit = r * Matrix3::from_diagonal(&lengths.map(f64::recip));
+        let svd = unit.svd(false, true);
+        let least = svd.singular_values.imin();
+        let expected = svd.v_t.unwrap().row(least).transpose().component_div(&lengths);
+        let found = weakest_direction(&r).unwrap();
+        let sign = found.dot(&expected).signum();
+        assert!((found * sign - expected).amax() < 1e-6 * expected.amax(), "{found} {expected}");
+        assert!(weakest_direction(&Matrix3::<f64>::zeros()).is_none());
     }
 
     #[test]

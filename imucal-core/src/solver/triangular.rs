@@ -260,6 +260,26 @@ mod tests {
         }
 
         #[test]
+        fn inverse_covariance_and_lengths_are_those_of_their_definitions(
+            entries in prop::collection::vec(-5.0f64..5.0, 40), x in prop::array::uniform4(-3.0f64..3.0),
+        ) {
+            let mut t = Triangular::<f64, 4>::default();
+            for row in entries.chunks_exact(5) {
+                t.push(row[4], &Vector4::from_column_slice(&row[..4]));
+            }
+            let (r, x) = (*t.r(), Vector4::from(x));
+            prop_assume!(r.diagonal().amin() > 0.1);
+            let inverse = r.try_inverse().unwrap();
+            prop_assert!((t.inverse().unwrap() - inverse).amax() < 1e-9 * inverse.amax());
+            let covariance = inverse * inverse.transpose() * 0.7;
+            prop_assert!((t.covariance(0.7).unwrap() - covariance).amax() < 1e-9 * covariance.amax());
+            prop_assert!((t.length_of(&x) - (r * x).norm()).abs() < 1e-10);
+            let mut solved = x;
+            prop_assert!(substitute_transposed(r.as_slice(), solved.as_mut_slice()));
+            prop_assert!((r.transpose() * solved - x).amax() < 1e-8 * (1.0 + solved.amax()));
+        }
+
+        #[test]
         fn the_damped_step_solves_the_damped_normal_equations(
             entries in prop::collection::vec(-5.0f64..5.0, 40), mu in 1e-3f64..10.0,
         ) {
@@ -273,6 +293,21 @@ mod tests {
             let left = t.r().transpose() * t.r() + damping;
             prop_assert!((left * step + t.gradient()).norm() < 1e-9 * left.norm());
         }
+    }
+
+    #[test]
+    fn a_row_whose_squares_vanish_leaves_the_factor_finite() {
+        let mut t = Triangular::<f64, 2>::default();
+        t.push(0.0, &SVector::from([1e-200, 1e-200]));
+        t.push(1.0, &SVector::from([3.0, 4.0]));
+        t.push(0.0, &SVector::from([0.0, 2.0]));
+        assert!((t.r().transpose() * t.r() - SMatrix::from([[9.0, 12.0], [12.0, 20.0]])).amax() < 1e-12);
+    }
+
+    #[test]
+    fn a_pivot_that_vanishes_has_no_solution() {
+        let r = [2.0, 0.0, 1.0, 0.0];
+        assert!(!substitute_transposed(&r, &mut [1.0, 1.0]) && !substitute_back(&r, &mut [1.0, 1.0]));
     }
 
     #[test]

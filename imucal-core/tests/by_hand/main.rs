@@ -2,4 +2,5 @@
 
 mod accept;
 mod rows;
+mod solver;
 mod turn;

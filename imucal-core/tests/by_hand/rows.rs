@@ -23,6 +23,21 @@ impl<const P: usize> Model<f64, P> for Rows<P> {
     }
 }
 
+/// Rosenbrock's valley as residuals: 10 (y − x²) and 1 − x.
+#[derive(Clone, Copy, Debug)]
+pub struct Valley;
+
+impl Model<f64, 2> for Valley {
+    fn rows<S: RowSink<f64, 2>>(&self, theta: &SVector<f64, 2>, sink: &mut S) {
+        sink.row(10.0 * (theta.y - theta.x * theta.x), &SVector::from([-20.0 * theta.x, 10.0]));
+        sink.row(1.0 - theta.x, &SVector::from([-1.0, 0.0]));
+    }
+
+    fn independent_rows(&self) -> usize {
+        2
+    }
+}
+
 /// One residual x + c x², x = g (θ − θ₀), and two that stay.
 #[derive(Clone, Copy, Debug)]
 pub struct Bent {

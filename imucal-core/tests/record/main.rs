@@ -182,6 +182,23 @@ fn figures_that_no_sensor_has_are_refused_both_ways() {
 }
 
 #[test]
+fn a_triad_that_stays_keeps_a_provenance_that_differs_in_date_or_serial_alone() {
+    let original = golden_record();
+    let (unit, date) = (original.sensor.clone(), original.date);
+    let gyr = original.acc.clone().unwrap();
+    let kept = |serial: &str, days: u32| {
+        let mut record = original.clone();
+        let unit = SensorIdentity { serial: serial.parse().unwrap(), ..unit.clone() };
+        record.adopt(Sensor::Gyroscope, &gyr, &unit, Date::from_days(days));
+        record.provenance[0].clone()
+    };
+    let own = Some(Provenance { serial: unit.serial.clone(), date });
+    assert_eq!(kept("00300017", 20_000), None);
+    assert_eq!(kept("00300017", 20_001), own);
+    assert_eq!(kept("00300018", 20_000), own);
+}
+
+#[test]
 fn a_triad_that_is_adopted_leaves_the_others_as_they_were_made() {
     let mut record = golden_record();
     let unit = SensorIdentity { serial: "00300018".parse().unwrap(), ..record.sensor.clone() };

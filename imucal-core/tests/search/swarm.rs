@@ -146,6 +146,13 @@ fn slices_of_any_size_give_the_same_bits_and_never_more_work_than_granted() {
 }
 
 #[test]
+fn a_grant_without_end_ends_in_one_step() {
+    let mut swarm = Swarm::<_, 40, 2, _>::new(bounds(), CONSTRICTION);
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    assert!(swarm.step(&sphere::<2>(), &mut rng, usize::MAX).is_some());
+}
+
+#[test]
 fn a_grant_of_nothing_does_nothing() {
     let mut swarm = Swarm::<_, 4, 3, _>::new(bounds(), CONSTRICTION);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
