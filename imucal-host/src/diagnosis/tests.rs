@@ -2,19 +2,24 @@ use std::sync::LazyLock;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::{
-    Options, Verdict,
-    candidates::{Candidates, Setting, is_shaped},
-    design::{Channel, Normal},
-    diagnose,
-    evidence::Projected,
-    footing::Footing,
-    linear::Linear,
-    noise::FAR,
-    refit::{Fit, refit},
-    scene::{Means, Scene},
-};
 use crate::{
+    diagnosis::{
+        Options, Verdict, diagnose,
+        library::{
+            candidates::{Candidates, Setting, is_shaped},
+            evidence::Projected,
+        },
+        mixed_model::{
+            design::{Channel, Normal},
+            noise::FAR,
+        },
+        residual::{block::Means, forward_model::Scene},
+        screening::preparation::Footing,
+        search::{
+            linearisation::Linear,
+            refit::{Fit, refit},
+        },
+    },
     effect::find,
     recording::{Recording, SensorKind},
     simulator::{

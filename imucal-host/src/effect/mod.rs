@@ -188,6 +188,19 @@ impl Effect {
         self
     }
 
+    /// Parameters that its signature is linear in.
+    pub fn amplitudes(&self) -> impl Iterator<Item = usize> {
+        let known = self.parameters.iter().enumerate();
+        known.filter(|(_, parameter)| parameter.role == Role::Amplitude).map(|(index, _)| index)
+    }
+
+    /// Parameters that say how or when, at these values; an instant that never comes is none.
+    pub fn shapes_at<'e>(&'e self, values: &'e [f64]) -> impl Iterator<Item = usize> + 'e {
+        let is_shape = |role: &Role| matches!(role, Role::Shape { .. } | Role::Instant { .. });
+        let known = self.parameters.iter().zip(values).enumerate();
+        known.filter(move |(_, (p, value))| is_shape(&p.role) && value.is_finite()).map(|(index, _)| index)
+    }
+
     /// Its parameters in a run of `duration` s, such that it does nothing.
     pub fn neutral(&self, duration: f64) -> Vec<f64> {
         self.parameters.iter().map(|parameter| parameter.neutral(duration)).collect()

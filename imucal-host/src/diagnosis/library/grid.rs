@@ -1,0 +1,89 @@
+//! Where in time, and in what shape, each candidate is likeliest.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::{
+    candidates::{Candidates, is_shaped},
+    grid_posterior::Shaped,
+    nonlinear,
+    nonlinear::Backdrop,
+};
+use crate::{
+    diagnosis::{
+        mixed_model::{
+            design::Design,
+            noise::{Noise, Weighing},
+        },
+        residual::{base_run::Reference, forward_model::Scene},
+    },
+    effect::Effect,
+    simulator::Dose,
+};
+
+/// Scans the shapes of candidates. Signatures are those about the fit it was made with: what is fitted later changes where
+/// they lie in the second order only, and they are taken anew where their size counts.
+#[derive(Clone)]
+pub struct Scan<'s> {
+    scene: &'s Scene<'s>,
+    candidates: &'s Candidates,
+    coarse: Arc<Reference<'s>>,
+}
+
+/// What candidates are shaped beside.
+pub struct Beside<'a> {
+    /// Effects that have their shapes.
+    pub doses: &'a [Dose],
+    /// Weighs the blocks.
+    pub weighing: &'a Weighing<'a>,
+    /// The columns of those effects, and a residual.
+    pub design: &'a Design,
+    /// Indices of those columns.
+    pub fitted: &'a [usize],
+}
+
+impl<'s> Scan<'s> {
+    /// About a fit. `None` where the simulator fails.
+    pub fn new(scene: &'s Scene<'s>, candidates: &'s Candidates, doses: Vec<Dose>) -> Option<Self> {
+        Some(Self { scene, candidates, coarse: Arc::new(Reference::new(scene, doses, &scene.coarse)?) })
+    }
+
+    /// The shape of each candidate that is best under a noise; that of the doses for those they hold, as widely `spread`
+    /// as it was when it was found, and what `kept` tells of others.
+    pub fn shapes(
+        &self,
+        beside: &Beside<'_>,
+        noise: &Noise,
+        spread: &(dyn Fn(usize) -> f64 + Sync),
+        kept: &(dyn Fn(usize) -> Option<Shaped> + Sync),
+    ) -> Option<Vec<Shaped>> {
+        let (scene, design) = (self.scene, beside.design);
+        let whitenings = beside.weighing.whitenings(design, noise);
+        // Where no rig guides the sensor, what a hand adds hides when an episode began and ended.
+        let quiet = match scene.swings {
+            Some(_) => None,
+            None => Some(beside.weighing.whitenings(design, &noise.quieter().even())),
+        };
+        let backdrop = Backdrop::new(scene, design, beside.fitted, &whitenings);
+        let quiet = quiet.as_ref().map(|quiet| Backdrop::new(scene, design, beside.fitted, quiet));
+        let best = |effect: &'static Effect| match quiet.as_ref().filter(|_| nonlinear::is_episode(effect)) {
+            Some(quiet) => {
+                let best = nonlinear::best(effect, &self.coarse, quiet)?;
+                let (values, _) = nonlinear::refine(effect, &best.values, &self.coarse, quiet)?;
+                Some(Shaped { values, ..best })
+            }
+            None => nonlinear::best(effect, &self.coarse, &backdrop),
+        };
+        let shape = |(at, effect): (usize, &&'static Effect)| {
+            let held = beside.doses.iter().find(|dose| std::ptr::eq(dose.effect, *effect));
+            let held = held.map(|dose| Shaped { values: dose.values.clone(), spread: spread(at) });
+            match held.or_else(|| kept(at)) {
+                Some(shape) => Some(shape),
+                None if is_shaped(effect) => best(effect),
+                None => Some(Shaped::alone(effect.neutral(scene.duration()))),
+            }
+        };
+        self.candidates.effects.par_iter().enumerate().map(shape).collect()
+    }
+}

@@ -1,0 +1,221 @@
+//! Whether a sensor's residual follows a driver: score tests, and evidence with a noise of its own.
+
+use nalgebra::{DMatrix, SymmetricEigen, Vector3};
+use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::{covariate::Driver, covariates::TIME, periodogram};
+use crate::{
+    diagnosis::{
+        library::evidence::{Projected, log_evidence},
+        mixed_model::{
+            augmented_normal::Bordered,
+            design::Design,
+            noise::{NEAR, Noise},
+        },
+        residual::{block::Means, forward_model::Scene},
+        search::linearisation::Linear,
+    },
+    effect::Effect,
+    recording::SensorKind,
+};
+
+/// The χ² of a test is divided by this: white noise is known to a few per cent.
+const CAUTION: f64 = 1.1;
+/// A driver that would be followed by chance less often than this in a quieter noise is tested again.
+const SUSPECT: f64 = 1e-9;
+/// What half-waves of the time must raise the evidence by beyond others: a drift is no sum of two processes.
+const DRIFTING: f64 = 12.0;
+/// Drivers tested again, of those as slow as drift and of the others.
+const SUSPECTS: (usize, usize) = (2, 4);
+/// Directions that keep less than this share of their information are others by another name, and do not count.
+pub const RETAINED: f64 = 1e-4;
+
+/// How a sensor's residual follows a driver.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Following {
+    /// Sensor.
+    pub kind: SensorKind,
+    /// Driver.
+    pub driver: String,
+    /// The function and axis that it follows most.
+    pub detail: String,
+    /// Whitened squared size of what follows it, less what noise alone would give.
+    pub size: f64,
+    /// Probability of as much by noise, this test alone.
+    pub p_value: f64,
+}
+
+/// How each sensor follows each driver once the baseline and `set` are fitted, the surest first.
+pub fn following(
+    linear: &Linear<'_>,
+    set: &[&'static Effect],
+    noise: &Noise,
+    drivers: &[Driver],
+) -> Option<Vec<Following>> {
+    let fitted = linear.fitted(set);
+    let whitenings = linear.whitenings(noise);
+    let bordered = Bordered::new(&linear.design, &whitenings, &fitted);
+    let kinds = linear.scene.kinds.iter();
+    let pairs: Vec<(SensorKind, &Driver)> = kinds
+        .flat_map(|kind| drivers.iter().map(move |driver| (*kind, driver)))
+        .filter(|(kind, driver)| !driver.columns(*kind).is_empty())
+        .collect();
+    let follow = |(kind, driver): &(SensorKind, &Driver)| {
+        let normal = bordered.with(&means(*kind, driver, noise));
+        let every: Vec<usize> = (0..normal.score.len()).collect();
+        let (first, others) = every.split_at(fitted.len());
+        follow(linear.scene, *kind, driver, &Projected::new(&normal, first, others)?)
+    };
+    let mut found: Vec<Following> = pairs.par_iter().map(follow).collect::<Option<_>>()?;
+    sort(&mut found);
+    Some(found)
+}
+
+/// As [`following`], but what would show in a quieter noise is judged again by its evidence, with a noise estimated
+/// beside it: a gap that nothing explains has been taken for drift or scatter. The odds of noise alone are a bound of the
+/// probability that noise would do as much.
+pub fn following_anew(
+    linear: &Linear<'_>,
+    set: &[&'static Effect],
+    noise: &Noise,
+    drivers: &[Driver],
+) -> Option<Vec<Following>> {
+    let mut found = following(linear, set, noise, drivers)?;
+    let suspects = following(linear, set, &noise.quieter(), drivers)?;
+    let suspects = |slow: bool, most: usize| {
+        suspects.iter().filter(move |f| f.p_value < SUSPECT && f.is_slow() == slow).take(most)
+    };
+    let again = |suspect: &Following| {
+        let driver = drivers.iter().find(|driver| driver.name == suspect.driver)?;
+        judged(linear, set, noise, suspect.kind, driver, 1)
+    };
+    let tested: Vec<&Following> = suspects(true, SUSPECTS.0).chain(suspects(false, SUSPECTS.1)).collect();
+    let again: Vec<Following> = tested.into_par_iter().map(again).collect::<Option<_>>()?;
+    for again in again {
+        if let Some(own) = found.iter_mut().find(|f| f.kind == again.kind && f.driver == again.driver)
+            && again.p_value < own.p_value
+        {
+            *own = again;
+        }
+    }
+    let whitenings = linear.whitenings(noise);
+    for kind in &linear.scene.kinds {
+        if let Some((driver, choices)) = periodogram::beat(linear, set, &whitenings, *kind) {
+            found.push(judged(linear, set, noise, *kind, &driver, choices)?);
+        }
+    }
+    sort(&mut found);
+    Some(found)
+}
+
+/// A driver, chosen among so many, beside a set, by the evidence that it adds with a noise of its own.
+fn judged(
+    linear: &Linear<'_>,
+    set: &[&'static Effect],
+    noise: &Noise,
+    kind: SensorKind,
+    driver: &Driver,
+    choices: usize,
+) -> Option<Following> {
+    let (mut design, fitted) = with_driver(linear, set, kind, driver, noise);
+    let every: Vec<usize> = (0..design.size).collect();
+    let mut groups = linear.groups(set, &linear.fitted(set));
+    // The other sensors do not show it.
+    design.channels.retain(|channel| channel.kind == kind);
+    let others = linear.condensed(noise).picked(None, &linear.fitted(set));
+    let condensed = linear.weighing.condensed(&design, noise).beside(others);
+    let alone = noise.normal(&condensed.picked(None, &every[..fitted]), fitted);
+    let before = log_evidence(&alone, noise, linear.baseline.len(), &groups)?;
+    let mut anew = noise.clone();
+    anew.sensors[kind as usize] = linear.weighing.fit(&condensed, kind, &every, noise, &NEAR);
+    let normal = anew.normal(&condensed, design.size);
+    groups.push(every[fitted..].to_vec());
+    let gain = log_evidence(&normal, &anew, linear.baseline.len(), &groups)? - before - (choices as f64).ln();
+    let gain = if driver.name == TIME { gain - DRIFTING } else { gain };
+    let projected = Projected::new(&normal, &every[..fitted], &every[fitted..])?;
+    let following = follow(linear.scene, kind, driver, &projected)?;
+    Some(Following { p_value: libm::exp(-gain.max(0.0)), ..following })
+}
+
+fn sort(found: &mut [Following]) {
+    found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value).then(b.size.total_cmp(&a.size)));
+}
+
+impl Following {
+    /// Its driver is as slow as drift, which an estimate of the noise cannot tell from it.
+    fn is_slow(&self) -> bool {
+        self.driver == TIME || self.driver.starts_with("temperature")
+    }
+}
+
+/// The columns of the baseline and a set, and of a driver of one sensor behind them; with the number of the former.
+fn with_driver(
+    linear: &Linear<'_>,
+    set: &[&'static Effect],
+    kind: SensorKind,
+    driver: &Driver,
+    noise: &Noise,
+) -> (Design, usize) {
+    let fitted = linear.fitted(set);
+    let columns = fitted.iter().map(|id| linear.design.columns[*id]).collect();
+    (linear.design.extended(&fitted, columns, &means(kind, driver, noise)), fitted.len())
+}
+
+/// Signatures of a driver on a sensor, of the size of white noise in a sample.
+fn means(kind: SensorKind, driver: &Driver, noise: &Noise) -> Vec<Means> {
+    let usual = noise.sensors[kind as usize].white.iter().sum::<f64>() / 3.0;
+    let columns = driver.columns(kind).into_iter();
+    columns.map(|(function, axis)| on(kind, axis, &driver.functions[function].values, usual)).collect()
+}
+
+/// A signature on one axis of one sensor.
+fn on(kind: SensorKind, axis: usize, values: &[f64], usual: f64) -> Means {
+    let mut means: Means = Default::default();
+    let along = |value: &f64| Vector3::from_fn(|k, _| if k == axis { usual * value } else { 0.0 });
+    means[kind as usize] = Some(values.iter().map(along).collect());
+    means
+}
+
+fn follow(scene: &Scene<'_>, kind: SensorKind, driver: &Driver, projected: &Projected) -> Option<Following> {
+    let places: Vec<usize> = (0..projected.score.len()).collect();
+    let (statistic, dimensions) = score_test(projected, &places);
+    let p_value = match ChiSquared::new(dimensions.max(1) as f64) {
+        Ok(distribution) if dimensions > 0 => distribution.sf(statistic / CAUTION),
+        _ => 1.0,
+    };
+    let single =
+        |place: &usize| projected.score[*place].powi(2) / projected.information[(*place, *place)].max(1e-12);
+    let most = places.iter().max_by(|a, b| single(a).total_cmp(&single(b)))?;
+    let (function, axis) = *driver.columns(kind).get(*most)?;
+    Some(Following {
+        kind,
+        driver: driver.name.clone(),
+        detail: match scene.axis(kind, axis) {
+            name @ ("x" | "y" | "z") => format!("{name} axis, {}", driver.functions[function].detail),
+            name => format!("{name}; {}", driver.functions[function].detail),
+        },
+        size: (statistic - dimensions as f64).max(0.0),
+        p_value,
+    })
+}
+
+/// sᵀ V⁺ s and the rank of V, over directions that the projection leaves.
+pub fn score_test(projected: &Projected, places: &[usize]) -> (f64, usize) {
+    let n = places.len();
+    let scale = |i: usize| 1.0 / projected.before[places[i]].max(f64::MIN_POSITIVE).sqrt();
+    let v =
+        DMatrix::from_fn(n, n, |i, j| projected.information[(places[i], places[j])] * scale(i) * scale(j));
+    let eigen = SymmetricEigen::new(v);
+    let mut sum = 0.0;
+    let mut rank = 0;
+    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        if *value > RETAINED {
+            let along: f64 =
+                vector.iter().enumerate().map(|(i, v)| v * projected.score[places[i]] * scale(i)).sum();
+            sum += along * along / value;
+            rank += 1;
+        }
+    }
+    (sum, rank)
+}

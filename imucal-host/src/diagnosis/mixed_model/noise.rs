@@ -1,0 +1,321 @@
+//! The noise of each channel: white, drifting, and what a rest or a movement has in common.
+//!
+//! White noise comes from neighbouring blocks. Drifts and scatter come from the restricted likelihood of the blocks'
+//! residuals ([`super::likelihood`]), so that what the model has taken up is not missed in the noise.
+//!
+//! Each sensor has its own; the axes of a sensor share drift and scatter. Not modelled: noise that axes have in common,
+//! white noise that changes in the course of the recording.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::{
+    design::{Channel, CondensedDesign, Design, Normal},
+    likelihood::Likelihood,
+    random_effects::Latents,
+    repeatability::Scattered,
+    whitening::{Process, Whitening},
+};
+use crate::{
+    diagnosis::residual::{block::Block, forward_model::Scene},
+    recording::SensorKind,
+};
+
+/// Correlation time of the fast drift, s.
+const FAST: f64 = 8.0;
+/// Correlation times that the slow drift may have, s: the last is a walk, which forgets nothing while it is recorded.
+const SLOW: [f64; 3] = [30.0, 120.0, WALK];
+const WALK: f64 = 1200.0;
+/// The one that a search begins with.
+pub const USUAL: f64 = SLOW[1];
+/// −ln of the odds of a walk against a drift that forgets: a walk would take up any cause that goes slowly.
+const WALKS: f64 = 2.0;
+/// Factors of a search that begins anywhere.
+pub const FAR: [f64; 2] = [4.0, 1.7];
+/// Factors of a search that begins near its end.
+pub const NEAR: [f64; 1] = [2.0];
+/// Rounds over all standard deviations for each factor.
+const ROUNDS: usize = 4;
+/// −2 ln of the likelihood must fall by this for a step to be gone.
+const WORTH: f64 = 0.05;
+/// A beginning near an end that is so much worse than what has been found leads nowhere better.
+const HOPELESS: f64 = 15.0;
+/// Share of drift and scatter that [`Noise::quieter`] leaves.
+const QUIET: f64 = 0.2;
+
+/// Noise of one sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorNoise {
+    /// White noise of a sample at rest, by axis; unit of the sensor.
+    pub white: [f64; 3],
+    /// White noise of a sample in motion, by axis.
+    pub moving: [f64; 3],
+    /// Standard deviations of the fast and the slow drift.
+    pub drift: [f64; 2],
+    /// Correlation time of the slow drift, s.
+    pub slow: f64,
+    /// Angle by which the table stands off its encoders, anew at each rest, rad.
+    pub scatter: f64,
+    /// ln of how many noises about this one are as likely.
+    pub breadth: f64,
+}
+
+/// Noise of a recording, by [`SensorKind::ALL`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Noise {
+    /// Of each sensor.
+    pub sensors: [SensorNoise; 3],
+}
+
+impl Noise {
+    /// Normal equations of all columns of a condensed design, of which there are `size`.
+    pub fn normal(&self, design: &CondensedDesign, size: usize) -> Normal {
+        let sensor = |kind: SensorKind| &self.sensors[kind as usize];
+        design.normal(size, &|channel| sensor(channel.kind).whitening(&channel.columns.latents))
+    }
+
+    /// −ln of the prior of all that are as likely, but for a constant.
+    pub fn surprise(&self) -> f64 {
+        self.sensors.iter().map(SensorNoise::surprise).sum()
+    }
+
+    /// With smaller drifts and scatter: what an unmodelled effect has put into them comes to light.
+    #[must_use]
+    pub fn quieter(&self) -> Self {
+        let mut quiet = self.clone();
+        for sensor in &mut quiet.sensors {
+            sensor.drift = sensor.drift.map(|sigma| QUIET * sigma);
+            sensor.scatter *= QUIET;
+        }
+        quiet
+    }
+
+    /// As noisy at rest as in motion: a quiet rest does not outweigh all else before an instant is known to a block.
+    #[must_use]
+    pub fn even(mut self) -> Self {
+        for sensor in &mut self.sensors {
+            for axis in 0..3 {
+                sensor.white[axis] = sensor.white[axis].max(sensor.moving[axis]);
+            }
+        }
+        self
+    }
+
+    /// With white noise that is no more than another's: a misfit that a fit has gone through is no noise.
+    #[must_use]
+    pub fn at_most(mut self, other: &Self) -> Self {
+        for (own, other) in self.sensors.iter_mut().zip(&other.sensors) {
+            for axis in 0..3 {
+                own.white[axis] = own.white[axis].min(other.white[axis]);
+                own.moving[axis] = own.moving[axis].min(other.moving[axis]);
+            }
+        }
+        self
+    }
+}
+
+/// What weighs the blocks: the scene, and what each sensor is given there.
+pub struct Weighing<'s> {
+    /// The scene.
+    pub scene: &'s Scene<'s>,
+    times: Vec<f64>,
+    /// Mean output of each block, by sensor: scatter turns it.
+    pub given: [Vec<Vector3<f64>>; 3],
+}
+
+impl<'s> Weighing<'s> {
+    /// With the outputs of the simulator, block by block.
+    pub fn new(scene: &'s Scene<'s>, given: [Vec<Vector3<f64>>; 3]) -> Self {
+        Self { scene, times: scene.blocks.iter().map(|block| block.time).collect(), given }
+    }
+
+    /// The smallest scatter that is looked for, rad: a rig repeats its rests; a hand does not, nor is the field of a
+    /// room the same all over it.
+    pub fn least_scatter(&self) -> f64 {
+        if self.scene.swings.is_some() { 1e-7 } else { 1e-5 }
+    }
+
+    /// Σ⁻¹ of each channel of a design.
+    pub fn whitenings(&self, design: &Design, noise: &Noise) -> Vec<Whitening> {
+        self.whitenings_within(design, noise, &|_| true)
+    }
+
+    /// Σ⁻¹ of each channel over some of the blocks, as if the others had not been measured.
+    pub fn whitenings_within(
+        &self,
+        design: &Design,
+        noise: &Noise,
+        inside: &(dyn Fn(usize) -> bool + Sync),
+    ) -> Vec<Whitening> {
+        let whitening = |channel: &Channel| {
+            let latents = self.latents(channel, noise, inside);
+            noise.sensors[channel.kind as usize].whitening(&Arc::new(latents))
+        };
+        design.channels.par_iter().map(whitening).collect()
+    }
+
+    /// What the blocks of a channel have in common, but for the scatter.
+    pub fn drifting(&self, channel: &Channel, noise: &Noise) -> Latents {
+        Latents::new(&self.times, self.weights(channel, noise, &|_| true), &[])
+    }
+
+    /// A design's columns, as white noise weighs them.
+    pub fn condensed(&self, design: &Design, noise: &Noise) -> CondensedDesign {
+        design.condensed(&|channel| self.latents(channel, noise, &|_| true))
+    }
+
+    /// Variance of a block's mean by noise alone.
+    pub fn variance(&self, channel: &Channel, noise: &Noise, block: usize) -> f64 {
+        let sensor = &noise.sensors[channel.kind as usize];
+        let count = self.scene.counts[channel.kind as usize][block].max(1) as f64;
+        let rest = self.scene.blocks[block].rest.is_some();
+        let white = if rest { sensor.white } else { sensor.moving }[channel.axis];
+        let scatter = sensor.scatter * sensor.scatter * self.scattered(channel).variance(block);
+        white * white / count + sensor.drift.iter().map(|sigma| sigma * sigma).sum::<f64>() + scatter
+    }
+
+    fn scattered(&self, channel: &Channel) -> Scattered<'_> {
+        let given = &self.given[channel.kind as usize];
+        Scattered { scene: self.scene, kind: channel.kind, axis: channel.axis, given }
+    }
+
+    /// What the blocks of a channel have in common, by its white noise; of some of them, as if the others had not been
+    /// measured.
+    fn latents(&self, channel: &Channel, noise: &Noise, inside: &(dyn Fn(usize) -> bool + Sync)) -> Latents {
+        let weights = self.weights(channel, noise, inside);
+        Latents::new(&self.times, weights, &self.scattered(channel).shared())
+    }
+
+    fn weights(&self, channel: &Channel, noise: &Noise, inside: &(dyn Fn(usize) -> bool + Sync)) -> Vec<f64> {
+        let sensor = &noise.sensors[channel.kind as usize];
+        let counts = &self.scene.counts[channel.kind as usize];
+        let weight = |(at, (block, count)): (usize, (&Block, &usize))| {
+            let sigma = if block.rest.is_some() { sensor.white } else { sensor.moving }[channel.axis];
+            let told = inside(at) && self.scene.tells(channel.kind, at, channel.axis);
+            if told { *count as f64 / (sigma * sigma) } else { 0.0 }
+        };
+        self.scene.blocks.iter().zip(counts).enumerate().map(weight).collect()
+    }
+
+    /// The noise of a sensor under which its residual, less `columns`, is likeliest; the search begins at `start`, by
+    /// whose white noise the design was condensed, and goes by these factors.
+    pub fn fit(
+        &self,
+        design: &CondensedDesign,
+        kind: SensorKind,
+        columns: &[usize],
+        start: &Noise,
+        steps: &[f64],
+    ) -> SensorNoise {
+        let asked = Likelihood::new(design, kind, columns);
+        let likelihood =
+            |sensor: &SensorNoise| asked.of(sensor.scatter, sensor.drifts()) + 2.0 * sensor.surprise();
+        let start = SensorNoise { breadth: 0.0, ..start.sensors[kind as usize] };
+        // Between two correlation times lies a hill: each is searched by itself.
+        let mut starts = SLOW.map(|slow| start.with_slow(slow)).map(|start| (start, likelihood(&start)));
+        starts.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+        let mut ends: Vec<(SensorNoise, f64)> = Vec::with_capacity(starts.len());
+        for tried in starts {
+            let hopeless = |end: &(SensorNoise, f64)| tried.1 >= end.1 + HOPELESS;
+            if steps.len() > NEAR.len() || !ends.iter().any(hopeless) {
+                ends.push(self.descended(kind, tried, steps, &likelihood));
+            }
+        }
+        ends.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+        let (best, least) = ends[0];
+        let mut breadth = log_sum(least, ends.iter().map(|(_, end)| *end));
+        for coordinate in self.coordinates(kind) {
+            let beside = [NEAR[0], 1.0 / NEAR[0]].into_iter();
+            let tried = beside.filter_map(|factor| self.scaled(best, coordinate, factor));
+            breadth += log_sum(least, tried.map(|tried| likelihood(&tried)).chain([least]));
+        }
+        SensorNoise { breadth, ..best }
+    }
+
+    /// Standard deviations of a sensor that are searched; a gyroscope does not see how the table stands.
+    fn coordinates(&self, kind: SensorKind) -> std::ops::Range<usize> {
+        0..if kind == SensorKind::Gyr { 2 } else { 3 }
+    }
+
+    /// Standard deviations changed one by one while `surprise` falls, and its end.
+    fn descended(
+        &self,
+        kind: SensorKind,
+        (mut best, mut least): (SensorNoise, f64),
+        steps: &[f64],
+        surprise: &dyn Fn(&SensorNoise) -> f64,
+    ) -> (SensorNoise, f64) {
+        for factor in steps {
+            for _ in 0..ROUNDS {
+                let before = least;
+                for coordinate in self.coordinates(kind) {
+                    for step in [*factor, 1.0 / factor] {
+                        while let Some(tried) = self.scaled(best, coordinate, step) {
+                            let found = surprise(&tried);
+                            if found >= least - WORTH {
+                                break;
+                            }
+                            (best, least) = (tried, found);
+                        }
+                    }
+                }
+                if least == before {
+                    break;
+                }
+            }
+        }
+        (best, least)
+    }
+
+    /// With one standard deviation scaled; `None` beyond what is looked for.
+    fn scaled(&self, mut sensor: SensorNoise, coordinate: usize, factor: f64) -> Option<SensorNoise> {
+        let floor = 1e-3 * sensor.white.into_iter().fold(f64::INFINITY, f64::min);
+        let (value, smallest) = match coordinate {
+            0 | 1 => (&mut sensor.drift[coordinate], floor),
+            _ => (&mut sensor.scatter, self.least_scatter()),
+        };
+        *value *= factor;
+        (smallest..=1e4 * smallest).contains(value).then_some(sensor)
+    }
+}
+
+impl SensorNoise {
+    /// Σ⁻¹ of one of the sensor's axes.
+    fn whitening(&self, latents: &Arc<Latents>) -> Whitening {
+        Whitening::new(Arc::clone(latents), self.scatter, &self.drifts())
+    }
+
+    /// The fast and the slow drift.
+    fn drifts(&self) -> [Process; 2] {
+        [(FAST, self.drift[0]), (self.slow, self.drift[1])].map(|(time, sigma)| Process { time, sigma })
+    }
+
+    /// −ln of the prior of all that are as likely, but for a constant.
+    fn surprise(&self) -> f64 {
+        if self.slow < WALK { -self.breadth } else { WALKS - self.breadth }
+    }
+
+    /// With another correlation time of the slow drift, which goes as far from one moment to the next.
+    fn with_slow(self, slow: f64) -> Self {
+        let drift = [self.drift[0], self.drift[1] * libm::sqrt(slow / self.slow)];
+        Self { slow, drift, ..self }
+    }
+}
+
+/// ln of a sum of likelihoods, each −2 ln of it, over the greatest.
+fn log_sum(least: f64, each: impl Iterator<Item = f64>) -> f64 {
+    each.map(|value| (-0.5 * (value - least)).exp()).sum::<f64>().ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noises_that_are_as_likely_count_and_others_do_not() {
+        assert!((log_sum(7.0, [7.0, 7.0, 900.0].into_iter()) - 2f64.ln()).abs() < 1e-12);
+        assert!((log_sum(7.0, [7.0, 9.0].into_iter()) - (1.0 + (-1f64).exp()).ln()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,144 @@
+//! White noise of each axis, from neighbouring tenths of a second, at rest and in motion apart.
+
+use nalgebra::Vector3;
+
+use super::noise::{Noise, SensorNoise, USUAL, Weighing};
+use crate::{
+    diagnosis::residual::block::{Block, Means},
+    recording::{SensorKind, median},
+};
+
+/// Lengths of groups of moving blocks that are compared where no rig guides the sensor; what is slower is drift.
+const SWAY: [usize; 6] = [1, 2, 4, 8, 16, 32];
+/// Pieces of which neighbours are compared, s.
+const PIECE: f64 = 0.1;
+
+impl Weighing<'_> {
+    /// Noise from what samples do within a tenth of a second, and drift yet to be told.
+    pub fn white(&self, residual: &Means) -> Noise {
+        let scatter = 100.0 * self.least_scatter();
+        let sensors = SensorKind::ALL.map(|kind| {
+            let white = self.still(kind, residual);
+            let moving = self.moving(kind, residual, &white);
+            let typical = white.iter().fold(0.0f64, |a, b| a.max(*b));
+            let drift = [0.05 * typical, 0.1 * typical];
+            SensorNoise { white, moving, drift, slow: USUAL, scatter, breadth: 0.0 }
+        });
+        Noise { sensors }
+    }
+
+    /// At rest: what the samples do, and on no rig what the residual does as well, since a reference trembles with the hand.
+    fn still(&self, kind: SensorKind, residual: &Means) -> [f64; 3] {
+        let mut white = self.resting(kind);
+        let Some(values) = residual[kind as usize].as_ref().filter(|_| self.scene.swings.is_none()) else {
+            return white;
+        };
+        for length in SWAY {
+            let bends = self
+                .bends(kind, values, length, |first, other| first.rest.is_some() && first.rest == other.rest);
+            for (white, bends) in white.iter_mut().zip(bends) {
+                *white = white.max(usual_square(bends).sqrt());
+            }
+        }
+        white
+    }
+
+    /// From the differences of neighbouring pieces of a rest.
+    fn resting(&self, kind: SensorKind) -> [f64; 3] {
+        let Some(triple) = self.scene.recording.sensor(kind) else { return [1.0; 3] };
+        let interval = self.scene.recording.median_interval().unwrap_or(PIECE);
+        let length = ((PIECE / interval).round() as usize).max(1);
+        let mut squares: [Vec<f64>; 3] = Default::default();
+        let usable = &self.scene.usable[kind as usize];
+        for block in self.scene.blocks.iter().filter(|block| block.rest.is_some()) {
+            // A sensor may be slower than the recording: then some rows hold nothing of it.
+            let rows: Vec<usize> = block.rows.clone().collect();
+            let pieces: Vec<(Vector3<f64>, f64)> = rows
+                .chunks_exact(length)
+                .filter_map(|rows| {
+                    let measured = rows.iter().filter(|row| usable[**row]);
+                    let (sum, count) = measured
+                        .fold((Vector3::zeros(), 0.0), |(s, n), row| (s + triple.values[*row], n + 1.0));
+                    (count > 0.0).then(|| (sum / count, count))
+                })
+                .collect();
+            for pair in pieces.windows(2) {
+                let ((before, m), (after, n)) = (pair[0], pair[1]);
+                let step = after - before;
+                let samples = 1.0 / (1.0 / m + 1.0 / n);
+                squares.iter_mut().zip(step.iter()).for_each(|(s, step)| s.push(step * step * samples));
+            }
+        }
+        squares.map(|squares| trimmed_mean(squares).sqrt().max(f64::MIN_POSITIVE))
+    }
+
+    /// From second differences of the residuals of neighbouring moving blocks; at least as at rest. What a hand adds is
+    /// no white noise: where no rig guides the sensor, groups of blocks count as well, and that which scatters most.
+    fn moving(&self, kind: SensorKind, residual: &Means, resting: &[f64; 3]) -> [f64; 3] {
+        let Some(values) = &residual[kind as usize] else { return [1.0; 3] };
+        let guided = self.scene.swings.is_some();
+        let in_motion = |_: &Block, other: &Block| other.rest.is_none();
+        let bends = |length: usize| self.bends(kind, values, length, in_motion);
+        let most: Vec<[f64; 3]> = match guided {
+            // The median of a χ² of one degree is 0.455.
+            true => vec![bends(1).map(|b| median(b).unwrap_or(0.0) / 0.455)],
+            false => SWAY.iter().map(|length| bends(*length).map(usual_square)).collect(),
+        };
+        std::array::from_fn(|axis| {
+            let square = most.iter().map(|squares| squares[axis]).fold(0.0, f64::max);
+            square.sqrt().max(resting[axis])
+        })
+    }
+
+    /// Squared second differences of neighbouring groups of blocks, as variances of one sample; `alike` tells whether a
+    /// block belongs to groups that begin with another.
+    fn bends(
+        &self,
+        kind: SensorKind,
+        values: &[Vector3<f64>],
+        length: usize,
+        alike: impl Fn(&Block, &Block) -> bool,
+    ) -> [Vec<f64>; 3] {
+        let counts = &self.scene.counts[kind as usize];
+        let guided = self.scene.swings.is_some();
+        let mut squares: [Vec<f64>; 3] = Default::default();
+        for from in (0..(values.len() + 1).saturating_sub(3 * length)).step_by(length) {
+            // On a rig a block with fewer rows is one that it has just left or reached.
+            let full =
+                |k: usize| if guided { counts[k] == counts[from] } else { 2 * counts[k] > counts[from] };
+            let blocks = &self.scene.blocks;
+            let whole = |k: usize| alike(&blocks[from], &blocks[k]) && counts[k] > 0 && full(k);
+            if !(from..from + 3 * length).all(whole) {
+                continue;
+            }
+            let group = |which: usize| {
+                let blocks = from + which * length..from + (which + 1) * length;
+                blocks.fold((Vector3::zeros(), 0.0), |(sum, count), k| {
+                    let n = counts[k] as f64;
+                    (sum + values[k] * n, count + n)
+                })
+            };
+            let [(a, l), (b, m), (c, n)] = [0, 1, 2].map(group);
+            let bend = a / l - 2.0 * b / m + c / n;
+            let share = 1.0 / l + 4.0 / m + 1.0 / n;
+            squares.iter_mut().zip(bend.iter()).for_each(|(s, bend)| s.push(bend * bend / share));
+        }
+        squares
+    }
+}
+
+/// The mean square of normal numbers from their squares without the largest tenth: a hand's jolts, and the beginning and
+/// end of an episode, are no noise.
+fn usual_square(mut squares: Vec<f64>) -> f64 {
+    squares.sort_unstable_by(f64::total_cmp);
+    let kept = squares.len() - squares.len() / 10;
+    // The mean of a χ² of one degree below its ninth decile is 0.623.
+    squares[..kept].iter().sum::<f64>() / (0.623 * kept.max(1) as f64)
+}
+
+/// The mean without the largest hundredth.
+fn trimmed_mean(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    let kept = values.len() - values.len() / 100;
+    values[..kept].iter().sum::<f64>() / kept.max(1) as f64
+}

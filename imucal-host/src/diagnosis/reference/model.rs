@@ -1,0 +1,150 @@
+//! The simulator's present model of a unit: a calibration made elsewhere.
+
+use imucal_core::triad::Triad;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::{
+    apply,
+    apply::ApplyError,
+    recording::{Nominal, Recording, SensorKind},
+    store::{StoredCalibration, StoredTriad},
+};
+
+/// Triads that a simulation starts from.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Nominal SI to SI, by [`SensorKind::ALL`]; identity where the calibration does not hold the sensor.
+    pub triads: [Triad<f64>; 3],
+    /// Sensors that it holds and the recording has.
+    pub calibrated: Vec<SensorKind>,
+    /// Standard errors of its gain and, nominal SI, of its bias, by [`SensorKind::ALL`]; zero where it has none.
+    pub errors: [(Matrix3<f64>, Vector3<f64>); 3],
+    /// What a reader ought to know of it.
+    pub remark: Option<String>,
+}
+
+impl Default for Model {
+    /// Knows nothing: every triad is nominal.
+    fn default() -> Self {
+        Self {
+            triads: [Triad::identity(); 3],
+            calibrated: Vec::new(),
+            errors: Default::default(),
+            remark: None,
+        }
+    }
+}
+
+impl Model {
+    /// A calibration, for a recording of the same unit.
+    ///
+    /// # Errors
+    ///
+    /// Why it does not fit the recording, for a reader.
+    pub fn new(recording: &Recording, stored: &StoredCalibration) -> Result<Self, String> {
+        let record = stored.to_record(&recording.path).map_err(|error| error.to_string())?;
+        let remark = apply::check(recording, stored, &record, false).map_err(because)?;
+        let mut model = Self { remark, ..Self::default() };
+        for kind in SensorKind::ALL {
+            if let (Some(triple), Some(triad)) = (recording.sensor(kind), stored.triad(kind)) {
+                model.triads[kind as usize] = si(triad, triple.nominal);
+                model.errors[kind as usize] = errors(kind, triad, triple.nominal);
+                model.calibrated.push(kind);
+            }
+        }
+        Ok(model)
+    }
+}
+
+/// Why a calibration is no model of a recording's unit: a simulation of another unit is not to be forced.
+fn because(error: ApplyError) -> String {
+    match error {
+        ApplyError::WrongSensor { recording, recorded, connected } => format!(
+            "{recording}: recorded with serial `{connected}`, but the model was calibrated for `{recorded}`: what parts \
+             two units is no gap of a simulator; give --model a calibration of `{connected}`, or leave it out"
+        ),
+        other => other.to_string(),
+    }
+}
+
+/// Standard errors of a gain from nominal SI to SI, and of a bias in nominal SI.
+fn errors(kind: SensorKind, stored: &StoredTriad, nominal: Nominal) -> (Matrix3<f64>, Vector3<f64>) {
+    let per_si = stored.unit_out.per_si().unwrap_or(nominal.per_unit);
+    let unsure = unsure(kind, stored);
+    let std = |value: f64| if value > 0.0 { value * unsure } else { 0.0 };
+    let gain =
+        Matrix3::from_fn(|row, column| std(stored.gain_std[row][column])) * (nominal.per_unit / per_si);
+    (gain, Vector3::from(stored.bias_std).map(std) / nominal.per_unit)
+}
+
+/// By how much a standard error is larger since the noise was told by few residuals: √(ν/(ν − 2)), the standard deviation
+/// of Student's t; with two degrees of freedom or fewer it tells nothing.
+fn unsure(kind: SensorKind, stored: &StoredTriad) -> f64 {
+    // A motion turns about three axes; a rest's or a sample's norm is one number.
+    let equations = f64::from(stored.observations) * if kind == SensorKind::Gyr { 3.0 } else { 1.0 };
+    let freedom = equations - f64::from(stored.parameters);
+    if freedom > 2.0 { (freedom / (freedom - 2.0)).sqrt() } else { f64::INFINITY }
+}
+
+/// `gain · (raw − bias)` as a triad from nominal SI values to SI ones.
+fn si(stored: &StoredTriad, nominal: Nominal) -> Triad<f64> {
+    let gain = Matrix3::from_fn(|row, column| stored.gain[row][column]);
+    let raw = Triad { gain, bias: Vector3::from(stored.bias) };
+    // A nominal value is (raw − offset) / per_unit; a calibrated one has no offset.
+    let nominal_in = raw.in_unit(-nominal.offset / nominal.per_unit, 1.0 / nominal.per_unit);
+    let per_si = stored.unit_out.per_si().unwrap_or(nominal.per_unit);
+    Triad { gain: nominal_in.gain / per_si, ..nominal_in }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Unit;
+
+    fn stored() -> StoredTriad {
+        StoredTriad {
+            unit_in: Unit::Counts,
+            unit_out: Unit::Gravity,
+            gain: [[2.5e-4, 1e-6, 0.0], [0.0, 2.4e-4, 0.0], [0.0, 2e-6, 2.6e-4]],
+            bias: [33_000.0, 32_500.0, 32_800.0],
+            model: "T9".to_owned(),
+            gain_std: [[0.0; 3]; 3],
+            bias_std: [0.0; 3],
+            rms: 0.0,
+            held_out_rms: None,
+            observations: 20,
+            parameters: 9,
+            condition: 2.0,
+            coverage: 1.0,
+            field_norm: None,
+            provenance: None,
+            temperature: None,
+        }
+    }
+
+    #[test]
+    fn a_model_of_few_residuals_is_less_sure_of_its_errors_and_one_of_two_knows_nothing() {
+        let of = |observations: u32, kind| {
+            let stored = StoredTriad { observations, bias_std: [0.5, 0.0, 0.2], ..stored() };
+            errors(kind, &stored, Nominal { offset: 0.0, per_unit: 1.0 }).1
+        };
+        let many = of(100_009, SensorKind::Acc);
+        assert!((many - Vector3::new(0.5, 0.0, 0.2)).norm() < 1e-4, "{many}");
+        let eight = of(17, SensorKind::Acc);
+        assert!((eight - Vector3::new(0.5, 0.0, 0.2) * (8.0f64 / 6.0).sqrt()).norm() < 1e-12, "{eight}");
+        assert_eq!(of(11, SensorKind::Acc), Vector3::new(f64::INFINITY, 0.0, f64::INFINITY));
+        // A motion tells three numbers.
+        assert!(of(11, SensorKind::Gyr).x < 0.53);
+    }
+
+    #[test]
+    fn counts_become_what_the_calibration_makes_of_them() {
+        let nominal = Nominal { offset: 32768.0, per_unit: 415.0 };
+        let stored = stored();
+        let raw = Vector3::new(37_000.0, 29_000.0, 33_123.0);
+        let gain = Matrix3::from_fn(|i, j| stored.gain[i][j]);
+        let expected = gain * (raw - Vector3::from(stored.bias)) * 9.80665;
+        let found = si(&stored, nominal).correct(&raw.map(|x| nominal.to_si(x)));
+        assert!((found - expected).norm() < 1e-9, "{found} {expected}");
+    }
+}

@@ -1,0 +1,121 @@
+//! What an ideal sensor would have been through: the movement of a rig's encoders, of a reference attitude, or of the
+//! sensor's own rests.
+
+use nalgebra::Vector3;
+
+use super::{model::Model, rest_to_rest::Held};
+use crate::{
+    observe::motion::{self, Attitudes},
+    recording::{
+        Recording, SensorKind, integrity::Integrity, manifest::Axis, median, unit::STANDARD_GRAVITY,
+    },
+    simulator::{Place, Recorded, Replay, Tracked},
+};
+
+/// Recordings are at least this long, s.
+const SHORTEST: f64 = 30.0;
+
+/// The rig's axes, outermost first.
+///
+/// # Errors
+///
+/// What the manifest lacks, for a reader.
+pub fn axes(recording: &Recording) -> Result<[Axis; 3], String> {
+    let axes = recording.manifest.rig.as_ref().and_then(|rig| rig.axes.clone());
+    axes.and_then(|axes| axes.try_into().ok()).ok_or_else(|| {
+        "the manifest's [rig] names no three axes, outermost first, such as [\"z\", \"y\", \"x\"]".to_owned()
+    })
+}
+
+/// The movement that a recording is compared with, and where it comes from.
+pub struct Reference {
+    /// The movement.
+    pub movement: Box<dyn Recorded>,
+    /// The rests that it is reconstructed from, where neither encoders nor a reference attitude were recorded.
+    pub held: Option<Held>,
+}
+
+/// The movement of a recording; a reference attitude is moved by `offset`, s: the row of t then shows the movement of
+/// t + offset.
+///
+/// # Errors
+///
+/// Why there is none, for a reader.
+pub fn reference(
+    recording: &Recording,
+    integrity: &Integrity,
+    model: &Model,
+    offset: f64,
+) -> Result<Reference, String> {
+    let site = &recording.manifest.site;
+    let place = Place {
+        latitude_deg: site.latitude_deg.unwrap_or(0.0),
+        height: site.height_m.unwrap_or(0.0),
+        gravity: site.gravity().unwrap_or(STANDARD_GRAVITY),
+        field_n: site.field_ned_ut.unwrap_or_default().into(),
+    };
+    let temperature = recording.temperature.clone().unwrap_or_else(|| vec![25.0; recording.rows()]);
+    let mut held = None;
+    let movement: Box<dyn Recorded> = match (recording.gimbal.as_deref(), recording.reference.as_deref()) {
+        (Some(gimbal), _) => {
+            let axes = axes(recording)?;
+            if recording.mag.is_some() && site.field_ned_ut.is_none() {
+                return Err(
+                    "the manifest's [site] lacks field_ned_ut, against which the magnetometer is compared"
+                        .into(),
+                );
+            }
+            let replay = Replay::new(&recording.time, gimbal, temperature, axes, place);
+            Box::new(replay.ok_or("no row has a reading of all three encoders")?)
+        }
+        (None, Some(reference)) => {
+            let attitudes = motion::of_reference(reference);
+            let tracked = |attitudes: &Attitudes| {
+                let mut place = place;
+                if site.field_ned_ut.is_none() {
+                    place.field_n = field(recording, integrity, attitudes, model).unwrap_or_default();
+                }
+                let tracked = Tracked::new(&recording.time, attitudes, temperature.clone(), place);
+                tracked.ok_or("no row has a reference attitude")
+            };
+            Box::new(match offset {
+                0.0 => tracked(&attitudes)?,
+                _ => tracked(&motion::later(&recording.time, &attitudes, -offset))?,
+            })
+        }
+        (None, None) => {
+            let told = Held::new(recording, integrity, model, temperature, place)?;
+            held = Some(told.clone());
+            Box::new(told)
+        }
+    };
+    let length = movement.duration() - recording.time.first().copied().unwrap_or(0.0);
+    if length < SHORTEST {
+        return Err(format!(
+            "{length:.0} s are too short to tell drift from anything else; {SHORTEST:.0} s at least"
+        ));
+    }
+    if !movement.moving().iter().any(|moves| *moves) {
+        return Err("the rig stands still: nothing tells an effect from a bias".to_owned());
+    }
+    Ok(Reference { movement, held })
+}
+
+/// The field in the frame of a reference, µT: the median of what the magnetometer shows there, component by component.
+fn field(
+    recording: &Recording,
+    integrity: &Integrity,
+    attitudes: &Attitudes,
+    model: &Model,
+) -> Option<Vector3<f64>> {
+    let triad = &model.triads[SensorKind::Mag as usize];
+    let (samples, usable) = (&recording.mag.as_ref()?.values, &integrity.sensor(SensorKind::Mag)?.usable);
+    let shown: Vec<Vector3<f64>> = attitudes
+        .iter()
+        .zip(samples)
+        .zip(usable)
+        .filter_map(|((c_t_n, b), usable)| usable.then_some((*c_t_n)? * triad.correct(b)))
+        .collect();
+    let along = |axis: usize| median(shown.iter().map(|b| b[axis]).collect());
+    Some(Vector3::new(along(0)?, along(1)?, along(2)?))
+}

@@ -1,0 +1,140 @@
+//! A simulated run at the sample points, and what each parameter of an effect would change in it.
+//!
+//! A signature is the simulator's own derivative, by a difference quotient, averaged over each block:
+//!
+//! ```text
+//! s_j = (output(θ + h e_j) − output(θ)) · σ_j / h      σ_j: the usual size of the parameter
+//! ```
+//!
+//! Not modelled: what two effects change together, which is of the second order.
+
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::{block::Means, forward_model::Scene, sample_points::Nodes};
+use crate::{
+    effect::{Act, Effect, Input, Parameter, Role, Truth},
+    recording::SensorKind,
+    simulator::Dose,
+};
+
+/// A derivative's step along an amplitude, as a share of its usual size; along a shape, of its usual value; of an
+/// instant, s.
+const STEP: (f64, f64, f64) = (0.1, 0.02, 0.25);
+
+/// A simulated run at the nodes, to be differentiated.
+pub struct Reference<'s> {
+    /// What is simulated beside.
+    pub scene: &'s Scene<'s>,
+    nodes: &'s Nodes,
+    /// Effects of the run, the baseline among them.
+    pub doses: Vec<Dose>,
+    truth: Vec<Truth>,
+    input: Vec<Input>,
+    outputs: [Vec<Vector3<f64>>; 3],
+    known: Known,
+}
+
+/// Signatures that were asked for: effect, parameter, and the bits of all parameters.
+type Known = Mutex<HashMap<(&'static str, usize, Vec<u64>), Arc<Means>>>;
+
+impl<'s> Reference<'s> {
+    /// The run with these effects. `None` where a triad is singular.
+    pub fn new(scene: &'s Scene<'s>, doses: Vec<Dose>, nodes: &'s Nodes) -> Option<Self> {
+        let truth = scene.truth(&doses, nodes);
+        let input: Vec<Input> = truth.iter().map(Input::of).collect();
+        let outputs = scene.outputs(&doses, &SensorKind::ALL, &input)?;
+        Some(Self { scene, nodes, doses, truth, input, outputs, known: Known::default() })
+    }
+
+    /// What a sensor puts out, block by block.
+    pub fn output(&self, kind: SensorKind) -> Vec<Vector3<f64>> {
+        match &self.scene.view {
+            Some(view) => view.given(kind),
+            None => self.nodes.averaged(&self.outputs[kind as usize], self.scene.cuts.len()),
+        }
+    }
+
+    /// The truth at each block's last node, in the order of the nodes.
+    pub fn truth(&self) -> &[Truth] {
+        &self.truth
+    }
+
+    /// A [`signature`](Self::signature), computed once.
+    pub fn known_signature(
+        &self,
+        effect: &'static Effect,
+        parameter: usize,
+        shape: &[f64],
+    ) -> Option<Arc<Means>> {
+        // What the run holds is altered where it stands.
+        let is_held = self.doses.iter().any(|dose| std::ptr::eq(dose.effect, effect));
+        let bits = shape.iter().filter(|_| !is_held).map(|value| value.to_bits()).collect();
+        let key = (effect.id.as_str(), parameter, bits);
+        let locked = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = locked().get(&key) {
+            return Some(Arc::clone(known));
+        }
+        let signature = Arc::new(self.signature(effect, parameter, shape)?);
+        locked().insert(key, Arc::clone(&signature));
+        Some(signature)
+    }
+
+    /// What a usual size of one parameter changes, block by block, by the simulator's difference quotient. Where the
+    /// run holds the effect already, its own parameter is altered; else `neutral` with this parameter switched on.
+    pub fn signature(&self, effect: &'static Effect, parameter: usize, neutral: &[f64]) -> Option<Means> {
+        let scale = effect.parameters.get(parameter)?.prior_scale;
+        let mut doses = self.doses.clone();
+        let step = step(effect.parameters.get(parameter)?);
+        match doses.iter_mut().find(|dose| std::ptr::eq(dose.effect, effect)) {
+            Some(dose) => *dose.values.get_mut(parameter)? += step,
+            None => {
+                let mut values = neutral.to_vec();
+                *values.get_mut(parameter)? += step;
+                doses.push(Dose { effect, values });
+            }
+        }
+        let outputs = match effect.act {
+            Act::Rig(_) | Act::Clock(_) => {
+                self.scene.outputs(&doses, effect.sensors, &self.scene.inputs(&doses, self.nodes))?
+            }
+            Act::Field(alter) if !self.doses.iter().any(|dose| std::ptr::eq(dose.effect, effect)) => {
+                // Field effects come after all that moves the rig; their order among themselves is of second order.
+                let values = &doses.last()?.values;
+                let altered = |row: &Truth| {
+                    let mut row = *row;
+                    alter(values, &mut row);
+                    Input::of(&row)
+                };
+                let input: Vec<Input> = self.truth.par_iter().map(altered).collect();
+                self.scene.outputs(&doses, effect.sensors, &input)?
+            }
+            Act::Field(_) => {
+                self.scene.outputs(&doses, effect.sensors, &self.scene.inputs(&doses, self.nodes))?
+            }
+            Act::Triad(..) | Act::Sensor(..) | Act::Signal(..) | Act::Data(..) => {
+                self.scene.outputs(&doses, effect.sensors, &self.input)?
+            }
+        };
+        let mut means: Means = Default::default();
+        for kind in effect.sensors.iter().filter(|kind| self.scene.kinds.contains(kind)) {
+            let (with, without) = (&outputs[*kind as usize], &self.outputs[*kind as usize]);
+            let change: Vec<_> = with.iter().zip(without).map(|(a, b)| (a - b) * (scale / step)).collect();
+            means[*kind as usize] = Some(self.nodes.averaged(&change, self.scene.cuts.len()));
+        }
+        Some(self.scene.seen(means))
+    }
+}
+
+fn step(parameter: &Parameter) -> f64 {
+    match parameter.role {
+        Role::Amplitude | Role::Choice => STEP.0 * parameter.prior_scale,
+        Role::Shape { usual } => STEP.1 * usual.abs(),
+        Role::Instant { .. } => STEP.2,
+    }
+}

@@ -1,0 +1,243 @@
+//! A recording beside the simulator's account of it: residuals, and what each parameter would change.
+//!
+//! Residuals are means over blocks of recorded less simulated samples, at the recording's full rate. A signature is the
+//! simulator's own derivative, from a run at nodes a few rows apart, since it need not hold what a residual must.
+
+use std::sync::OnceLock;
+
+use imucal_core::triad::Triad;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::{
+    block::{Block, Means, cut},
+    gravity_observables::View,
+    sample_points::Nodes,
+    transient,
+};
+use crate::{
+    diagnosis::reference::rest_to_rest::Held,
+    effect::{Effect, Input, Swing, Truth},
+    recording::{Recording, SensorKind},
+    simulator::{Dose, Recorded, chain::Chain},
+};
+
+/// Nodes of signatures are this far apart in motion, s; where no rig guides the sensor, which moves briskly then, the
+/// latter.
+const NODES: (f64, f64) = (0.045, 0.0175);
+/// At rest on a rig nothing changes from one to the next, s.
+const RESTING: f64 = 0.25;
+
+/// What is simulated beside a recording.
+pub struct Scene<'a> {
+    /// The recording.
+    pub recording: &'a Recording,
+    /// Its blocks; where a view looks at it, those of the view.
+    pub blocks: Vec<Block>,
+    pub(super) cuts: Vec<Block>,
+    pub(super) view: Option<View>,
+    /// Sensors that are there.
+    pub kinds: Vec<SensorKind>,
+    /// Swings of the gimbals at each row; `None` without gimbals.
+    pub swings: Option<&'a [[Swing; 3]]>,
+    /// Usable rows of each block, by sensor.
+    pub counts: [Vec<usize>; 3],
+    motion: &'a dyn Recorded,
+    /// Rows of each sensor that are used, by [`SensorKind::ALL`].
+    pub usable: [Vec<bool>; 3],
+    /// The triads that the simulator starts from, by [`SensorKind::ALL`].
+    pub triads: [Triad<f64>; 3],
+    /// Nodes for signatures.
+    pub fine: Nodes,
+    /// One node a block: to look where in time an effect without memory lies.
+    pub coarse: Nodes,
+    /// Computed by `gimbal_derivatives` when it is first asked for.
+    pub(super) gimbal_derivatives: OnceLock<Vec<Means>>,
+}
+
+impl<'a> Scene<'a> {
+    /// Beside `recording`, the rows of each sensor that are to be used, a movement, and the triads that the simulator starts from, by [`SensorKind::ALL`].
+    pub fn new(
+        recording: &'a Recording,
+        usable: [Vec<bool>; 3],
+        motion: &'a dyn Recorded,
+        triads: [Triad<f64>; 3],
+    ) -> Self {
+        let interval = recording.median_interval().unwrap_or(0.01);
+        let blocks = cut(&recording.time, motion.moving(), interval);
+        let mut counts = usable.each_ref().map(|usable| {
+            let count = |block: &Block| usable.get(block.rows.clone()).unwrap_or_default();
+            blocks.iter().map(|block| count(block).iter().filter(|usable| **usable).count()).collect()
+        });
+        if recording.reference.is_some() && motion.swings().is_none() {
+            transient::leave_out(recording, &usable, &blocks, &mut counts);
+        }
+        // On a rig a sensor without a usable row stays: its samples may be told from another unit.
+        let is_used = |kind: SensorKind| motion.swings().is_some() || usable[kind as usize].contains(&true);
+        let is_there = |kind: &SensorKind| recording.sensor(*kind).is_some() && is_used(*kind);
+        let kinds = SensorKind::ALL.into_iter().filter(is_there).collect();
+        let apart = if motion.swings().is_some() { NODES.0 } else { NODES.1 };
+        let fine = |block: &Block| {
+            let still = block.rest.is_some() && motion.swings().is_some();
+            let stride = ((if still { RESTING } else { apart } / interval).round() as usize).max(1);
+            block.rows.len().div_ceil(stride)
+        };
+        // Across a gap of a reference it is bridged as if it turned evenly: no derivative is to be taken there.
+        let told = |row: usize| motion.swings().is_some() || motion.known()[row];
+        let fine = Nodes::choose(&recording.time, &blocks, fine, told);
+        let coarse = Nodes::choose(&recording.time, &blocks, |_| 1, |_| true);
+        Self {
+            recording,
+            cuts: blocks.clone(),
+            view: None,
+            blocks,
+            kinds,
+            swings: motion.swings(),
+            counts,
+            motion,
+            usable,
+            triads,
+            fine,
+            coarse,
+            gimbal_derivatives: OnceLock::new(),
+        }
+    }
+
+    /// Looked at by way of the rests of a hand; what the magnetometer is given there is not known.
+    #[must_use]
+    pub fn through(mut self, held: &Held) -> Self {
+        let gravity = self.motion.place().gravity;
+        let of = |time: f64| self.motion.truth(time, &|_| ()).c_t_p;
+        let view = View::new(held, &self.recording.time, &self.cuts, &self.counts, &of, gravity);
+        self.kinds.retain(|kind| match kind {
+            SensorKind::Acc => true,
+            SensorKind::Gyr => held.with_gyroscope,
+            SensorKind::Mag => false,
+        });
+        self.blocks.clone_from(&view.blocks);
+        self.counts.clone_from(&view.counts);
+        self.view = Some(view);
+        self
+    }
+
+    /// Without the blocks in which something is brought near the magnetometer or taken away, where no rig guides it.
+    #[must_use]
+    pub fn without_passages(mut self) -> Self {
+        if self.swings.is_none() && self.view.is_none() && self.recording.reference.is_some() {
+            // A shock of a hand is movement, and no passage.
+            let of_mag = self.residual(&[]).map(|[_, _, mag]| [None, None, mag]);
+            transient::leave_out_passages(&of_mag.unwrap_or_default(), &self.blocks, &mut self.counts);
+        }
+        self
+    }
+
+    /// Means as they are looked at.
+    pub(super) fn seen(&self, means: Means) -> Means {
+        match &self.view {
+            Some(view) => view.of(&means),
+            None => means,
+        }
+    }
+
+    /// Sensors whose blocks an effect may alter: by way of an attitude, others than its own.
+    pub fn reach(&self, effect: &Effect) -> &'static [SensorKind] {
+        if self.view.is_some() { &SensorKind::ALL } else { effect.sensors }
+    }
+
+    /// It is looked at by way of the rests of a hand.
+    pub fn is_viewed(&self) -> bool {
+        self.view.is_some()
+    }
+
+    /// The movement is told at a row.
+    pub fn is_known(&self, row: usize) -> bool {
+        self.motion.known().get(row).copied().unwrap_or(false)
+    }
+
+    /// A block tells something on an axis of a sensor.
+    pub fn tells(&self, kind: SensorKind, block: usize, axis: usize) -> bool {
+        self.view.as_ref().is_none_or(|view| view.tells(kind, block, axis))
+    }
+
+    /// What an axis of a sensor is, in a table.
+    pub fn axis(&self, kind: SensorKind, axis: usize) -> &'static str {
+        match (&self.view, kind) {
+            (Some(_), SensorKind::Acc) => ["along gravity", "across gravity, first", "across, second"][axis],
+            _ => ["x", "y", "z"][axis],
+        }
+    }
+
+    /// Length of the recording, s.
+    pub fn duration(&self) -> f64 {
+        self.motion.duration()
+    }
+
+    pub(super) fn truth(&self, doses: &[Dose], nodes: &Nodes) -> Vec<Truth> {
+        Chain::new(doses).truth(self.motion.steady(), &nodes.times)
+    }
+
+    pub(super) fn inputs(&self, doses: &[Dose], nodes: &Nodes) -> Vec<Input> {
+        Chain::new(doses).inputs(self.motion.steady(), &nodes.times)
+    }
+
+    /// The truth in the middle of each block, without any effect.
+    pub fn plain(&self) -> Vec<Truth> {
+        match &self.view {
+            Some(_) => {
+                let times: Vec<f64> = self.blocks.iter().map(|block| block.time).collect();
+                Chain::default().truth(self.motion, &times)
+            }
+            None => self.truth(&[], &self.coarse),
+        }
+    }
+
+    /// What the simulator puts out at each row, by sensor. `None` where a triad is singular.
+    pub fn simulated(&self, doses: &[Dose]) -> Option<Vec<(SensorKind, Vec<Vector3<f64>>)>> {
+        let chain = Chain::new(doses);
+        let input = chain.inputs(self.motion, &self.recording.time);
+        let of =
+            |kind: &SensorKind| Some((*kind, chain.output(*kind, &self.triads[*kind as usize], &input)?));
+        self.kinds.par_iter().map(of).collect()
+    }
+
+    /// Recorded less simulated, block by block. `None` where a triad is singular.
+    pub fn residual(&self, doses: &[Dose]) -> Option<Means> {
+        let simulated = self.simulated(doses)?;
+        let of = |(kind, output): &(SensorKind, Vec<_>)| (*kind, self.difference(*kind, output));
+        let mut means: Means = Default::default();
+        for (kind, difference) in simulated.par_iter().map(of).collect::<Vec<_>>() {
+            means[kind as usize] = difference;
+        }
+        Some(self.seen(means))
+    }
+
+    fn difference(&self, kind: SensorKind, output: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
+        let samples = &self.recording.sensor(kind)?.values;
+        let usable = &self.usable[kind as usize];
+        let mean = |block: &Block| {
+            let mut sum = Vector3::zeros();
+            let mut count = 0.0;
+            for row in block.rows.clone().filter(|row| usable[*row]) {
+                sum += samples[row] - output[row];
+                count += 1.0;
+            }
+            if count > 0.0 { sum / count } else { sum }
+        };
+        Some(self.cuts.iter().map(mean).collect())
+    }
+
+    /// What each sensor puts out at the nodes.
+    pub(super) fn outputs(
+        &self,
+        doses: &[Dose],
+        kinds: &[SensorKind],
+        input: &[Input],
+    ) -> Option<[Vec<Vector3<f64>>; 3]> {
+        let chain = Chain::new(doses);
+        let mut outputs: [Vec<Vector3<f64>>; 3] = Default::default();
+        for kind in kinds.iter().filter(|kind| self.kinds.contains(kind)) {
+            outputs[*kind as usize] = chain.output(*kind, &self.triads[*kind as usize], input)?;
+        }
+        Some(outputs)
+    }
+}

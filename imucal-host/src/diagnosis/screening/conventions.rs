@@ -1,0 +1,154 @@
+//! What is wrong with the recording itself: looked for before any fit, since nothing later means anything without it.
+//!
+//! Each check compares samples with what the simulator says they were given, or with themselves, and names an effect of
+//! the catalogue, or, where the fault lies not in one sensor, says in words what would explain it. Times of rows are
+//! those of [`Recording::time`]. Not looked for: columns that are shifted by a row, wrong byte order.
+
+use crate::{
+    diagnosis::finding::Amount,
+    effect,
+    effect::{Effect, Truth},
+    recording::{Recording, SensorKind, integrity::Integrity},
+    simulator::{Dose, Motion},
+};
+
+mod axis_swap;
+mod carried_about;
+mod gimbal_order;
+mod noise_burst;
+mod pairs;
+mod saturation;
+mod stuck_samples;
+#[cfg(test)]
+mod tests;
+mod unit_error;
+
+use self::pairs::Pairs;
+
+/// No finding is made above this probability of as much by chance.
+const SURE: f64 = 1e-6;
+/// Rows that are compared with the truth, at most.
+const ROWS: usize = 2000;
+
+/// A fault of the recording that is an effect of the catalogue.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// The effect.
+    pub effect: &'static Effect,
+    /// Its parameters, in the order of [`Effect::parameters`].
+    pub parameters: Vec<Amount>,
+    /// Upper bound of the probability of as much by chance, all places that were looked at counted.
+    pub p_value: f64,
+}
+
+impl Finding {
+    /// Of an effect's id, with its parameters' values and standard errors. `None` where the catalogue has no such
+    /// effect or another number of parameters.
+    fn new(id: &str, values: &[(Option<f64>, Option<f64>)], p_value: f64) -> Option<Self> {
+        let effect = effect::find(id)?;
+        let parameters: Vec<Amount> = effect
+            .parameters
+            .iter()
+            .zip(values)
+            .map(|(parameter, (value, std_error))| Amount {
+                name: parameter.name.clone(),
+                value: *value,
+                std_error: *std_error,
+                unit: parameter.unit.clone(),
+            })
+            .collect();
+        (parameters.len() == effect.parameters.len()).then_some(Self { effect, parameters, p_value })
+    }
+
+    /// The effect with these parameters, for the simulator; `None` where one is not known.
+    pub fn dose(&self) -> Option<Dose> {
+        let values: Option<Vec<f64>> = self.parameters.iter().map(|parameter| parameter.value).collect();
+        Some(Dose { effect: self.effect, values: values? })
+    }
+}
+
+/// What the checks found.
+#[derive(Clone, Debug, Default)]
+pub struct Conventions {
+    /// Effects, in the order of the sensors.
+    pub findings: Vec<Finding>,
+    /// What else a reader ought to know.
+    pub remarks: Vec<String>,
+    /// Code of the turn, as `axis_swap` counts them, that all triads share: that of the mount.
+    pub turned: Option<usize>,
+    /// A sensor that cannot be compared with the movement, since that does not hold what it was given.
+    pub beyond_movement: Option<SensorKind>,
+    /// How the encoders contradict every sensor: no baseline fits before that is mended.
+    pub contradiction: Option<String>,
+}
+
+/// Share of a sensor's variance that no gain and bias explain where the row of t shows the movement of t + `offset`, s;
+/// `None` where nothing tells.
+pub fn unexplained(
+    recording: &Recording,
+    integrity: &Integrity,
+    kind: SensorKind,
+    motion: &dyn Motion,
+    offset: f64,
+) -> Option<f64> {
+    let rows = rows(recording);
+    let truth = truth(recording, motion, &rows, offset);
+    Some(Pairs::of(recording, integrity, kind, &rows, &truth)?.trusted().moments().unexplained())
+}
+
+/// Rows that are compared with the truth.
+fn rows(recording: &Recording) -> Vec<usize> {
+    let stride = recording.rows().div_ceil(ROWS).max(1);
+    (stride / 2..recording.rows()).step_by(stride).collect()
+}
+
+fn truth(recording: &Recording, motion: &dyn Motion, rows: &[usize], offset: f64) -> Vec<Truth> {
+    rows.iter().map(|row| motion.truth(recording.time[*row] + offset, &|_| ())).collect()
+}
+
+/// Checks a recording against a movement that was told from it or besides it.
+pub fn check(recording: &Recording, integrity: &Integrity, motion: &dyn Motion) -> Conventions {
+    let mut found = Conventions::default();
+    let rows = rows(recording);
+    let truth = truth(recording, motion, &rows, 0.0);
+    // Gravity and the gyroscope tell no heading: there is no field to compare a magnetometer with.
+    let by_rests = motion.encoders(0.0).is_none() && recording.reference.is_none();
+    let is_compared = |kind: SensorKind| !(by_rests && kind == SensorKind::Mag);
+    let mut pairs = SensorKind::ALL.map(|kind| {
+        let pairs = is_compared(kind).then(|| Pairs::of(recording, integrity, kind, &rows, &truth));
+        pairs.flatten()
+    });
+    let carried = carried_about::check(recording, integrity, &rows, &truth, &pairs);
+    if let Some(remark) = carried {
+        found.remarks.push(remark);
+        found.beyond_movement = Some(SensorKind::Acc);
+        pairs[SensorKind::Acc as usize] = None;
+    }
+    match gimbal_order::remark(recording, integrity, motion, &rows, &truth, &pairs) {
+        // Against a wrong movement no sensor's axes mean anything.
+        Some(remark) => found.contradiction = Some(remark),
+        None => {
+            let scales = axis_swap::check(&pairs, &mut found);
+            for (kind, scale) in SensorKind::ALL.into_iter().zip(scales) {
+                if let (Some(scale), Some(triple)) = (scale, recording.sensor(kind)) {
+                    unit_error::check(kind, triple.unit, &scale, &mut found);
+                }
+            }
+        }
+    }
+    for sensor in &integrity.sensors {
+        let Some(triple) = recording.sensor(sensor.sensor) else { continue };
+        if found.beyond_movement == Some(sensor.sensor) {
+            continue;
+        }
+        saturation::check(triple, sensor, &mut found);
+        stuck_samples::check(triple, sensor, &mut found);
+        if motion.encoders(0.0).is_none() {
+            // What a hand does besides turning is no noise of the sensor.
+            continue;
+        }
+        let moves = |row: usize| motion.truth(recording.time[row], &|_| ()).w_pt_t.norm();
+        noise_burst::check(&recording.time, triple, sensor, &moves, &mut found);
+    }
+    found
+}

@@ -1,0 +1,20 @@
+//! Faults of the recording itself, which are named, undone or left out before anything is fitted.
+//!
+//! | goes in | comes out |
+//! | --- | --- |
+//! | a recording and its reference | usable rows of each sensor, triads with axes and units put right, findings with their p-values, remarks |
+//!
+//! | file | what |
+//! | --- | --- |
+//! | [`conventions`] | axis order and signs, units, gimbal order, clipping, repeated samples, noise bursts |
+//! | [`reference_offset`] | a large offset of the reference's clock, by the share of variance that no gain and bias explain |
+//! | [`preparation`] | all of them together: what the rest of the diagnosis starts from |
+//!
+//! Statistics: linear regression of samples on the ideal input and its coefficient of determination; F and χ² tests with
+//! the number of alternatives counted (Bonferroni).
+//!
+//! Not done here: effects that leave the samples usable; those are candidates of the search.
+
+pub mod conventions;
+pub mod preparation;
+pub mod reference_offset;

@@ -1,0 +1,203 @@
+//! What a diagnosis stands on: the movement, rows that can be used, and triads to start from.
+//!
+//! Faults of the recording itself are undone or left out here, so that the search sees none of them.
+
+use imucal_core::triad::Triad;
+use nalgebra::{Matrix3, Vector3};
+
+use super::{
+    conventions,
+    conventions::{Conventions, Finding},
+    reference_offset,
+};
+use crate::{
+    diagnosis::reference::{model::Model, movement, movement::Reference, rest_to_rest::Held, revisits},
+    effect::{Act, DataRun, Effect, axis_swap},
+    recording::{Recording, SensorKind, Triple, integrity, integrity::Integrity, median},
+    simulator::Recorded,
+    store::StoredCalibration,
+};
+
+/// Samples closer to a limit than this many standard deviations of their noise are not used.
+const CLIPPED: f64 = 5.0;
+/// Samples so close in time to one beyond that are left out with it, s.
+const BESIDE: f64 = 0.5;
+
+/// What a diagnosis stands on.
+pub struct Footing {
+    /// The recorded movement.
+    pub movement: Box<dyn Recorded>,
+    /// The rests that it was told from, where neither a rig nor a reference tells it.
+    pub held: Option<Held>,
+    /// What a reference was moved by in time to follow the samples, s: see [`reference_offset::coarse`].
+    pub moved: f64,
+    /// Rows of each sensor that can be used, by [`SensorKind::ALL`].
+    pub usable: [Vec<bool>; 3],
+    /// Triads to start from, nominal SI to SI: those of the model, or such as put axes and units right.
+    pub triads: [Triad<f64>; 3],
+    /// The model that it stands on.
+    pub model: Model,
+    /// Faults of the recording that are effects of the catalogue.
+    pub findings: Vec<Finding>,
+    /// What else a reader ought to know.
+    pub remarks: Vec<String>,
+}
+
+impl Footing {
+    /// Of a recording, with the model of its unit where there is one.
+    ///
+    /// # Errors
+    ///
+    /// Why the recording cannot be diagnosed, for a reader.
+    pub fn new(recording: &Recording, model: Option<&StoredCalibration>) -> Result<Self, String> {
+        let model = model.map(|model| Model::new(recording, model)).transpose()?.unwrap_or_default();
+        let integrity = integrity::inspect(recording);
+        let mut as_read = movement::reference(recording, &integrity, &model, 0.0)?;
+        let mut moved = 0.0;
+        if recording.gimbal.is_none() && recording.reference.is_some() {
+            moved = reference_offset::coarse(recording, &integrity, &*as_read.movement);
+            if moved != 0.0 {
+                as_read = movement::reference(recording, &integrity, &model, moved)?;
+            }
+        }
+        let Reference { movement, held } = as_read;
+        let conventions = conventions::check(recording, &integrity, &*movement);
+        if let Some(contradiction) = conventions.contradiction {
+            return Err(contradiction);
+        }
+        let mut usable = SensorKind::ALL.map(|kind| usable_rows(recording, &integrity, &conventions, kind));
+        if let Some(kind) = conventions.beyond_movement {
+            usable[kind as usize].fill(false);
+        }
+        for usable in &mut usable {
+            usable.iter_mut().zip(movement.known()).for_each(|(usable, known)| *usable &= known);
+        }
+        let mut triads = model.triads;
+        if let Some(held) = &held {
+            for kind in [SensorKind::Acc, SensorKind::Gyr] {
+                if model.calibrated.contains(&kind) {
+                    triads[kind as usize] = held.triads[kind as usize];
+                }
+            }
+        }
+        if let Some(turn) = conventions.turned.and_then(axis_swap::signed_permutation) {
+            triads.iter_mut().for_each(|triad| triad.gain = turn.tr_mul(&triad.gain));
+        }
+        for finding in &conventions.findings {
+            let Some(kind) = finding.effect.sensors.first().copied() else { continue };
+            leave_out(finding, recording, kind, &mut usable[kind as usize]);
+            if let Some(matrix) = finding.dose().and_then(|dose| response(finding.effect, &dose.values)) {
+                let triad = &mut triads[kind as usize];
+                // The samples are M v: what undoes M comes first.
+                triad.gain *= matrix.try_inverse().unwrap_or_else(Matrix3::identity);
+            }
+        }
+        let Some(measured) =
+            SensorKind::ALL.iter().find(|kind| usable[**kind as usize].iter().any(|row| *row))
+        else {
+            return Err("no sensor has a usable row".to_owned());
+        };
+        debug_assert!(recording.sensor(*measured).is_some());
+        let mut remarks = conventions.remarks;
+        remarks.extend(model.remark.clone());
+        remarks.extend(revisits::remark(&*movement));
+        remarks.extend(shortcomings(recording));
+        let findings = conventions.findings;
+        Ok(Self { movement, held, moved, usable, triads, model, findings, remarks })
+    }
+}
+
+/// Rows of a sensor that can be used. In a wrong unit every sample may seem to lie beyond the range: then those count
+/// that were measured and are not stuck.
+fn usable_rows(
+    recording: &Recording,
+    integrity: &Integrity,
+    conventions: &Conventions,
+    kind: SensorKind,
+) -> Vec<bool> {
+    let (Some(sensor), Some(triple)) = (integrity.sensor(kind), recording.sensor(kind)) else {
+        return Vec::new();
+    };
+    let id = format!("{kind}.unit_error");
+    if !conventions.findings.iter().any(|finding| finding.effect.id == id) {
+        return sensor.usable.clone();
+    }
+    let mut usable: Vec<bool> =
+        triple.values.iter().map(|value| value.iter().all(|component| component.is_finite())).collect();
+    sensor.stuck.iter().for_each(|rows| usable[rows.clone()].fill(false));
+    usable
+}
+
+/// Noise of a triad's samples, SI unit: the largest of the axes', from neighbouring samples.
+fn noise(triple: &Triple) -> f64 {
+    let of = |axis: usize| {
+        let steps = triple.values.windows(2).map(|pair| (pair[1][axis] - pair[0][axis]).abs());
+        // The median of |x| is 0.674 of its standard deviation; a step has that of a sample, times √2.
+        median(steps.filter(|step| step.is_finite()).collect()).unwrap_or(0.0) / (0.674 * 2.0f64.sqrt())
+    };
+    (0..3).map(of).fold(0.0, f64::max)
+}
+
+/// What the samples of a data effect are of those before it, where that is linear: a column an axis.
+fn response(effect: &Effect, values: &[f64]) -> Option<Matrix3<f64>> {
+    let Act::Data(_, alter) = effect.act else { return None };
+    let linear = effect.id.ends_with(".axis_swap") || effect.id.ends_with(".unit_error");
+    linear.then(|| {
+        let mut samples = [Vector3::x(), Vector3::y(), Vector3::z()];
+        alter(values, &mut DataRun { samples: &mut samples });
+        Matrix3::from_columns(&samples)
+    })
+}
+
+/// Rows that a fault has spoilt are not used.
+pub fn leave_out(finding: &Finding, recording: &Recording, kind: SensorKind, usable: &mut [bool]) {
+    let Some(triple) = recording.sensor(kind) else { return };
+    if finding.effect.id.ends_with(".stuck_samples") {
+        for (usable, pair) in usable.iter_mut().skip(1).zip(triple.values.windows(2)) {
+            *usable &= pair[0] != pair[1];
+        }
+    }
+    if finding.effect.id.ends_with(".saturation")
+        && let (Some(shortfall), Some(full_scale)) =
+            (finding.parameters.first().and_then(|amount| amount.value), triple.full_scale_si())
+    {
+        // Just below the limit noise is clipped on one side; and to choose samples by their noise would be a bias as well.
+        let most = full_scale / (1.0 + shortfall) - CLIPPED * noise(triple);
+        let beyond: Vec<f64> = (triple.values.iter().zip(&recording.time))
+            .filter(|(value, _)| value.amax() >= most)
+            .map(|(_, time)| *time)
+            .collect();
+        for (usable, time) in usable.iter_mut().zip(&recording.time) {
+            let next = beyond.partition_point(|beyond| *beyond < time - BESIDE);
+            *usable &= beyond.get(next).is_none_or(|beyond| *beyond > time + BESIDE);
+        }
+    }
+    if finding.effect.id.ends_with(".noise_burst") {
+        let time = |name: &str| {
+            let amount = finding.parameters.iter().find(|amount| amount.name == name);
+            amount.and_then(|amount| amount.value)
+        };
+        if let Some(start) = time("t_start") {
+            // Without an end it goes on to that of the recording.
+            let end = time("t_end").unwrap_or(f64::INFINITY);
+            for (usable, time) in usable.iter_mut().zip(&recording.time) {
+                *usable &= !(start..end).contains(time);
+            }
+        }
+    }
+}
+
+/// What the recording lacks, and what that costs.
+fn shortcomings(recording: &Recording) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if recording.temperature.is_none() {
+        remarks.push("there is no temperature: what follows it looks like drift".to_owned());
+    }
+    if recording.manifest.site.gravity().is_none() && recording.acc.is_some() {
+        remarks.push(
+            "the site's gravity is not given: standard gravity stands in, and the scale takes up the rest"
+                .to_owned(),
+        );
+    }
+    remarks
+}

@@ -1,0 +1,393 @@
+//! The linear problem about a fit: signatures as columns, sets of effects judged by least squares and evidence.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::{
+    hypothesis::{Judged, Sifted},
+    memo::Latest,
+    refit::{Fit, columns, signatures},
+};
+use crate::{
+    diagnosis::{
+        library::{
+            candidates::Candidates,
+            evidence::{Projected, log_evidence},
+            grid::{Beside, Scan},
+            grid_posterior::Shaped,
+            nonlinear,
+        },
+        mixed_model::{
+            design::{CondensedDesign, Design, Normal},
+            noise::{Noise, SensorNoise, Weighing},
+            shared_offsets::Offsets,
+            whitening::Whitening,
+        },
+        residual::{base_run::Reference, forward_model::Scene},
+    },
+    effect::{Act, Effect, Role, class::class},
+    recording::SensorKind,
+    simulator::Dose,
+};
+
+/// The problem about a fit, with all its effects put back into the residual.
+pub struct Linear<'s> {
+    /// The scene.
+    pub scene: &'s Scene<'s>,
+    /// What there is to choose from.
+    pub candidates: &'s Candidates,
+    /// All columns and the residual of the baseline alone.
+    pub design: Design,
+    /// Weighs the blocks.
+    pub weighing: Weighing<'s>,
+    /// Columns of the baseline.
+    pub baseline: Vec<usize>,
+    /// Where each candidate's signature was taken.
+    pub shapes: Vec<Shaped>,
+    scan: Scan<'s>,
+    /// Effects of the fit beside the baseline.
+    held: Vec<Dose>,
+    normals: Latest<Noise, Normal>,
+    condensed: Latest<White, CondensedDesign>,
+    offsets: Latest<White, Option<Offsets>>,
+    projected: Latest<Noise, Option<(Projected, Vec<usize>)>>,
+}
+
+/// White noise of each sensor at rest and in motion, by axis.
+type White = [[[f64; 3]; 2]; 3];
+
+impl<'s> Linear<'s> {
+    /// About a fit, with its columns alone: nothing can be added.
+    pub fn fitted_alone(scene: &'s Scene<'s>, candidates: &'s Candidates, fit: &Fit) -> Option<Self> {
+        let scan = Scan::new(scene, candidates, fit.doses.clone())?;
+        Self::alone(&Reference::new(scene, fit.doses.clone(), &scene.fine)?, scan, scene, candidates, fit)
+    }
+
+    fn alone(
+        reference: &Reference<'_>,
+        scan: Scan<'s>,
+        scene: &'s Scene<'s>,
+        candidates: &'s Candidates,
+        fit: &Fit,
+    ) -> Option<Self> {
+        let neutral = |effect: &&'static Effect| Shaped::alone(effect.neutral(scene.duration()));
+        let shapes = candidates.effects.iter().map(neutral).collect();
+        let columns = columns(&fit.doses.iter().map(|dose| dose.effect).collect::<Vec<_>>());
+        let means = signatures(reference, &columns, &|_| Vec::new())?;
+        let design = Design::new(scene, columns, &means, &fit.residual);
+        let weighing = Weighing::new(scene, SensorKind::ALL.map(|kind| reference.output(kind)));
+        Some(Self::of(scene, candidates, scan, fit, design, weighing, shapes))
+    }
+
+    /// About a fit; shapes of candidates that it does not hold are those best under `noise`. What reaches no sensor on
+    /// which this fit and another differ is taken from the problem about that.
+    pub fn new(
+        scene: &'s Scene<'s>,
+        candidates: &'s Candidates,
+        fit: &Fit,
+        noise: &Noise,
+        before: Option<&Self>,
+    ) -> Option<Self> {
+        let reference = Reference::new(scene, fit.doses.clone(), &scene.fine)?;
+        let scan = match before {
+            Some(before) => before.scan.clone(),
+            None => Scan::new(scene, candidates, fit.doses.clone())?,
+        };
+        let alone = Self::alone(&reference, scan.clone(), scene, candidates, fit)?;
+        let every: Vec<usize> = (0..alone.design.columns.len()).collect();
+        let beside =
+            Beside { doses: &fit.doses, weighing: &alone.weighing, design: &alone.design, fitted: &every };
+        let lasts = |effect: &Effect| before.is_some_and(|before| before.lasts(effect, fit));
+        let known = |at: usize| before.and_then(|before| before.shapes.get(at));
+        let spread = |at: usize| known(at).map_or(0.0, |shape| shape.spread);
+        let kept = |at: usize| known(at).filter(|_| lasts(candidates.effects[at])).cloned();
+        let shapes = scan.shapes(&beside, noise, &spread, &kept)?;
+        let (old, new): (Vec<&'static Effect>, Vec<&'static Effect>) =
+            candidates.effects.iter().copied().partition(|effect| {
+                lasts(effect) && fit.doses.iter().all(|dose| !std::ptr::eq(dose.effect, *effect))
+            });
+        let fresh = columns(&candidates.baseline.iter().copied().chain(new).collect::<Vec<_>>());
+        let means = signatures(&reference, &fresh, &|effect| candidates.shape(&shapes, effect))?;
+        let mut design = match before {
+            Some(before) => {
+                let kept: Vec<usize> = old.iter().flat_map(|effect| before.design.of(effect)).collect();
+                let columns = kept.iter().map(|id| before.design.columns[*id]).chain(fresh).collect();
+                before.design.extended(&kept, columns, &means).leaving(&fit.residual)
+            }
+            None => Design::new(scene, fresh, &means, &fit.residual),
+        };
+        restore(&mut design, fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect)));
+        Some(Self::of(scene, candidates, scan, fit, design, alone.weighing, shapes))
+    }
+
+    fn of(
+        scene: &'s Scene<'s>,
+        candidates: &'s Candidates,
+        scan: Scan<'s>,
+        fit: &Fit,
+        design: Design,
+        weighing: Weighing<'s>,
+        shapes: Vec<Shaped>,
+    ) -> Self {
+        let baseline = candidates.baseline.iter().flat_map(|term| design.of(term)).collect();
+        let held = fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect)).cloned().collect();
+        Self {
+            scene,
+            candidates,
+            design,
+            weighing,
+            baseline,
+            shapes,
+            scan,
+            held,
+            normals: Latest::default(),
+            condensed: Latest::default(),
+            offsets: Latest::default(),
+            projected: Latest::default(),
+        }
+    }
+
+    /// An effect's signature is the same about another fit but for the second order: no sensor it reaches has an effect in
+    /// the one and not in the other, or in another shape.
+    fn lasts(&self, effect: &Effect, fit: &Fit) -> bool {
+        let moves = |effect: &Effect| matches!(effect.act, Act::Rig(_) | Act::Clock(_));
+        let meets = |changed: &Dose| {
+            let met = |kind| self.scene.reach(changed.effect).contains(kind);
+            // What moves the rig reaches all sensors by the same path, whatever a sensor makes of it.
+            if moves(effect) { moves(changed.effect) } else { self.scene.reach(effect).iter().any(met) }
+        };
+        let has = |doses: &[Dose], dose: &Dose| doses.iter().any(|other| has_same_shape(dose, other));
+        let gone = self.held.iter().filter(|dose| !has(&fit.doses, dose));
+        let come = fit.doses.iter().filter(|dose| !self.candidates.has_term(dose.effect));
+        !gone.chain(come.filter(|dose| !has(&self.held, dose))).any(meets)
+    }
+
+    /// The same problem, with shapes of candidates that are best under another noise, or without some of the fit's
+    /// effects; `None` as well where those are the same.
+    pub fn reshaped(&self, fit: &Fit, noise: &Noise, without: &[&'static Effect]) -> Option<Self> {
+        let is_taken = |effect: &Effect| without.iter().any(|taken| std::ptr::eq(*taken, effect));
+        let doses: Vec<Dose> = fit.doses.iter().filter(|dose| !is_taken(dose.effect)).cloned().collect();
+        let fitted: Vec<usize> = doses.iter().flat_map(|dose| self.design.of(dose.effect)).collect();
+        let (design, weighing) = (&self.design, &self.weighing);
+        let beside = Beside { doses: &doses, weighing, design, fitted: &fitted };
+        let meets = |effect: &Effect| {
+            let reached = |kind| without.iter().any(|taken| self.scene.reach(taken).contains(kind));
+            without.is_empty() || self.scene.reach(effect).iter().any(reached)
+        };
+        let spread = |at: usize| self.shapes[at].spread;
+        let kept =
+            |at: usize| Some(&self.shapes[at]).filter(|_| !meets(self.candidates.effects[at])).cloned();
+        let shapes = self.scan.shapes(&beside, noise, &spread, &kept)?;
+        let others: Vec<&'static Effect> = self
+            .candidates
+            .effects
+            .iter()
+            .zip(self.shapes.iter().zip(&shapes))
+            .filter(|(_, (own, other))| own.values != other.values)
+            .map(|(effect, _)| *effect)
+            .collect();
+        if others.is_empty() {
+            return None;
+        }
+        let reference = Reference::new(self.scene, doses.clone(), &self.scene.fine)?;
+        let changed = columns(&others);
+        let means = signatures(&reference, &changed, &|effect| self.candidates.shape(&shapes, effect))?;
+        let is_kept = |id: &usize| !others.iter().any(|effect| self.design.columns[*id].is_of(effect));
+        let kept: Vec<usize> = (0..self.design.columns.len()).filter(is_kept).collect();
+        let columns = kept.iter().map(|id| self.design.columns[*id]).chain(changed).collect();
+        let design = self.design.extended(&kept, columns, &means);
+        let weighing = Weighing::new(self.scene, self.weighing.given.clone());
+        Some(Self::of(self.scene, self.candidates, self.scan.clone(), fit, design, weighing, shapes))
+    }
+
+    /// The same problem with a term of the baseline as an effect, the last of `candidates`, of these values.
+    pub fn with_effect<'c>(
+        &'c self,
+        candidates: &'c Candidates,
+        fit: &Fit,
+        effect: &'static Effect,
+        values: Vec<f64>,
+    ) -> Linear<'c> {
+        let mut design = self.design.clone();
+        restore(&mut design, [&Dose { effect, values }].into_iter());
+        let neutral = Shaped::alone(effect.neutral(self.scene.duration()));
+        let shapes = self.shapes.iter().cloned().chain([neutral]).collect();
+        let weighing = Weighing::new(self.scene, self.weighing.given.clone());
+        Linear::of(self.scene, candidates, self.scan.clone(), fit, design, weighing, shapes)
+    }
+
+    /// Parameters at which a candidate's signature was taken.
+    pub fn shape_of(&self, effect: &Effect) -> Vec<f64> {
+        self.candidates.shape(&self.shapes, effect)
+    }
+
+    /// Columns of the baseline and of a set.
+    pub fn fitted(&self, set: &[&'static Effect]) -> Vec<usize> {
+        let of = |effect: &&'static Effect| self.design.of(effect);
+        self.baseline.iter().copied().chain(set.iter().flat_map(of)).collect()
+    }
+
+    /// Noise and evidence of a set; the noise is estimated anew for the sensors that `anew` reaches.
+    pub fn judge(
+        &self,
+        set: &[&'static Effect],
+        start: &Noise,
+        anew: &[SensorKind],
+        steps: &[f64],
+    ) -> Option<Judged> {
+        let sifted = self.sift(set, start, anew, steps)?;
+        self.together(sifted, &self.offsets(start))
+    }
+
+    /// Evidence of a sifted set; as it was sifted where no rig guides the sensor, or none that would show its offsets.
+    pub fn together(&self, sifted: Sifted, offsets: &Option<Offsets>) -> Option<Judged> {
+        let Sifted { set, noise, value: sifted } = sifted;
+        let Some(offsets) = offsets else {
+            return Some(Judged { set, noise, log_evidence: sifted, sifted });
+        };
+        let fitted = self.fitted(&set);
+        let (baseline, groups) = (self.baseline.len(), self.groups(&set, &fitted));
+        let value = |normal: &Normal| log_evidence(normal, &noise, baseline, &groups);
+        let likeliest = offsets.likeliest(self.scene, &noise, &fitted, &value)?;
+        let surprise: f64 = set.iter().map(|effect| self.surprise(effect)).sum();
+        Some(Judged { log_evidence: likeliest - surprise, set, noise, sifted })
+    }
+
+    /// The same axis by axis.
+    pub fn sift(
+        &self,
+        set: &[&'static Effect],
+        start: &Noise,
+        anew: &[SensorKind],
+        steps: &[f64],
+    ) -> Option<Sifted> {
+        let fitted = self.fitted(set);
+        let mut noise = start.clone();
+        let is_new = |column: &usize| !fitted.contains(column);
+        let taken_out = self.candidates.taken_out.iter().flat_map(|term| self.design.of(term)).filter(is_new);
+        let known: Vec<usize> = fitted.iter().copied().chain(taken_out).collect();
+        let condensed = self.condensed(start).picked(None, &known);
+        let every: Vec<usize> = (0..known.len()).collect();
+        let fit = |kind: &SensorKind| self.weighing.fit(&condensed, *kind, &every, start, steps);
+        let asked: Vec<SensorKind> =
+            self.scene.kinds.iter().copied().filter(|kind| anew.contains(kind)).collect();
+        let found: Vec<SensorNoise> = asked.par_iter().map(fit).collect();
+        asked.into_iter().zip(found).for_each(|(kind, found)| noise.sensors[kind as usize] = found);
+        let normal = noise.normal(&condensed.picked(None, &every[..fitted.len()]), fitted.len());
+        let value = log_evidence(&normal, &noise, self.baseline.len(), &self.groups(set, &fitted))?
+            - set.iter().map(|effect| self.surprise(effect)).sum::<f64>();
+        Some(Sifted { set: set.to_vec(), noise, value })
+    }
+
+    /// Places of each effect's columns among the fitted.
+    pub fn groups(&self, set: &[&'static Effect], fitted: &[usize]) -> Vec<Vec<usize>> {
+        let of = |effect: &&'static Effect| -> Vec<usize> {
+            (0..fitted.len()).filter(|at| self.design.columns[fitted[*at]].is_of(effect)).collect()
+        };
+        set.iter().map(of).collect()
+    }
+
+    /// −ln of an effect's prior: one of the candidates, in one of its shapes or such as are as likely. What was taken out of
+    /// the baseline is no surprise.
+    pub fn surprise(&self, effect: &Effect) -> f64 {
+        if self.candidates.was_taken_out(effect) {
+            return 0.0;
+        }
+        let at = self.candidates.effects.iter().position(|other| std::ptr::eq(*other, effect));
+        let spread = at.map_or(0.0, |at| self.shapes[at].spread);
+        let shapes = (nonlinear::choices(effect, self.scene.duration()) as f64).ln();
+        (self.candidates.effects.len() as f64).ln() + (shapes - spread).max(0.0)
+    }
+
+    /// Σ⁻¹ of each channel.
+    pub fn whitenings(&self, noise: &Noise) -> Vec<Whitening> {
+        self.weighing.whitenings(&self.design, noise)
+    }
+
+    /// Normal equations of all columns.
+    pub fn normal(&self, noise: &Noise) -> Arc<Normal> {
+        self.normals.get(noise.clone(), || noise.normal(&self.condensed(noise), self.design.size))
+    }
+
+    /// All columns, as white noise weighs them.
+    pub fn condensed(&self, noise: &Noise) -> Arc<CondensedDesign> {
+        self.condensed.get(white(noise), || self.weighing.condensed(&self.design, noise))
+    }
+
+    /// All columns and the gimbals' offsets, as white noise weighs them.
+    pub fn offsets(&self, noise: &Noise) -> Arc<Option<Offsets>> {
+        self.offsets.get(white(noise), || Offsets::of(self.scene, &self.design, &self.weighing, noise))
+    }
+
+    /// Scores of all columns but the baseline's, with the baseline projected out, and those columns.
+    pub fn projected(&self, noise: &Noise) -> Arc<Option<(Projected, Vec<usize>)>> {
+        self.projected.get(noise.clone(), || {
+            let every = 0..self.design.columns.len();
+            let others: Vec<usize> = every.filter(|id| !self.baseline.contains(id)).collect();
+            Some((Projected::new(&self.normal(noise), &self.baseline, &others)?, others))
+        })
+    }
+
+    /// Candidates by ln BF of a set with each of them added, best first; the set itself has the value returned beside.
+    pub fn ranked(
+        &self,
+        set: &[&'static Effect],
+        noise: &Noise,
+    ) -> Option<(f64, Vec<(f64, &'static Effect)>)> {
+        // Two of a class explain each other's noise and not the gap.
+        let is_new = |effect: &&'static Effect| !set.iter().any(|own| class(&own.id) == class(&effect.id));
+        let others: Vec<[&'static Effect; 1]> =
+            self.candidates.effects.iter().copied().filter(is_new).map(|effect| [effect]).collect();
+        let (own, values) = self.values(set, &others, noise)?;
+        let mut ranked: Vec<(f64, &'static Effect)> =
+            values.into_iter().zip(others).map(|(value, [effect])| (value, effect)).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        Some((own, ranked))
+    }
+
+    /// ln BF of a set, and of the set with each of `additions` added.
+    pub fn values<const N: usize>(
+        &self,
+        set: &[&'static Effect],
+        additions: &[[&'static Effect; N]],
+        noise: &Noise,
+    ) -> Option<(f64, Vec<f64>)> {
+        let projected = self.projected(noise);
+        let (projected, others) = projected.as_ref().as_ref()?;
+        let places = |effect: &&'static Effect| -> Vec<usize> {
+            (0..others.len()).filter(|at| self.design.columns[others[*at]].is_of(effect)).collect()
+        };
+        let own: Vec<Vec<usize>> = set.iter().map(places).collect();
+        let value = |more: &[&'static Effect]| {
+            let more: Vec<Vec<usize>> = more.iter().map(places).collect();
+            let parts: Vec<&[usize]> = own.iter().chain(&more).map(Vec::as_slice).collect();
+            projected.log_bayes_factor(&parts)
+        };
+        let surprise =
+            |more: &[&'static Effect]| more.iter().map(|effect| self.surprise(effect)).sum::<f64>();
+        Some((value(&[]), additions.par_iter().map(|more| value(more) - surprise(more)).collect()))
+    }
+}
+
+fn white(noise: &Noise) -> White {
+    noise.sensors.map(|sensor| [sensor.white, sensor.moving])
+}
+
+/// The same effect with the same parameters beside its amplitudes.
+fn has_same_shape(one: &Dose, other: &Dose) -> bool {
+    let mut values = one.effect.parameters.iter().zip(one.values.iter().zip(&other.values));
+    std::ptr::eq(one.effect, other.effect) && values.all(|(p, (a, b))| p.role == Role::Amplitude || a == b)
+}
+
+/// Puts effects back into a design's residual.
+fn restore<'d>(design: &mut Design, doses: impl Iterator<Item = &'d Dose>) {
+    let restored: Vec<(usize, f64)> = doses
+        .flat_map(|dose| design.of(dose.effect).into_iter().map(move |id| (id, dose)))
+        .map(|(id, dose)| {
+            let at = design.columns[id].parameter;
+            (id, dose.values[at] / dose.effect.parameters[at].prior_scale)
+        })
+        .collect();
+    design.restore(&restored);
+}

@@ -1,0 +1,25 @@
+//! Which set of effects explains the residual best, and its fit.
+//!
+//! | goes in | comes out |
+//! | --- | --- |
+//! | candidates and their evidence | the best set, its noise, its fitted parameters, and the problem linearised about them |
+//!
+//! | file | what |
+//! | --- | --- |
+//! | [`hypothesis`] | a set as it is screened axis by axis and scored jointly |
+//! | [`refit`] | Gauss–Newton through the simulator: baseline and a set together |
+//! | [`staged_start`] | a start for it, sensor by sensor |
+//! | [`linearisation`] | the problem linearised about a fit |
+//! | [`memo`] | results that are asked for again |
+//! | [`neighbours`] | sets one addition, removal or exchange away |
+//! | [`stepwise`] | the search: neighbours are screened and scored until none is better |
+//!
+//! Not done here: sets of more than a few effects are not enumerated; the search climbs.
+
+pub mod hypothesis;
+pub mod linearisation;
+pub mod memo;
+pub mod neighbours;
+pub mod refit;
+pub mod staged_start;
+pub mod stepwise;

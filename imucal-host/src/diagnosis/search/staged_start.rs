@@ -1,0 +1,55 @@
+//! Where the fit of a baseline begins if no rig guides the sensor.
+//!
+//! Sensors share what a reference does not tell: its clock, its tilt, its heading. A magnet beside one of them would pull
+//! at all that it shares, and by way of it at the others. So each is heard in turn: first the gyroscope, of which
+//! nothing but the clock is shared; then the accelerometer, which tells the tilt; the magnetometer last, once drift and
+//! scatter of its own are known.
+
+use super::refit::{Fit, refit};
+use crate::{
+    diagnosis::{
+        mixed_model::noise::{Noise, Weighing},
+        residual::{base_run::Reference, forward_model::Scene},
+    },
+    effect::Effect,
+    recording::SensorKind,
+    simulator::Dose,
+};
+
+/// Sensors are heard one after the other, and each tells its own terms and of the shared ones these.
+const HEARD: [(&[SensorKind], &[&str]); 2] = [
+    (&[SensorKind::Gyr], &["clk.time_offset"]),
+    (&[SensorKind::Gyr, SensorKind::Acc], &["clk.time_offset", "rig.level_tilt"]),
+];
+/// Fits of each, each with the noise that the last one left.
+const ROUNDS: usize = 2;
+/// White noise of one that is not yet heard is taken for so many times what it is.
+const MUTED: f64 = 1e6;
+
+/// Fits the baseline to the sensors in turn. `None` where the simulator fails.
+pub fn start(scene: &Scene<'_>, mut doses: Vec<Dose>) -> Option<Fit> {
+    for (heard, shared) in HEARD {
+        let told = |effect: &Effect| {
+            shared.contains(&effect.id.as_str()) || effect.sensors.iter().all(|kind| heard.contains(kind))
+        };
+        let (mut asked, rest): (Vec<Dose>, Vec<Dose>) = doses.into_iter().partition(|dose| told(dose.effect));
+        for _ in 0..ROUNDS {
+            let reference = Reference::new(scene, asked.clone(), &scene.fine)?;
+            let weighing = Weighing::new(scene, SensorKind::ALL.map(|kind| reference.output(kind)));
+            let noise = muted(weighing.white(&scene.residual(&asked)?), heard);
+            asked = refit(scene, asked, Some(&noise))?.doses;
+        }
+        doses = asked;
+        doses.extend(rest);
+    }
+    Some(Fit { residual: scene.residual(&doses)?, doses })
+}
+
+/// A noise that lets only these sensors be heard.
+fn muted(mut noise: Noise, heard: &[SensorKind]) -> Noise {
+    for kind in SensorKind::ALL.into_iter().filter(|kind| !heard.contains(kind)) {
+        let sensor = &mut noise.sensors[kind as usize];
+        sensor.white.iter_mut().chain(&mut sensor.moving).for_each(|sigma| *sigma *= MUTED);
+    }
+    noise
+}

@@ -1,0 +1,237 @@
+//! Which set of effects explains the gap: evidence, with the noise estimated anew for each set.
+//!
+//! Starting from none, effects are added, replaced and taken out while the evidence rises. Sets are judged by linear
+//! algebra first; the few best are judged again with the noise that suits them, since steps and sways hide in a drift
+//! that was estimated without them. After each change baseline and effects are fitted anew through the simulator.
+
+use super::{
+    hypothesis::Judged,
+    linearisation::Linear,
+    refit::{Fit, refit},
+    staged_start,
+};
+use crate::{
+    diagnosis::{
+        library::{
+            candidates::{Candidates, is_shaped},
+            nonlinear,
+            nonlinear::Backdrop,
+        },
+        mixed_model::noise::{FAR, Noise},
+        residual::{base_run::Reference, forward_model::Scene},
+    },
+    effect::Effect,
+    recording::SensorKind,
+    simulator::Dose,
+};
+
+/// Most effects in a set; where no rig guides the sensor, the latter: a hand and a reference add gaps of their own.
+const MOST: (usize, usize) = (3, 5);
+/// The first effect must raise the evidence by this, beyond its share of the prior, and each further one by the latter:
+/// where one thing is wrong, another is less of a surprise. How many false alarms that makes is told by `imucal blind`.
+const GAIN: (f64, f64) = (0.5, 0.0);
+/// A set of as many effects must raise it by this; one of fewer need not, since what the data would rather be without is
+/// not asserted.
+const CHANGE: f64 = 0.5;
+/// Fits of the baseline, each with the noise that the last one left, where no rig guides the sensor.
+const SETTLING: usize = 2;
+
+/// A search that has come to its end.
+pub struct Explained<'s> {
+    /// The best set, with its noise.
+    pub best: Judged,
+    /// No effect at all, with its noise.
+    pub none: Judged,
+    /// The fit of the best set.
+    pub fit: Fit,
+    /// The problem about that fit.
+    pub linear: Linear<'s>,
+}
+
+/// Searches. `None` where the simulator fails.
+pub fn search<'s>(
+    scene: &'s Scene<'s>,
+    candidates: &'s Candidates,
+    trace: &dyn Fn(&str),
+) -> Option<Explained<'s>> {
+    let doses: Vec<Dose> = candidates
+        .baseline
+        .iter()
+        .map(|effect| Dose { effect, values: vec![0.0; effect.parameters.len()] })
+        .collect();
+    let mut fit = match scene.swings {
+        Some(_) => refit(scene, doses, None)?,
+        None => staged_start::start(scene, doses)?,
+    };
+    trace("baseline fitted");
+    let mut linear = Linear::fitted_alone(scene, candidates, &fit)?;
+    let white = linear.weighing.white(&fit.residual);
+    let mut none = linear.judge(&[], &white, &SensorKind::ALL, &FAR)?;
+    trace(&format!("none: {:.1} {:?}", none.log_evidence, none.noise));
+    // Where no rig guides the sensor, the first noise holds much of the misfit that the first fit began with.
+    for _ in 0..if scene.swings.is_none() { SETTLING } else { 0 } {
+        fit = refit(scene, fit.doses, Some(&none.noise))?;
+        linear = Linear::fitted_alone(scene, candidates, &fit)?;
+        let start = with_white(&none.noise, &linear.weighing.white(&fit.residual));
+        none = linear.judge(&[], &start, &SensorKind::ALL, &FAR)?;
+        trace(&format!("none again: {:.1} {:?}", none.log_evidence, none.noise));
+    }
+    let most = if scene.swings.is_some() { MOST.0 } else { MOST.1 };
+    linear = Linear::new(scene, candidates, &fit, &none.noise, None)?;
+    trace("shapes");
+    let mut at = Explained { best: none.clone(), none, fit, linear };
+    let mut likeliest: Option<Explained<'s>> = None;
+    let mut seen = vec![Vec::new()];
+    loop {
+        at = at.settled()?;
+        let Some(Step { to, found_in }) = improved(&at, most)? else { break };
+        // Two sets may each be better than the other with the noise that the other leaves; a set may be better once in
+        // shapes of another place.
+        let visits = if found_in.is_some() { 2 } else { 1 };
+        let comes_round = seen.iter().filter(|set| **set == key(&to.set)).count() >= visits;
+        if comes_round && to.set.len() >= at.best.set.len() {
+            break;
+        }
+        seen.push(key(&to.set));
+        let names: Vec<&str> = to.set.iter().map(|effect| effect.id.as_str()).collect();
+        trace(&format!("{:.1} → {:.1} {names:?}", at.best.log_evidence, to.log_evidence));
+        let next = at.advanced(found_in.as_ref().unwrap_or(&at.linear), to)?;
+        trace("refitted");
+        if comes_round {
+            // The fit with one effect more would rather be without it: it has not kept what linear algebra promised.
+            return next.settled();
+        }
+        let left = std::mem::replace(&mut at, next);
+        if likeliest.as_ref().is_none_or(|most| left.is_likelier(most)) {
+            likeliest = Some(left);
+        }
+    }
+    // What a move promises by linear algebra the fit through the simulator need not keep.
+    Some(likeliest.filter(|most| most.is_likelier(&at)).unwrap_or(at))
+}
+
+impl<'s> Explained<'s> {
+    /// With the noise that suits its set.
+    fn settled(mut self) -> Option<Self> {
+        self.best = self.linear.judge(&self.best.set, &self.best.noise, &SensorKind::ALL, &FAR)?;
+        if self.best.set.is_empty() {
+            self.none = self.best.clone();
+        }
+        Some(self)
+    }
+
+    fn is_likelier(&self, other: &Self) -> bool {
+        self.best.log_evidence > other.best.log_evidence
+    }
+
+    /// Fits a set, found in a problem that may have other shapes than the own, through the simulator, and looks at all
+    /// candidates from there.
+    fn advanced(&self, found_in: &Linear<'s>, mut next: Judged) -> Option<Self> {
+        let Linear { scene, candidates, .. } = *found_in;
+        // An effect whose shape that problem has changed begins anew.
+        let kept = |effect: &'static Effect| {
+            let is_same =
+                |dose: &&Dose| candidates.has_term(effect) || found_in.shape_of(effect) == dose.values;
+            self.fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, effect)).filter(is_same)
+        };
+        let all = candidates.baseline.iter().chain(&next.set);
+        let mut doses: Vec<Dose> = all.filter_map(|effect| kept(effect).cloned()).collect();
+        for effect in next.set.iter().copied().filter(|effect| kept(effect).is_none()) {
+            let rest: Vec<&'static Effect> =
+                next.set.iter().copied().filter(|other| !std::ptr::eq(*other, effect)).collect();
+            let values = refined(effect, found_in, &doses, &rest, &next.noise)?;
+            doses.push(Dose { effect, values });
+        }
+        let fit = refit(scene, doses, Some(&next.noise))?;
+        next.noise = with_white(&next.noise, &found_in.weighing.white(&fit.residual));
+        let linear = Linear::new(scene, candidates, &fit, &next.noise, Some(&self.linear))?;
+        Some(Self { best: next, none: self.none.clone(), fit, linear })
+    }
+}
+
+/// An effect's parameters at which its signature was taken; a shape is refined against what is fitted without it.
+fn refined(
+    effect: &'static Effect,
+    linear: &Linear<'_>,
+    doses: &[Dose],
+    rest: &[&'static Effect],
+    noise: &Noise,
+) -> Option<Vec<f64>> {
+    let (scene, values) = (linear.scene, linear.shape_of(effect));
+    if !is_shaped(effect) {
+        return Some(values);
+    }
+    let fitted = linear.fitted(rest);
+    let whitenings = linear.whitenings(noise);
+    let backdrop = Backdrop::new(scene, &linear.design, &fitted, &whitenings);
+    let reference = Reference::new(scene, doses.to_vec(), &scene.fine)?;
+    Some(nonlinear::refine(effect, &values, &reference, &backdrop).map_or(values, |(refined, _)| refined))
+}
+
+/// A likelier set, and the problem in which it was found where that is not the one it was sought from.
+struct Step<'s> {
+    to: Judged,
+    found_in: Option<Linear<'s>>,
+}
+
+impl Step<'_> {
+    fn to(to: Judged) -> Self {
+        Self { to, found_in: None }
+    }
+}
+
+/// The cheapest step that gains.
+fn improved<'s>(at: &Explained<'s>, most: usize) -> Option<Option<Step<'s>>> {
+    let Explained { linear, fit, best, .. } = at;
+    let gains = |judged: &Judged, least: f64| judged.log_evidence > best.log_evidence + least;
+    let gain = if best.set.is_empty() { GAIN.0 } else { GAIN.1 };
+    let change = |judged: &Judged| if judged.set.len() < best.set.len() { 0.0 } else { CHANGE };
+    let room = most.saturating_sub(best.set.len());
+    if room > 0
+        && let Some(next) = linear.added(best, &|_| true)?.filter(|next| gains(next, gain))
+    {
+        return Some(Some(Step::to(next)));
+    }
+    if !best.set.is_empty()
+        && let Some(next) = linear.changed(best)?.filter(|next| gains(next, change(next)))
+    {
+        return Some(Some(Step::to(next)));
+    }
+    // A step or a sway that stands in the drift is not where that drift would have it.
+    let quiet = if room > 0 { linear.reshaped(fit, &best.noise.quieter(), &[]) } else { None };
+    let moved = |effect: &'static Effect| {
+        quiet.as_ref().is_some_and(|quiet| quiet.shape_of(effect) != linear.shape_of(effect))
+    };
+    let from_quiet = match &quiet {
+        Some(quiet) => quiet.added(best, &moved)?.filter(|next| gains(next, gain)),
+        None => None,
+    };
+    if let Some(to) = from_quiet {
+        return Some(Some(Step { to, found_in: quiet }));
+    }
+    if room > 1
+        && let paired = quiet.as_ref().unwrap_or(linear).paired(best)?
+        && let Some(to) = paired.filter(|next| gains(next, gain + GAIN.1))
+    {
+        return Some(Some(Step { to, found_in: quiet }));
+    }
+    let anew = linear.changed_anew(fit, best)?.filter(|(_, next)| gains(next, CHANGE));
+    Some(anew.map(|(anew, to)| Step { to, found_in: Some(anew) }))
+}
+
+/// A set, whatever the order of its effects.
+fn key(set: &[&'static Effect]) -> Vec<&'static str> {
+    let mut key: Vec<&'static str> = set.iter().map(|effect| effect.id.as_str()).collect();
+    key.sort_unstable();
+    key
+}
+
+/// A noise with the white noise of another, where that is less: a misfit that a fit has gone through is no noise.
+fn with_white(noise: &Noise, white: &Noise) -> Noise {
+    let least = white.clone().at_most(noise);
+    let mut noise = noise.clone();
+    for (own, least) in noise.sensors.iter_mut().zip(least.sensors) {
+        (own.white, own.moving) = (least.white, least.moving);
+    }
+    noise
+}

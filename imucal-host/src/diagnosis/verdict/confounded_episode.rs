@@ -1,0 +1,62 @@
+//! Episodes that last as long as a hand carries the sensor about.
+//!
+//! Where it lies before and after, the field may not be that of where it is turned: such an episode is told from a change
+//! of place by nothing in the recording.
+
+use crate::diagnosis::{finding::Cause, residual::block::Block};
+
+/// An episode begins and ends with the movement where it does so within this time of it, s.
+const NEAR: f64 = 3.0;
+
+/// Takes out of `causes` what lasts as long as the movement, and says so.
+pub fn leave_out(causes: &mut Vec<Cause>, blocks: &[Block]) -> Vec<String> {
+    let mut moving = blocks.iter().filter(|block| block.rest.is_none()).map(|block| block.time);
+    let Some(first) = moving.next() else { return Vec::new() };
+    let last = moving.next_back().unwrap_or(first);
+    let time = |cause: &Cause, name: &str| {
+        cause.parameters.iter().find(|amount| amount.name == name).and_then(|amount| amount.value)
+    };
+    let lasts = |cause: &mut Cause| {
+        let ends = time(cause, "t_start").zip(time(cause, "t_end"));
+        ends.is_some_and(|(start, end)| (start - first).abs() < NEAR && (end - last).abs() < NEAR)
+    };
+    let remark = |cause: Cause| {
+        format!(
+            "not asserted: {} from {first:.0} to {last:.0} s, as long as the sensor is carried about; what surrounds it where \
+             it lies would look the same",
+            cause.effect
+        )
+    };
+    causes.extract_if(.., lasts).map(remark).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::{finding::Amount, residual::block::cut};
+
+    fn episode(start: f64, end: Option<f64>) -> Cause {
+        let amount =
+            |name: &str, value| Amount { name: name.into(), value, std_error: None, unit: "s".into() };
+        Cause {
+            effect: "mag.bias_step".into(),
+            probability: 1.0,
+            equivalents: Vec::new(),
+            parameters: vec![amount("t_start", Some(start)), amount("t_end", end)],
+            material: true,
+            gap_closed: None,
+            gap_closed_ci95: None,
+        }
+    }
+
+    #[test]
+    fn an_episode_as_long_as_the_movement_is_left_out_and_one_within_it_is_not() {
+        let time: Vec<f64> = (0..10_000).map(|k| 0.01 * f64::from(k)).collect();
+        let moves: Vec<bool> = time.iter().map(|t| (30.0..80.0).contains(t)).collect();
+        let blocks = cut(&time, &moves, 0.01);
+        let mut causes = vec![episode(29.0, Some(81.5)), episode(28.0, Some(60.0)), episode(30.0, None)];
+        let remarks = leave_out(&mut causes, &blocks);
+        assert_eq!((causes.len(), remarks.len()), (2, 1));
+        assert!(remarks[0].contains("mag.bias_step from 30 to 80 s"), "{}", remarks[0]);
+    }
+}

@@ -1,0 +1,86 @@
+//! Which other effects could stand in a cause's place.
+
+use rayon::prelude::*;
+
+use crate::{
+    diagnosis::{
+        mixed_model::noise::NEAR,
+        search::{hypothesis::Judged, linearisation::Linear},
+    },
+    effect::Effect,
+};
+
+/// Alternatives judged with a noise of their own.
+const JUDGED: usize = 5;
+/// Alternatives further below in ln of probability are not judged.
+const FAR: f64 = 25.0;
+/// Likewise, where each has a noise of its own.
+const BEHIND: f64 = 10.0;
+/// Probability that a credible set holds.
+const CREDIBLE: f64 = 0.95;
+
+/// A cause among those that could stand in its place.
+#[derive(Clone, Debug)]
+pub struct Standing {
+    /// Its probability, among all that could stand in its place and nothing at all.
+    pub probability: f64,
+    /// The others of the credible set, likeliest first.
+    pub equivalents: Vec<&'static Effect>,
+    /// The set, likeliest first, the cause among them.
+    pub set: Vec<&'static Effect>,
+}
+
+/// Effects that were not asserted where nothing was, and cannot be excluded: beside none at all, each has more than what a
+/// credible set leaves out. Likeliest first.
+pub fn suspects(linear: &Linear<'_>, none: &Judged) -> Option<Vec<&'static Effect>> {
+    let (own, ranked) = linear.ranked(&none.set, &none.noise)?;
+    let odds = |value: f64| (value - own).exp();
+    let likely = ranked.into_iter().take_while(|(value, _)| odds(*value) > 1.0 - CREDIBLE);
+    Some(likely.map(|(_, effect)| effect).collect())
+}
+
+/// The standing of one cause of a set.
+pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> Option<Standing> {
+    let rest: Vec<&'static Effect> =
+        best.set.iter().copied().filter(|effect| !std::ptr::eq(*effect, cause)).collect();
+    let (_, ranked) = linear.ranked(&rest, &best.noise)?;
+    let own = ranked.iter().find(|(_, effect)| std::ptr::eq(*effect, cause))?.0;
+    let standard = linear.sift(&best.set, &best.noise, &[], &NEAR)?;
+    let none = linear.judge(&rest, &best.noise, linear.scene.reach(cause), &NEAR)?;
+    let mut judged: Vec<(f64, Option<&'static Effect>)> =
+        vec![(best.log_evidence, Some(cause)), (none.log_evidence, None)];
+    let others = ranked.iter().filter(|(value, effect)| !std::ptr::eq(*effect, cause) && *value > own - FAR);
+    let others: Vec<&'static Effect> = others.take(JUDGED).map(|(_, effect)| *effect).collect();
+    let offsets = linear.offsets(&best.noise);
+    let instead = |effect: &&'static Effect| {
+        let set: Vec<&'static Effect> = rest.iter().copied().chain([*effect]).collect();
+        let anew: Vec<_> =
+            linear.scene.reach(cause).iter().chain(linear.scene.reach(effect)).copied().collect();
+        let sifted = linear.sift(&set, &best.noise, &anew, &NEAR);
+        // What falls behind axis by axis is not judged any further.
+        let sifted = sifted.filter(|sifted| sifted.value > standard.value - BEHIND)?;
+        Some((linear.together(sifted, &offsets)?.log_evidence, Some(*effect)))
+    };
+    let instead: Vec<Option<_>> = others.par_iter().map(instead).collect();
+    judged.extend(instead.into_iter().flatten());
+    judged.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let most = judged[0].0;
+    let total: f64 = judged.iter().map(|(value, _)| (value - most).exp()).sum();
+    let probability = |value: f64| (value - most).exp() / total;
+    let mut set = Vec::new();
+    let mut held = 0.0;
+    for (value, effect) in &judged {
+        if held < CREDIBLE {
+            set.extend(*effect);
+        }
+        held += probability(*value);
+    }
+    if !set.iter().any(|effect| std::ptr::eq(*effect, cause)) {
+        set.push(cause);
+    }
+    Some(Standing {
+        probability: probability(best.log_evidence),
+        equivalents: set.iter().copied().filter(|effect| !std::ptr::eq(*effect, cause)).collect(),
+        set,
+    })
+}

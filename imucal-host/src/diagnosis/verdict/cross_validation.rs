@@ -1,0 +1,76 @@
+//! Which causes are borne out by blocks that no fit has seen.
+//!
+//! Where no rig guides the sensor, what hand and reference add is no noise of any kind that is estimated, and evidence
+//! alone is too sure. A cause that is not borne out may spoil what the others would foretell: the worst is taken out
+//! first, and the others are asked again. Against a calibration made elsewhere an error of a given triad is a gap as well,
+//! which nine products of rates may stand for as well as six misalignments: a cause must be borne out beside the triad's
+//! terms, were they free.
+
+use super::{estimates, shares, shares::Share};
+use crate::{
+    diagnosis::{finding::Cause, mixed_model::noise::Noise, search::linearisation::Linear},
+    effect::Effect,
+};
+
+/// A cause closes at least this share of what its own sensors show.
+const LEAST: f64 = 0.05;
+/// One of its amplitudes at least is so many standard errors from zero: of one that is not, nobody could take out anything.
+const ERRORS: f64 = 2.0;
+
+/// Takes out the causes of a set that no held-out block bears out, that are too small to matter or of no known size, and
+/// says so; `causes` are those of `set`, in its order. `None` where nothing can be fitted.
+pub fn leave_out(
+    causes: &mut Vec<Cause>,
+    linear: &Linear<'_>,
+    set: &[&'static Effect],
+    noise: &Noise,
+) -> Option<Vec<String>> {
+    let mut kept = set.to_vec();
+    let mut out = Vec::new();
+    loop {
+        let shares = shares::closed_of_own(linear, &kept, noise)?;
+        let fails = |at: &usize| {
+            let (share, cause) = (&shares[*at], &causes[*at]);
+            let matters = cause.material && estimates::is_sized(kept[*at], &cause.parameters, ERRORS);
+            !matters || !is_borne(share)
+        };
+        let failing = (0..kept.len()).filter(fails);
+        let Some(worst) = failing.min_by(|a, b| shares[*a].value.total_cmp(&shares[*b].value)) else { break };
+        kept.remove(worst);
+        out.push(causes.remove(worst).effect);
+    }
+    for at in (0..kept.len()).rev() {
+        if !is_borne_beside_terms(at, &kept, linear, noise)? {
+            kept.remove(at);
+            out.push(causes.remove(at).effect);
+        }
+    }
+    let names = out.join(", ");
+    Some(match out.is_empty() {
+        true => Vec::new(),
+        false => vec![format!(
+            "not asserted, since held-out data do not bear them out or no size of theirs is told from zero: {names}"
+        )],
+    })
+}
+
+fn is_borne(share: &Share) -> bool {
+    share.value > LEAST && share.interval[0] > 0.0
+}
+
+/// Whether held-out blocks bear out a cause of a set with the terms of its triads free, where these are given.
+fn is_borne_beside_terms(
+    at: usize,
+    set: &[&'static Effect],
+    linear: &Linear<'_>,
+    noise: &Noise,
+) -> Option<bool> {
+    let is_other = |term: &&'static Effect| !set.iter().any(|own| std::ptr::eq(*own, *term));
+    let terms: Vec<&'static Effect> =
+        linear.candidates.given_beside(set[at]).into_iter().filter(is_other).collect();
+    if terms.is_empty() {
+        return Some(true);
+    }
+    let all: Vec<&'static Effect> = set.iter().copied().chain(terms).collect();
+    shares::closed_of_own(linear, &all, noise)?.get(at).map(is_borne)
+}

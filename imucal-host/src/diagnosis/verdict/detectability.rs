@@ -1,0 +1,76 @@
+//! Which effects would have been seen, and which this recording cannot show.
+
+use crate::{
+    diagnosis::{
+        finding::{Absent, NotTestable},
+        library::evidence::{Projected, SEEN},
+        location::score_test::{RETAINED, score_test},
+        mixed_model::noise::Noise,
+        search::linearisation::Linear,
+    },
+    effect::Effect,
+};
+
+/// Effects that are absent at sizes that matter, and effects that cannot be told, once baseline and `set` are fitted.
+pub fn testable(
+    linear: &Linear<'_>,
+    set: &[&'static Effect],
+    noise: &Noise,
+) -> Option<(Vec<Absent>, Vec<NotTestable>)> {
+    let fitted = linear.fitted(set);
+    let others: Vec<usize> = (0..linear.design.columns.len()).filter(|id| !fitted.contains(id)).collect();
+    let projected = Projected::new(&linear.normal(noise), &fitted, &others)?;
+    let mut absent = Vec::new();
+    let told = |(effect, why): &(&'static Effect, &str)| NotTestable {
+        effect: effect.id.clone(),
+        because: (*why).to_owned(),
+    };
+    let mut untold: Vec<NotTestable> = linear.candidates.untestable.iter().map(told).collect();
+    for effect in &linear.candidates.effects {
+        if set.iter().any(|own| std::ptr::eq(*own, *effect)) {
+            continue;
+        }
+        let places: Vec<usize> =
+            (0..others.len()).filter(|at| linear.design.columns[others[*at]].is_of(effect)).collect();
+        let parameter = |place: &usize| &effect.parameters[linear.design.columns[others[*place]].parameter];
+        let detectable = |place: &usize| {
+            let information = projected.information[(*place, *place)];
+            let kept = information > RETAINED * projected.before[*place];
+            if kept { (SEEN / information).sqrt() * parameter(place).prior_scale } else { f64::INFINITY }
+        };
+        let plausible = |place: &usize| detectable(place) < parameter(place).range.1;
+        if !places.iter().any(plausible) {
+            untold.push(NotTestable {
+                effect: effect.id.clone(),
+                because: because(effect, &projected, &places),
+            });
+            continue;
+        }
+        let worst = places.iter().max_by(|a, b| {
+            let relative = |place: &usize| detectable(place) / parameter(place).material;
+            relative(a).total_cmp(&relative(b))
+        })?;
+        let (statistic, dimensions) = score_test(&projected, &places);
+        if detectable(worst) < parameter(worst).material && statistic < dimensions as f64 + SEEN {
+            absent.push(Absent {
+                effect: effect.id.clone(),
+                minimum_detectable: detectable(worst),
+                unit: parameter(worst).unit.clone(),
+            });
+        }
+    }
+    Some((absent, untold))
+}
+
+fn because(effect: &Effect, projected: &Projected, places: &[usize]) -> String {
+    if places.iter().all(|place| projected.before[*place] <= 0.0) {
+        return format!("the recording holds nothing that it would change; it needs: {}", effect.words.needs);
+    }
+    let taken = places.iter().all(|p| projected.information[(*p, *p)] < RETAINED * projected.before[*p]);
+    match effect.confusables.first() {
+        Some(other) if taken => {
+            format!("here the same as {}, which is fitted; what parts them: {}", other.id, other.parted_by)
+        }
+        _ => format!("it would have to be implausibly large to be seen; it needs: {}", effect.words.needs),
+    }
+}

@@ -1,0 +1,89 @@
+//! Parameters of the causes with their standard errors.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::{
+    diagnosis::{
+        finding::Amount,
+        mixed_model::design::Column,
+        residual::{base_run::Reference, block::Means},
+        search::stepwise::Explained,
+    },
+    effect::{Effect, Role},
+    simulator::Dose,
+};
+
+/// Prior standard deviation in usual sizes: so loose that it only keeps what the data do not show finite.
+const LOOSE: f64 = 1e3;
+/// An instant was looked for at least as closely as this, s, where no block tells it.
+const SCANNED: f64 = 5.0;
+
+/// Parameters of each effect of the best set, shapes among them.
+pub fn amounts(explained: &Explained<'_>) -> Option<Vec<Vec<Amount>>> {
+    amounts_of(explained, &explained.best.set)
+}
+
+/// Parameters of some effects of the fit, likewise.
+pub fn amounts_of(explained: &Explained<'_>, asked: &[&'static Effect]) -> Option<Vec<Vec<Amount>>> {
+    let (linear, set) = (&explained.linear, &explained.best.set);
+    let reference = Reference::new(linear.scene, explained.fit.doses.clone(), &linear.scene.fine)?;
+    let dose = |effect: &Effect| explained.fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, effect));
+    let shaped = |dose: &Dose| -> Vec<Column> {
+        let effect = dose.effect;
+        effect.shapes_at(&dose.values).map(|parameter| Column { effect, parameter }).collect()
+    };
+    let shape_columns: Vec<Column> = set.iter().filter_map(|effect| dose(effect)).flat_map(shaped).collect();
+    let means: Vec<Means> = shape_columns
+        .iter()
+        .map(|column| reference.signature(column.effect, column.parameter, &[]))
+        .collect::<Option<_>>()?;
+    let fitted = linear.fitted(set);
+    let columns: Vec<Column> =
+        fitted.iter().map(|id| linear.design.columns[*id]).chain(shape_columns.iter().copied()).collect();
+    let design = linear.design.extended(&fitted, columns.clone(), &means);
+    let every: Vec<usize> = (0..design.size).collect();
+    let normal = design.normal(&linear.whitenings(&explained.best.noise), &every);
+    let precision = |column: &Column| {
+        let parameter = &column.effect.parameters[column.parameter];
+        match parameter.role {
+            Role::Instant { .. } => (parameter.prior_scale / SCANNED).powi(2),
+            _ => 1.0 / (LOOSE * LOOSE),
+        }
+    };
+    let prior = DVector::from_iterator(columns.len(), columns.iter().map(precision));
+    let information = normal.information + DMatrix::from_diagonal(&prior);
+    let covariance = information.cholesky()?.inverse();
+    let error = |effect: &Effect, parameter: usize| {
+        let at = columns.iter().position(|c| c.is_of(effect) && c.parameter == parameter)?;
+        Some(covariance[(at, at)].sqrt() * effect.parameters[parameter].prior_scale)
+    };
+    asked
+        .iter()
+        .map(|effect| {
+            let values = &dose(effect)?.values;
+            let amount = |(at, value): (usize, &f64)| Amount {
+                name: effect.parameters[at].name.clone(),
+                value: value.is_finite().then_some(*value),
+                std_error: error(effect, at),
+                unit: effect.parameters[at].unit.clone(),
+            };
+            Some(values.iter().enumerate().map(amount).collect())
+        })
+        .collect()
+}
+
+/// An effect is large enough to matter: one of its amplitudes is.
+pub fn is_material(effect: &Effect, amounts: &[Amount]) -> bool {
+    effect.parameters.iter().zip(amounts).any(|(parameter, amount)| {
+        parameter.role == Role::Amplitude
+            && amount.value.is_some_and(|value| value.abs() >= parameter.material)
+    })
+}
+
+/// At least one amplitude is further from zero than so many of its standard errors.
+pub fn is_sized(effect: &Effect, amounts: &[Amount], errors: f64) -> bool {
+    effect.parameters.iter().zip(amounts).any(|(parameter, amount)| {
+        let far = |value: f64| amount.std_error.is_none_or(|error| value.abs() >= errors * error);
+        parameter.role == Role::Amplitude && amount.value.is_some_and(far)
+    })
+}

@@ -1,0 +1,189 @@
+//! The clock of a reference attitude: how far the samples are ahead of it or behind it.
+//!
+//! The offset is a term of the baseline, so that no other effect stands for it, and it is named where it is one that
+//! matters. A large one is looked for first, by the share of the samples' variance that no gain and bias explain, and the
+//! reference is moved by it: the fit is linear in what is left.
+
+use super::{estimates, shares, shares::Closed};
+use crate::{
+    diagnosis::{
+        finding::{Amount, Cause},
+        library::candidates::Candidates,
+        search::{linearisation::Linear, stepwise::Explained},
+    },
+    effect,
+    effect::Effect,
+};
+
+/// The effect.
+const ID: &str = "clk.time_offset";
+/// An offset that is named is so many standard errors from zero at least.
+const ERRORS: f64 = 5.0;
+
+/// The offset as a cause, and what all causes close beside it.
+pub struct Clock<'s> {
+    /// The cause.
+    pub cause: Cause,
+    /// What the causes of the set close of the gap that the offset is a part of; the offset's own share stands last.
+    pub closed: Closed,
+    /// The set and the offset.
+    pub set: Vec<&'static Effect>,
+    /// The problem with the offset among its effects.
+    pub linear: Linear<'s>,
+}
+
+/// The baseline's candidates with the offset among the effects, where it stands in the baseline.
+pub fn candidates(candidates: &Candidates) -> Option<(&'static Effect, Candidates)> {
+    let offset = effect::find(ID).filter(|offset| candidates.has_term(offset))?;
+    let mut with = candidates.clone();
+    with.baseline.retain(|term| !std::ptr::eq(*term, offset));
+    with.effects.push(offset);
+    with.taken_out.push(offset);
+    Some((offset, with))
+}
+
+/// The offset, where it is known, matters and held-out blocks bear it out; `moved` is what the reference was moved by, s,
+/// and `remainder` the whitened size of what a driver still follows. `None` where nothing can be fitted.
+pub fn clock<'s>(
+    explained: &'s Explained<'s>,
+    (offset, candidates): &'s (&'static Effect, Candidates),
+    moved: f64,
+    remainder: f64,
+) -> Option<Option<Clock<'s>>> {
+    let Explained { linear, best, fit, .. } = explained;
+    let Some(mut parameters) = estimates::amounts_of(explained, &[offset])?.pop() else { return Some(None) };
+    parameters.iter_mut().for_each(|amount| amount.value = amount.value.map(|value| value + moved));
+    if !estimates::is_material(offset, &parameters) || !estimates::is_sized(offset, &parameters, ERRORS) {
+        return Some(None);
+    }
+    let set: Vec<&'static Effect> = best.set.iter().copied().chain([*offset]).collect();
+    let values = parameters.iter().map(|amount| amount.value.unwrap_or_default()).collect();
+    let linear = linear.with_effect(candidates, fit, offset, values);
+    let closed = shares::closed(&linear, &set, &best.noise, remainder)?;
+    let Some(share) = closed.each.last().copied().filter(|share| share.interval[0] > 0.0) else {
+        return Some(None);
+    };
+    let cause = Cause {
+        effect: offset.id.clone(),
+        probability: 1.0 - chance(&parameters),
+        equivalents: Vec::new(),
+        parameters,
+        material: true,
+        gap_closed: Some(share.value),
+        gap_closed_ci95: Some(share.interval),
+    };
+    Some(Some(Clock { cause, closed, set, linear }))
+}
+
+/// Probability that an offset of zero would be estimated as far from zero.
+fn chance(parameters: &[Amount]) -> f64 {
+    let errors = |amount: &Amount| Some(amount.value? / amount.std_error?);
+    let furthest = parameters.iter().filter_map(errors).fold(0.0f64, |most, errors| most.max(errors.abs()));
+    libm::erfc(furthest / std::f64::consts::SQRT_2)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+    use super::*;
+    use crate::{
+        diagnosis::{Options, Verdict, diagnose},
+        effect::{Machine, Truth},
+        recording::{
+            Recording,
+            manifest::{Rig, RigKind},
+        },
+        simulator::{Motion, Place, SimulatedUnit, recent::Recent, record, truth::in_the_open},
+    };
+
+    /// A hand that swings a sensor without a rest, up to 4 rad/s, and moves it to and fro.
+    struct Swung {
+        /// Amplitude of the linear acceleration, m/s².
+        acceleration: f64,
+    }
+
+    /// A step of numerical derivatives, s.
+    const STEP: f64 = 1e-3;
+
+    impl Swung {
+        fn attitude(time: f64) -> Matrix3<f64> {
+            let (x, y) = (0.4 * time + 1.1 * (1.3 * time).sin(), 0.9 * (0.9 * time + 1.0).sin());
+            let z = 0.7 * time + 0.8 * (1.7 * time).sin();
+            Rotation3::from_euler_angles(x, y, z).into_inner()
+        }
+
+        fn rate(time: f64) -> Vector3<f64> {
+            let turn = Self::attitude(time - STEP).tr_mul(&Self::attitude(time + STEP));
+            imucal_core::rotation::log(&turn) / (2.0 * STEP)
+        }
+    }
+
+    impl Motion for Swung {
+        fn duration(&self) -> f64 {
+            40.0
+        }
+
+        fn truth_among(&self, time: f64, _: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
+            let change = (Self::rate(time + STEP) - Self::rate(time - STEP)) / (2.0 * STEP);
+            let attitude = Self::attitude(time);
+            let mut truth = in_the_open(time, &attitude, Self::rate(time), change, &self.place(), recent);
+            let to_and_fro = Vector3::new((5.3 * time).sin(), (4.1 * time).cos(), (6.7 * time).sin());
+            truth.f_t += attitude.tr_mul(&to_and_fro) * self.acceleration;
+            truth
+        }
+
+        fn rig(&self) -> Rig {
+            Rig { kind: RigKind::Optical, axes: None }
+        }
+
+        fn place(&self) -> Place {
+            Place::ankara()
+        }
+    }
+
+    /// A recording at 50 Hz whose reference is `late` behind the samples, s, and trembles by 0.01°.
+    fn tracked(acceleration: f64, late: f64) -> Recording {
+        let unit = SimulatedUnit { interval: 0.02, ..SimulatedUnit::mtx() };
+        let mut recording = record("swung.csv", &Swung { acceleration }, &unit, 3);
+        let trembling = |row: usize, axis: usize| 1.7e-4 * (7.3 * (row * row + 31 * axis) as f64).sin();
+        let quaternion = |(row, time): (usize, &f64)| {
+            let shown = Rotation3::from_matrix_unchecked(Swung::attitude(time - late));
+            let off = Vector3::from_fn(|axis, _| trembling(row, axis));
+            let q = UnitQuaternion::from_rotation_matrix(&shown) * UnitQuaternion::from_scaled_axis(off);
+            [q.w, q.i, q.j, q.k]
+        };
+        recording.reference = Some(recording.time.iter().enumerate().map(quaternion).collect());
+        recording
+    }
+
+    #[test]
+    fn a_reference_s_latency_is_named_with_its_value() {
+        for late in [-0.02, 0.01, 0.03, 0.05, 0.12] {
+            let diagnosis = diagnose(&tracked(0.0, late), &Options::default(), &|_| ());
+            let [cause] = &diagnosis.causes[..] else { panic!("{late}: {:?}", diagnosis.causes) };
+            assert_eq!((cause.effect.as_str(), diagnosis.verdict), (ID, Verdict::Explained), "{late}");
+            let (value, error) = (cause.parameters[0].value.unwrap(), cause.parameters[0].std_error.unwrap());
+            // A late reference shows the sensor ahead of it.
+            assert!((value - late).abs() < 4.0 * error && error < 5e-4, "{late}: {value} ± {error}");
+            assert!(cause.gap_closed.unwrap() > 0.95, "{late}: {:?}", cause.gap_closed);
+            assert_eq!(diagnosis.credible_set[0], ID);
+        }
+    }
+
+    #[test]
+    fn fast_motion_along_a_reference_in_time_has_no_gap() {
+        let diagnosis = diagnose(&tracked(0.0, 0.0), &Options::default(), &|_| ());
+        assert_eq!((diagnosis.verdict, diagnosis.causes.len()), (Verdict::None, 0), "{:?}", diagnosis.causes);
+    }
+
+    #[test]
+    fn a_sensor_moved_to_and_fro_is_diagnosed_without_its_accelerometer() {
+        let diagnosis = diagnose(&tracked(8.0, 0.01), &Options::default(), &|_| ());
+        let remark = diagnosis.remarks.iter().find(|remark| remark.contains("the accelerometer is left out"));
+        assert!(remark.is_some_and(|remark| remark.contains("moved to and fro")), "{:?}", diagnosis.remarks);
+        assert!(diagnosis.gap.iter().all(|gap| gap.sensor != "acc"));
+        let value = diagnosis.causes.iter().find(|cause| cause.effect == ID).unwrap().parameters[0].value;
+        assert!((value.unwrap() - 0.01).abs() < 5e-4, "{value:?}");
+    }
+}

@@ -1,0 +1,239 @@
+//! How large the gap is, and how far it shrinks on data that the fit has not seen.
+//!
+//! Blocks are dealt to folds in stretches. For each fold, baseline and effects are fitted to the others, and
+//!
+//! ```text
+//! closed      = Σ_folds E(baseline) − E(baseline and effects)      E: whitened energy of the fold's residual
+//! explainable = closed + what the fits' own errors cost + what a driver still follows
+//! φ           = closed / explainable
+//! ```
+//!
+//! A difference of energies needs no noise floor, so that white noise known to a few per cent does no harm. The
+//! interval is that of a jackknife over the folds, widened by what no test would have seen: below it stands the share
+//! that would be closed if the gap held an effect more that just escapes the search. How much that is, is told by the
+//! size of what is closed in the whole recording, since drift that ties one fold to the next makes a slow effect seem
+//! larger in each.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::{
+    diagnosis::{
+        finding::Gap,
+        library::evidence::Projected,
+        mixed_model::{
+            design::{Design, LOOSE, Normal},
+            noise::Noise,
+        },
+        search::linearisation::Linear,
+    },
+    effect::Effect,
+};
+
+/// Folds.
+pub const FOLDS: usize = 8;
+/// Stretches dealt to folds, s.
+const STRETCH: f64 = 3.0;
+/// Standard deviation of an effect's prior, in usual sizes: what few blocks tell of it must not run away on the others.
+const LARGE: f64 = 30.0;
+/// Standard deviation of a driver's statistic where there is nothing to follow: √(2·18).
+const SCATTER: f64 = 6.0;
+/// What a driver follows tells what is left within this share of it: it is another function than the one that is there.
+const VAGUE: f64 = 0.15;
+/// Whitened squared size of an effect that the search may miss.
+const UNSEEN: f64 = 50.0;
+
+/// A share of the explainable gap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Share {
+    /// φ.
+    pub value: f64,
+    /// 95 % interval, within 0 and 1.
+    pub interval: [f64; 2],
+}
+
+impl Share {
+    /// With the values that are `left` when one fold is left out, a further variance, and the whitened squared size of
+    /// the gap.
+    pub fn new(value: f64, left: &[f64], further: f64, whole: f64) -> Self {
+        let n = left.len() as f64;
+        let mean = left.iter().sum::<f64>() / n;
+        let variance = (n - 1.0) / n * left.iter().map(|l| (l - mean).powi(2)).sum::<f64>();
+        let wide = 1.96 * (variance + further).sqrt();
+        let bound = |x: f64| x.clamp(0.0, 1.0);
+        let least = bound(value - wide) * whole / (whole + UNSEEN);
+        Self { value: bound(value), interval: [least, bound(value + wide)] }
+    }
+}
+
+/// What was closed on held-out blocks.
+#[derive(Clone, Debug)]
+pub struct Closed {
+    /// By all effects.
+    pub total: Share,
+    /// By each effect, the others being there.
+    pub each: Vec<Share>,
+    /// Whitened squared size of the explainable gap.
+    pub explainable: f64,
+}
+
+/// Shares that a set closes; `remainder` is the whitened size of what a driver still follows.
+pub fn closed(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise, remainder: f64) -> Option<Closed> {
+    closed_in(linear, &linear.design, set, noise, remainder)
+}
+
+/// Share that each effect closes of what its own sensors show: beside a quiet sensor's gap that of another looks small.
+pub fn closed_of_own(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise) -> Option<Vec<Share>> {
+    let of = |(k, effect): (usize, &&'static Effect)| {
+        let mut design = linear.design.clone();
+        design.channels.retain(|channel| linear.scene.reach(effect).contains(&channel.kind));
+        closed_in(linear, &design, set, noise, 0.0)?.each.get(k).copied()
+    };
+    set.iter().enumerate().map(of).collect()
+}
+
+fn closed_in(
+    linear: &Linear<'_>,
+    design: &Design,
+    set: &[&'static Effect],
+    noise: &Noise,
+    remainder: f64,
+) -> Option<Closed> {
+    let fitted = linear.fitted(set);
+    let folds: Vec<Normal> = (0..FOLDS)
+        .map(|fold| {
+            let time = |block: usize| linear.scene.blocks[block].time / STRETCH;
+            // A row that holds no samples is a convention, and belongs to every fold.
+            let empty = |block: usize| linear.scene.blocks[block].rows.is_empty();
+            let inside = |block: usize| empty(block) || time(block) as usize % FOLDS == fold;
+            let whitenings = linear.weighing.whitenings_within(design, noise, &inside);
+            design.normal(&whitenings, &fitted)
+        })
+        .collect();
+    let baseline = linear.baseline.len();
+    let without = |left_out: Option<usize>| -> Vec<usize> {
+        (0..fitted.len())
+            .filter(|at| {
+                let column = linear.design.columns[fitted[*at]];
+                *at < baseline || left_out.is_none_or(|k| !column.is_of(set[k]))
+            })
+            .collect()
+    };
+    let before = held_out(&folds, &(0..baseline).collect::<Vec<_>>(), baseline)?;
+    let after = held_out(&folds, &without(None), baseline)?;
+    let gain = |after: &[Fold]| -> Vec<f64> {
+        before.iter().zip(after).map(|(before, after)| before.energy - after.energy).collect()
+    };
+    let costs: f64 = before.iter().zip(&after).map(|(before, after)| after.cost - before.cost).sum();
+    let closed = gain(&after);
+    let explainable = (closed.iter().sum::<f64>() + costs + remainder).max(f64::MIN_POSITIVE);
+    let whole = (size(linear, set, noise)? + remainder).clamp(1.0, explainable.max(1.0));
+    let share = |gains: &[f64]| {
+        let value = gains.iter().sum::<f64>() / explainable;
+        let n = FOLDS as f64;
+        // Of the ratio, leaving one fold out of both sums.
+        let left: Vec<f64> = (0..FOLDS)
+            .map(|fold| {
+                let rest = |gains: &[f64]| gains.iter().sum::<f64>() - gains[fold];
+                rest(gains) / (rest(&closed) + (costs + remainder) * (n - 1.0) / n).max(f64::MIN_POSITIVE)
+            })
+            .collect();
+        let vague = VAGUE * remainder / explainable;
+        Share::new(value, &left, (SCATTER / whole).powi(2) + vague * vague, whole)
+    };
+    let total = share(&closed);
+    let mut each = Vec::new();
+    for k in 0..set.len() {
+        let rest = held_out(&folds, &without(Some(k)), baseline)?;
+        let gains: Vec<f64> =
+            rest.iter().zip(&after).map(|(rest, after)| rest.energy - after.energy).collect();
+        each.push(share(&gains));
+    }
+    Some(Closed { total, each, explainable })
+}
+
+/// Whitened squared size of what a set explains beyond the baseline, less what noise alone would give.
+pub fn size(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise) -> Option<f64> {
+    let fitted = linear.fitted(set);
+    let normal = linear.design.normal(&linear.whitenings(noise), &fitted);
+    let every: Vec<usize> = (0..fitted.len()).collect();
+    let (baseline, own) = every.split_at(linear.baseline.len());
+    let projected = Projected::new(&normal, baseline, own)?;
+    let places: Vec<usize> = (0..own.len()).collect();
+    Some((projected.explained(&places) - own.len() as f64).max(0.0))
+}
+
+/// A fold that was not fitted.
+struct Fold {
+    /// Whitened energy of its residual.
+    energy: f64,
+    /// What of that the fit's own errors cost on average.
+    cost: f64,
+}
+
+/// Each fold's residual after a fit of columns to the others; the first `baseline` columns are the baseline's.
+fn held_out(folds: &[Normal], places: &[usize], baseline: usize) -> Option<Vec<Fold>> {
+    let part = |normal: &Normal| {
+        let n = places.len();
+        let g = DMatrix::from_fn(n, n, |i, j| normal.information[(places[i], places[j])]);
+        (g, DVector::from_fn(n, |i, _| normal.score[places[i]]))
+    };
+    let parts: Vec<(DMatrix<f64>, DVector<f64>)> = folds.iter().map(part).collect();
+    let n = places.len();
+    let precision = |place: &usize| if *place < baseline { LOOSE.powi(-2) } else { LARGE.powi(-2) };
+    let loose = DMatrix::from_diagonal(&DVector::from_iterator(n, places.iter().map(precision)));
+    folds
+        .iter()
+        .enumerate()
+        .map(|(fold, normal)| {
+            let mut information = loose.clone();
+            let mut score = DVector::zeros(n);
+            for (_, (g, z)) in parts.iter().enumerate().filter(|(other, _)| *other != fold) {
+                information += g;
+                score += z;
+            }
+            let factor = information.cholesky()?;
+            let fitted = factor.solve(&score);
+            let (g, z) = &parts[fold];
+            Some(Fold {
+                energy: normal.energy - 2.0 * fitted.dot(z) + fitted.dot(&(g * &fitted)),
+                cost: factor.solve(g).trace(),
+            })
+        })
+        .collect()
+}
+
+/// Root mean squares of each channel's block means, before and after, and what noise alone would leave.
+pub fn table(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise) -> Option<Vec<Gap>> {
+    let whitenings = linear.whitenings(noise);
+    let solve = |fitted: &[usize]| linear.design.normal(&whitenings, fitted).amounts();
+    let all = linear.fitted(set);
+    let (before, after) = (solve(&linear.baseline)?, solve(&all)?);
+    let gaps = linear.design.channels.iter().map(|channel| {
+        let counts = &linear.scene.counts[channel.kind as usize];
+        let rms = |fitted: &[usize], amounts: &DVector<f64>| {
+            let residual = channel.less(fitted, amounts);
+            weighted(counts, |block| residual[block] * residual[block])
+        };
+        Gap {
+            sensor: channel.kind.prefix().to_owned(),
+            axis: linear.scene.axis(channel.kind, channel.axis).to_owned(),
+            unit: crate::recording::Unit::of(channel.kind)
+                .first()
+                .map(ToString::to_string)
+                .unwrap_or_default(),
+            rms_before: rms(&linear.baseline, &before),
+            rms_after: rms(&all, &after),
+            noise_floor: weighted(counts, |block| linear.weighing.variance(channel, noise, block)),
+        }
+    });
+    Some(gaps.collect())
+}
+
+fn weighted(counts: &[usize], square: impl Fn(usize) -> f64) -> f64 {
+    let (sum, count) = counts
+        .iter()
+        .enumerate()
+        .filter(|(_, count)| **count > 0)
+        .fold((0.0, 0.0), |(s, n), (block, count)| (s + *count as f64 * square(block), n + *count as f64));
+    (sum / count.max(1.0)).sqrt()
+}
