@@ -3,7 +3,7 @@
 use imucal_host::{
     calibrate::{
         FitSummary, SensorOutcome,
-        mag::{self, MagInput},
+        mag::samples::{self, MagInput},
     },
     recording::Triple,
 };
@@ -20,7 +20,7 @@ const NINE: f64 = 33.7;
 const THREE: f64 = 21.1;
 
 fn calibrated(cloud: &CapCloud, field: Option<f64>) -> SensorOutcome {
-    mag::calibrate(&MagInput::of_cloud(&cloud.sensor, &vec![true; cloud.sensor.values.len()], field))
+    samples::calibrate(&MagInput::of_cloud(&cloud.sensor, &vec![true; cloud.sensor.values.len()], field))
 }
 
 /// Estimated entries of found less true, file's unit.
@@ -151,7 +151,8 @@ fn whole(seed: u64) -> Triple {
 /// Centre and AᵀA of a cloud's shell of radius `field`.
 fn shell(values: Vec<Vector3<f64>>, field: f64) -> (Vector3<f64>, Matrix3<f64>) {
     let usable = vec![true; values.len()];
-    let outcome = mag::calibrate(&MagInput::of_cloud(&Triple { values, ..whole(0) }, &usable, Some(field)));
+    let outcome =
+        samples::calibrate(&MagInput::of_cloud(&Triple { values, ..whole(0) }, &usable, Some(field)));
     let triad = outcome.accepted().expect("the whole sphere is accepted").triad;
     (triad.bias, triad.gain.tr_mul(&triad.gain))
 }

@@ -3,9 +3,8 @@
 use imucal_core::rotation::exp;
 use imucal_host::{
     calibrate::{
-        Options,
-        alignment::{Alignment, align},
-        calibrate,
+        Options, calibrate,
+        fit::alignment::{Alignment, align},
     },
     recording::{Recording, SensorKind},
     simulator::{SimulatedUnit, Tumble, record},

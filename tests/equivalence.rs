@@ -1,18 +1,23 @@
 //! The core in `f32` against the reference in `f64`: every sensor of every recording, sample by sample, and every
 //! fit that was accepted, parameter by parameter.
 
-use std::path::PathBuf;
-use std::sync::LazyLock;
+use std::{path::PathBuf, sync::LazyLock};
 
-use imucal_core::corrector::{Compensator, Corrector};
-use imucal_core::record::{Date, TriadRecord};
-use imucal_core::temperature::TemperatureTerms;
-use imucal_host::calibrate::{Calibration, Options, calibrate};
-use imucal_host::equivalence::samples::{self, Samples};
-use imucal_host::equivalence::{SampleEquivalence, fits};
-use imucal_host::recording::{Recording, SensorKind, Triple, Unit};
-use imucal_host::simulator::{Programme, Simulation, UnitKind};
-use imucal_host::store::{StoredCalibration, StoredTemperature, StoredTriad};
+use imucal_core::{
+    corrector::{Compensator, Corrector},
+    record::{Date, TriadRecord},
+    temperature::TemperatureTerms,
+};
+use imucal_host::{
+    calibrate::{Calibration, Options, calibrate},
+    equivalence::{
+        SampleEquivalence, fit_equivalence, fits,
+        samples::{self, Samples},
+    },
+    recording::{Recording, SensorKind, Triple, Unit},
+    simulator::{Programme, Simulation, UnitKind},
+    store::{StoredCalibration, StoredTemperature, StoredTriad},
+};
 use imucal_tests::{data, simulated};
 use rayon::prelude::*;
 
@@ -147,7 +152,7 @@ fn recordings_of_a_rig_are_corrected_and_fitted_alike_by_the_rig_s_models() {
                 assert!(fit.passes(), "seed {seed}, {}: {fit:#?}", outcome.model);
                 let mut wrong = fit.clone();
                 let last = wrong.parameters.last_mut().expect("some");
-                last.device += (0.25 * last.std).max(2.5 * fits::FLOOR * last.scale);
+                last.device += (0.25 * last.std).max(2.5 * fit_equivalence::FLOOR * last.scale);
                 assert!(!wrong.passes(), "{}: {wrong:#?}", outcome.model);
             }
         }
@@ -296,7 +301,7 @@ fn a_fit_that_ends_elsewhere_fails_the_comparison() {
         for index in 0..sound.parameters.len() {
             let mut wrong = sound.clone();
             let parameter = &mut wrong.parameters[index];
-            parameter.device += (0.25 * parameter.std).max(2.5 * fits::FLOOR * parameter.scale);
+            parameter.device += (0.25 * parameter.std).max(2.5 * fit_equivalence::FLOOR * parameter.scale);
             assert!(!wrong.passes(), "{}: {wrong:#?}", outcome.kind);
         }
     }

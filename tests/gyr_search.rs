@@ -15,7 +15,7 @@ use imucal_core::{
     triad::Triad,
 };
 use imucal_host::{
-    calibrate::{Calibration, FitSummary, Options, calibrate, outcome::Evidence, search::Search},
+    calibrate::{Calibration, FitSummary, Options, calibrate, fit::search::Search, outcome::Evidence},
     recording::{Nominal, Recording, SensorKind},
     report::table::table,
 };

@@ -4,7 +4,7 @@ use imucal_core::model::unified::UnifiedParameters;
 use imucal_host::{
     calibrate::{
         Options, calibrate,
-        ladder::{Rung, rung},
+        known_attitudes::ladder::{Rung, rung},
     },
     observe::pose::Poses,
     recording::SensorKind,

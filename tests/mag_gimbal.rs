@@ -7,9 +7,9 @@ use imucal_core::model::{
 };
 use imucal_host::{
     calibrate::{
-        ladder::{T12, X18, X21},
-        rig::unified_name,
-        rig_fit::{RigFit, fit},
+        fit::rig_fit::{RigFit, fit},
+        known_attitudes::ladder::{T12, X18, X21},
+        known_attitudes::rig::unified_name,
     },
     observe::pose::Poses,
 };

@@ -8,8 +8,9 @@ use imucal_core::{
 use imucal_host::{
     calibrate::{
         Calibration, FitSummary, Options, calibrate,
-        mag::{self, MagInput},
-        mag_reference, reference_fit,
+        fit::reference_fit,
+        known_attitudes::mag_reference,
+        mag::samples::{self, MagInput},
     },
     observe::{motion, pose},
     recording::{Recording, SensorKind},
@@ -75,7 +76,7 @@ fn on_the_half_not_seen_vectors_predict_directions_better_than_an_ellipsoid_does
         let vectors =
             mag_reference::magnetometer(&recording, mag, &usable, &Options::default(), &mut calibration)
                 .expect("a reference");
-        let ellipsoid = mag::calibrate(&MagInput::of_cloud(mag, &usable, None));
+        let ellipsoid = samples::calibrate(&MagInput::of_cloud(mag, &usable, None));
         println!("M15 {:?}, E9 {:?}", vectors.verdict, ellipsoid.verdict);
         let of = |fit: &FitSummary| {
             // Each at the lag that suits it best.

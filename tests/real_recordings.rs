@@ -10,7 +10,7 @@ use imucal_core::{
 use imucal_host::{
     calibrate::{
         AccModel, Calibration, FitSummary, Options, calibrate,
-        mag::{self, MagInput},
+        mag::samples::{self, MagInput},
         outcome::Evidence,
     },
     observe::cloud::cloud,
@@ -205,7 +205,7 @@ fn no_magnetometer_of_a_real_recording_runs_away() {
         let extent =
             values.iter().filter(|v| v.iter().all(|x| x.is_finite())).map(|v| v.norm()).fold(0.0, f64::max);
         let usable = vec![true; values.len()];
-        let outcome = mag::calibrate(&MagInput::of_cloud(&Triple { values, ..mag }, &usable, None));
+        let outcome = samples::calibrate(&MagInput::of_cloud(&Triple { values, ..mag }, &usable, None));
         let fit = outcome.fit.expect("enough points");
         let smallest = fit.triad.gain.diagonal().amin();
         // A runaway has its centre far outside of the cloud and its gain at nothing.
@@ -219,7 +219,7 @@ fn a_magnet_for_a_part_of_the_time_is_refused_and_little_of_it_left_out() {
     let mag = recording.mag.expect("a magnetometer");
     let usable = vec![true; mag.values.len()];
     let points = cloud(&mag.values, &usable).points.len();
-    let outcome = mag::calibrate(&MagInput::of_cloud(&mag, &usable, None));
+    let outcome = samples::calibrate(&MagInput::of_cloud(&mag, &usable, None));
     assert!(outcome.verdict.is_err(), "{outcome:?}");
     // Residuals of a tenth of the field: the model is wrong, not the data, of which a tenth at the most may go.
     let fit = outcome.fit.expect("for information");
@@ -262,7 +262,7 @@ fn assert_bootstrap(file: &str, every: usize, resamples: u64, factor: f64) {
         cloud(&mag.values, &usable).points.iter().step_by(every).map(|p| p.value).collect();
     let usable = vec![true; points.len()];
     let of = |values: Vec<Vector3<f64>>| {
-        mag::calibrate(&MagInput::of_cloud(&Triple { values, ..mag.clone() }, &usable, None))
+        samples::calibrate(&MagInput::of_cloud(&Triple { values, ..mag.clone() }, &usable, None))
     };
     let outcome = of(points.clone());
     let fit = outcome.accepted().expect("accepted");

@@ -4,7 +4,7 @@
 use imucal_host::{
     calibrate::{
         Calibration, Options, calibrate,
-        compare::{Comparison, SIGNIFICANT, Step},
+        fit::compare::{Comparison, SIGNIFICANT, Step},
         outcome::RigFindings,
     },
     recording::{Recording, SensorKind},

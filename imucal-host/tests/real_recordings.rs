@@ -1,12 +1,18 @@
 //! The reader and the integrity report on recordings of real sensors.
 
-use std::fs;
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
 
-use imucal_host::calibrate::{Options, calibrate};
-use imucal_host::recording::integrity::{Integrity, inspect};
-use imucal_host::recording::{Recording, SensorKind, Warning};
+use imucal_host::{
+    calibrate::{Options, calibrate},
+    recording::{
+        Recording, SensorKind, Warning,
+        check::integrity::{Integrity, inspect},
+    },
+};
 
 /// The data's folder, or nothing, told loudly; a failure where the data must be there.
 fn data(folder: &str) -> Option<PathBuf> {

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::{
-    recording::{gravity::normal_gravity, manifest::Axis},
+    recording::manifest::{Axis, gravity::normal_gravity},
     simulator::{
         Conditions, DriftKind, NoiseLevel, Place, Programme, Simulation, SimulationError, UnitKind,
         random::Random,

@@ -12,60 +12,37 @@ use crate::{
     },
     recording::{
         Recording, SensorKind, Triple,
-        integrity::{self, Integrity},
+        check::{integrity, integrity::Integrity},
         unit::STANDARD_GRAVITY,
     },
     simulator::place::EARTH_RATE,
 };
 
 pub mod acc;
-pub mod alignment;
-pub mod compare;
-pub mod directions;
 pub mod examination;
-pub mod gain_remark;
+pub mod fit;
 pub mod gyr;
-pub mod gyr_ladder;
-pub mod gyr_motions;
-pub mod gyr_path;
-pub mod gyr_residual;
-pub mod gyr_rig;
-pub mod gyr_rig_fit;
 pub mod handedness;
-pub mod ladder;
-pub mod lag;
+pub mod known_attitudes;
 pub mod mag;
-pub mod mag_reference;
-pub mod norm_fit;
-pub mod norm_residual;
 pub mod outcome;
-pub mod outlier;
-pub mod reference_fit;
-pub mod residual_driver;
-pub mod rest_bias;
-pub mod rest_noise;
-pub mod rig;
-pub mod rig_fit;
-pub mod rows;
-pub mod score_test;
-pub mod search;
 pub mod segmentation;
-pub mod serial;
-pub mod shell_errors;
 pub mod suspicion;
-pub mod turn_errors;
-pub mod turn_sense;
-pub mod turning_rest;
 
-use acc::AccInput;
-pub use acc::AccModel;
-use alignment::FieldAtRest;
-use directions::Directions;
-use mag::MagInput;
 pub use outcome::{Calibration, FitSummary, Refused, SegmentationReport, SensorOutcome};
-use rest_noise::{AtRest, RestNoise};
 use segmentation::Cut;
 pub use suspicion::{Follows, Status, Suspicion};
+
+pub use self::acc::rests::AccModel;
+use self::{
+    acc::rests::AccInput,
+    fit::{
+        alignment::FieldAtRest,
+        directions::Directions,
+        rest_noise::{AtRest, RestNoise},
+    },
+    mag::samples::MagInput,
+};
 
 /// What to calibrate, and how.
 #[derive(Clone, Debug)]
@@ -76,11 +53,11 @@ pub struct Options {
     pub skip: Vec<SensorKind>,
     /// Multiples of the initial rest's variance to try.
     pub multipliers: Vec<f64>,
-    /// The accelerometer's rung of [`ladder::ACCELEROMETER`] where the recording has a rig; `None` for the field form.
+    /// The accelerometer's rung of [`known_attitudes::ladder::ACCELEROMETER`] where the recording has a rig; `None` for the field form.
     pub rig_acc: Option<&'static str>,
-    /// The gyroscope's model of [`gyr_rig::MODELS`] where the recording has attitudes; `None` for the field form.
+    /// The gyroscope's model of [`gyr::rig::MODELS`] where the recording has attitudes; `None` for the field form.
     pub rig_gyr: Option<&'static str>,
-    /// The magnetometer's rung of [`ladder::MAGNETOMETER`] where the recording has attitudes; `None` for the field form.
+    /// The magnetometer's rung of [`known_attitudes::ladder::MAGNETOMETER`] where the recording has attitudes; `None` for the field form.
     pub rig_mag: Option<&'static str>,
     /// Climb the ladders and say which rung to use.
     pub compare: bool,
@@ -93,7 +70,7 @@ impl Default for Options {
             skip: Vec::new(),
             multipliers: segmentation::MULTIPLIERS.to_vec(),
             rig_acc: Some("I14"),
-            rig_gyr: Some(gyr_rig::G12),
+            rig_gyr: Some(gyr::rig::G12),
             rig_mag: Some("X21"),
             compare: false,
         }
@@ -120,15 +97,23 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         progress("fitting the magnetometer");
         let field = recording.manifest.site.field_ned_ut.map(|f| Vector3::from(f).norm());
         let usable = usable(&integrity, SensorKind::Mag, recording.rows());
-        let on_rig = rig::magnetometer(recording, mag, &usable, options, &mut calibration)
-            .or_else(|| mag_reference::magnetometer(recording, mag, &usable, options, &mut calibration));
+        let on_rig = known_attitudes::rig::magnetometer(recording, mag, &usable, options, &mut calibration)
+            .or_else(|| {
+                known_attitudes::mag_reference::magnetometer(
+                    recording,
+                    mag,
+                    &usable,
+                    options,
+                    &mut calibration,
+                )
+            });
         let outcome = on_rig.unwrap_or_else(|| {
             let rests = calibration.segmentation.as_ref().map_or(&[][..], |found| &found.rests);
             let interval = recording.median_interval().unwrap_or(1.0);
             let usable = counted_once(mag, &usable, rests, &mut calibration.warnings);
             let input =
                 MagInput { time: &recording.time, sensor: mag, usable: &usable, interval, rests, field };
-            let mut outcome = mag::calibrate(&input);
+            let mut outcome = mag::samples::calibrate(&input);
             if outcome.verdict.is_ok()
                 && let Some(fit) = &mut outcome.fit
             {
@@ -139,9 +124,9 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         calibration.sensors.push(outcome);
     }
     progress("checking the order and signs of the axes");
-    handedness::check(recording, &mut calibration);
+    handedness::mirror::check(recording, &mut calibration);
     progress("testing the residuals");
-    examination::examine(recording, &integrity, &mut calibration);
+    examination::examine::examine(recording, &integrity, &mut calibration);
     few_left_over(&mut calibration);
     calibration
 }
@@ -170,7 +155,7 @@ fn counted_once(
     warnings: &mut Vec<String>,
 ) -> Vec<bool> {
     let share = held::share(&mag.values, usable, rests);
-    if share <= examination::HELD {
+    if share <= examination::examine::HELD {
         return usable.to_vec();
     }
     warnings.push(format!(
@@ -196,7 +181,7 @@ fn align(
         let (mean, count) = (moments.mean(), f64::from(moments.count()));
         (count > 0.0).then(|| FieldAtRest { rest, mean, variance: moments.variance() / count })
     });
-    mag::align_with(fit, directions, &at_rest.collect::<Vec<_>>());
+    mag::samples::align_with(fit, directions, &at_rest.collect::<Vec<_>>());
 }
 
 /// What was found wrong with the samples and left out, in words.
@@ -241,17 +226,17 @@ fn inertial(
         .and_then(|gyr| {
             progress("fitting the gyroscope");
             let usable = usable(integrity, SensorKind::Gyr, recording.rows());
-            gyr_rig::gyroscope(recording, gyr, &usable, options, calibration)
+            gyr::rig::gyroscope(recording, gyr, &usable, options, calibration)
         })
         .unzip();
     let motions = motions.flatten().filter(|_| options.compare);
     let compare_gyr = |calibration: &mut Calibration, field: FieldForm<'_>| {
-        let comparison = motions.as_ref().and_then(|motions| gyr_ladder::comparison(motions, field));
+        let comparison = motions.as_ref().and_then(|motions| gyr::ladder::comparison(motions, field));
         calibration.comparisons.extend(comparison);
     };
     let Some(acc) = &recording.acc else {
         compare_gyr(calibration, &|_| None);
-        let without = || wanted.map(|_| gyr::without_accelerometer(Refusal::NoRest));
+        let without = || wanted.map(|_| gyr::turns::without_accelerometer(Refusal::NoRest));
         calibration.sensors.extend(gyr_on_rig.or_else(without));
         return None;
     };
@@ -289,17 +274,19 @@ fn inertial(
     let at_rest =
         AtRest { time: &recording.time, values: &acc.values, usable: &usable, interval, rows: &chosen.rows };
     let shown = at_rest.noise();
-    let on_rig = rig::accelerometer(recording, acc, &usable, gravity, options, calibration);
+    let on_rig = known_attitudes::rig::accelerometer(recording, acc, &usable, gravity, options, calibration);
     let result = match on_rig {
-        Some(outcome) => acc::AccResult { outcome, used: (0..chosen.rests.len()).collect(), noise: None },
-        None if never_moved(&chosen.rows, recording.rows()) => acc::never_moved(options.acc),
+        Some(outcome) => {
+            acc::rests::AccResult { outcome, used: (0..chosen.rests.len()).collect(), noise: None }
+        }
+        None if never_moved(&chosen.rows, recording.rows()) => acc::rests::never_moved(options.acc),
         None => {
             let input = AccInput { rests: &chosen.rests, noise: &shown, sensor: acc, gravity };
-            acc::calibrate(&input, options.acc)
+            acc::rests::calibrate(&input, options.acc)
         }
     };
     if options.compare && recording.gimbal.is_none() {
-        calibration.comparisons.extend(acc::compare(&chosen.rests, gravity));
+        calibration.comparisons.extend(acc::rests::compare(&chosen.rests, gravity));
     }
     let mut trials: Vec<_> = cuts.iter().map(Cut::trial).collect();
     let mut acc_outcome = result.outcome;
@@ -326,8 +313,8 @@ fn inertial(
         progress("fitting the gyroscope");
         Some(match (&acc_outcome.verdict, acc_outcome.fit.as_ref()) {
             (Ok(()), Some(fit)) => shared.outcome(gyr, chosen, &cuts, &fit.triad, &result.used, &mut trials),
-            (Err(refused), _) => gyr::without_accelerometer(refused.refusal),
-            (Ok(()), None) => gyr::without_accelerometer(Refusal::NoRest),
+            (Err(refused), _) => gyr::turns::without_accelerometer(refused.refusal),
+            (Ok(()), None) => gyr::turns::without_accelerometer(Refusal::NoRest),
         })
     });
     if !options.skip.contains(&SensorKind::Acc) {
@@ -383,8 +370,8 @@ impl GyrShared<'_> {
         cut: &'b Cut,
         acc: &'b Triad<f64>,
         used: &'b [usize],
-    ) -> gyr::GyrInput<'b> {
-        gyr::GyrInput {
+    ) -> gyr::turns::GyrInput<'b> {
+        gyr::turns::GyrInput {
             time: &self.recording.time,
             sensor: gyr,
             usable: self.usable,
@@ -410,8 +397,8 @@ impl GyrShared<'_> {
         let count = cut.rows.partition_point(|rest| rest.end <= row);
         let used: Vec<usize> = used.iter().copied().filter(|k| *k < count).collect();
         let whole = self.input(gyr, cut, acc, &used);
-        let input = gyr::GyrInput { rows: &cut.rows[..count], rests: &cut.rests[..count], ..whole };
-        gyr::calibrate(&input).passed().map(|fit| fit.triad)
+        let input = gyr::turns::GyrInput { rows: &cut.rows[..count], rests: &cut.rests[..count], ..whole };
+        gyr::turns::calibrate(&input).passed().map(|fit| fit.triad)
     }
 
     fn outcome(
@@ -423,8 +410,9 @@ impl GyrShared<'_> {
         used: &[usize],
         trials: &mut [outcome::ThresholdTrial],
     ) -> SensorOutcome {
-        let input = gyr::GyrInput { directions: self.directions, ..self.input(gyr, chosen, acc, used) };
-        let mut outcome = gyr::calibrate(&input);
+        let input =
+            gyr::turns::GyrInput { directions: self.directions, ..self.input(gyr, chosen, acc, used) };
+        let mut outcome = gyr::turns::calibrate(&input);
         let Some(fit) = &mut outcome.fit else {
             return outcome;
         };
@@ -435,7 +423,7 @@ impl GyrShared<'_> {
             .map(|cut| {
                 let all: Vec<usize> = (0..cut.rows.len()).collect();
                 let own = cut.fit.map_or(*acc, |(triad, _)| triad);
-                gyr::trial(&self.input(gyr, cut, &own, &all), &start)
+                gyr::turns::trial(&self.input(gyr, cut, &own, &all), &start)
             })
             .collect();
         for (trial, gain) in trials.iter_mut().zip(&gains) {

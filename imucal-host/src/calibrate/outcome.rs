@@ -10,11 +10,9 @@ use imucal_core::{
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{
-    alignment::Alignment,
-    compare::Comparison,
-    gyr_rig_fit::MotionFit,
-    rig_fit::RigFit,
-    search::Search,
+    fit::{
+        alignment::Alignment, compare::Comparison, gyr_rig_fit::MotionFit, rig_fit::RigFit, search::Search,
+    },
     suspicion::{Status, Suspicion},
 };
 use crate::{

@@ -8,7 +8,7 @@ use std::ops::Range;
 use imucal_core::{observation::Rest, triad::Triad};
 use rayon::prelude::*;
 
-use super::{acc, outcome::ThresholdTrial};
+use super::{acc::rests, outcome::ThresholdTrial};
 use crate::observe::rest::RestDetector;
 
 /// Multiples of the initial rest's variance that are tried.
@@ -51,7 +51,7 @@ pub fn cuts(detector: &RestDetector<'_>, multipliers: &[f64], gravity: f64) -> V
         .map(|multiplier| {
             let cut = detector.cut(*multiplier);
             let rests: Vec<_> = cut.rests.iter().map(|rows| detector.rest(rows)).collect();
-            let fit = acc::trial(&rests, gravity);
+            let fit = rests::trial(&rests, gravity);
             Cut { multiplier: cut.multiplier, threshold: cut.threshold, rows: cut.rests, rests, fit }
         })
         .collect()

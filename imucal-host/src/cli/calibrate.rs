@@ -14,7 +14,12 @@ use super::{
     warn,
 };
 use crate::{
-    calibrate::{AccModel, Calibration, Options, Status, calibrate, gyr, gyr_rig, ladder, mag},
+    calibrate::{
+        AccModel, Calibration, Options, Status, calibrate,
+        gyr::{rig, turns},
+        known_attitudes::ladder,
+        mag::samples,
+    },
     file::OutputSet,
     observe::pose,
     recording::{Recording, SensorKind},
@@ -74,9 +79,9 @@ fn model(text: &str) -> Result<(SensorKind, ModelChoice), String> {
         Some(("acc", "T9")) => Some((SensorKind::Acc, ModelChoice::Acc(AccModel::T9))),
         Some(("acc", "T6")) => Some((SensorKind::Acc, ModelChoice::Acc(AccModel::T6))),
         Some(("acc", name)) => rung(&ladder::ACCELEROMETER, name).map(|choice| (SensorKind::Acc, choice)),
-        Some(("gyr", name)) if name == gyr::MODEL => Some((SensorKind::Gyr, ModelChoice::Field)),
-        Some(("gyr", name)) => rung(&gyr_rig::MODELS, name).map(|choice| (SensorKind::Gyr, choice)),
-        Some(("mag", name)) if name == mag::MODEL => Some((SensorKind::Mag, ModelChoice::Field)),
+        Some(("gyr", name)) if name == turns::MODEL => Some((SensorKind::Gyr, ModelChoice::Field)),
+        Some(("gyr", name)) => rung(&rig::MODELS, name).map(|choice| (SensorKind::Gyr, choice)),
+        Some(("mag", name)) if name == samples::MODEL => Some((SensorKind::Mag, ModelChoice::Field)),
         Some(("mag", name)) => rung(&ladder::MAGNETOMETER, name).map(|choice| (SensorKind::Mag, choice)),
         _ => None,
     };
@@ -87,9 +92,9 @@ fn model(text: &str) -> Result<(SensorKind, ModelChoice), String> {
             "`{text}` is no model; expected acc=T9 or acc=T6, on a rig acc= {}; gyr={}, on a rig gyr= {}; \
              mag={}, on a rig mag= {}",
             names(&ladder::ACCELEROMETER),
-            gyr::MODEL,
-            names(&gyr_rig::MODELS),
-            mag::MODEL,
+            turns::MODEL,
+            names(&rig::MODELS),
+            samples::MODEL,
             names(&ladder::MAGNETOMETER)
         )
     })

@@ -11,7 +11,7 @@ use super::{
     reading::Reading,
     warn,
 };
-use crate::recording::{Manifest, imu_tk};
+use crate::recording::{Manifest, read::imu_tk};
 
 /// Other people's formats.
 #[derive(Clone, Copy, Debug, ValueEnum)]

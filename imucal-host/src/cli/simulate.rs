@@ -16,9 +16,13 @@ use crate::{
         case::{Omission, omission},
         seal::{Nonce, digest},
     },
-    effect::{self, CATALOGUE, Effect},
+    effect,
+    effect::{CATALOGUE, Effect},
     file::OutputSet,
-    recording::{Manifest, manifest::Axis, spelling::nearest},
+    recording::{
+        Manifest,
+        manifest::{Axis, spelling::nearest},
+    },
     report,
     simulator::{
         Conditions, Programme, Simulation, UnitKind,

@@ -17,13 +17,10 @@ use super::{
 };
 use crate::{
     apply,
-    calibrate::{AccModel, Options, calibrate, gyr_rig, ladder},
+    calibrate::{AccModel, Options, calibrate, gyr::rig, known_attitudes::ladder},
     device::{Address, Session},
     equivalence::{
-        FitEquivalence, SampleEquivalence,
-        board::{self, BoardSamples},
-        fits,
-        samples::{self, Samples},
+        FitEquivalence, SampleEquivalence, board, board::BoardSamples, fits, samples, samples::Samples,
     },
     recording::{Recording, SensorKind},
     report::table::words,
@@ -146,7 +143,7 @@ fn options(stored: &StoredCalibration) -> Options {
     Options {
         acc: if six { AccModel::T6 } else { AccModel::T9 },
         rig_acc: rung(SensorKind::Acc, &ladder::ACCELEROMETER),
-        rig_gyr: rung(SensorKind::Gyr, &gyr_rig::MODELS),
+        rig_gyr: rung(SensorKind::Gyr, &rig::MODELS),
         rig_mag: rung(SensorKind::Mag, &ladder::MAGNETOMETER),
         ..Options::default()
     }

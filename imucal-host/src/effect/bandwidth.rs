@@ -42,9 +42,10 @@ fn alter(values: &[f64], run: &mut SensorRun<'_>) {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
     use crate::effect::Input;
-    use nalgebra::Vector3;
 
     #[test]
     fn a_ramp_comes_out_late_by_the_time_constant() {

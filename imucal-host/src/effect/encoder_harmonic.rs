@@ -46,9 +46,10 @@ fn alter(values: &[f64], machine: &mut Machine) {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
     use crate::effect::Swing;
-    use nalgebra::Vector3;
 
     #[test]
     fn the_errors_derivatives_are_those_of_the_error() {

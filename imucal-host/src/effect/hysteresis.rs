@@ -30,8 +30,9 @@ fn alter(values: &[f64], run: &mut SensorRun<'_>) {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use nalgebra::Vector3;
+
+    use super::*;
 
     #[test]
     fn what_is_left_at_rest_depends_on_the_side_it_came_from() {

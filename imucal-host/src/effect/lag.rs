@@ -34,9 +34,10 @@ fn alter(values: &[f64], run: &mut SensorRun<'_>) {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
     use crate::effect::Input;
-    use nalgebra::Vector3;
 
     #[test]
     fn a_row_shows_what_was_there_a_lag_before() {

@@ -68,12 +68,14 @@ mod vibration_rectification;
 mod warmup;
 mod wobble;
 
-pub use self::machine::{Machine, Swing};
-pub use self::parameter::{Parameter, Role};
-pub use self::sensor_run::{DataRun, SensorRun, SignalRun};
-pub use self::truth::{Input, Truth};
-
 use SensorKind::{Acc, Gyr, Mag};
+
+pub use self::{
+    machine::{Machine, Swing},
+    parameter::{Parameter, Role},
+    sensor_run::{DataRun, SensorRun, SignalRun},
+    truth::{Input, Truth},
+};
 
 /// Where in the chain an effect acts. The order is that of the chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

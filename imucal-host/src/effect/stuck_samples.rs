@@ -37,8 +37,9 @@ fn chance(index: u64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use nalgebra::Vector3;
+
+    use super::*;
 
     #[test]
     fn about_the_given_share_of_rows_repeats() {

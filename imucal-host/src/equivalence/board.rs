@@ -114,9 +114,10 @@ pub fn fits(
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use imucal_core::{temperature::TemperatureTerms, triad::Triad};
     use nalgebra::Matrix3;
+
+    use super::*;
 
     #[test]
     fn one_ulp_of_one_axis_of_one_sample_is_found() {

@@ -11,12 +11,12 @@ use imucal_core::{
 use nalgebra::{Matrix3, Rotation3, SVector, UnitQuaternion, Vector3};
 
 use super::{
-    fits::{FitEquivalence, ParameterDifference},
+    fit_equivalence::{FitEquivalence, ParameterDifference},
     reference::{self, KnownPose},
     ulp,
 };
 use crate::{
-    calibrate::{rig::unified_name, rig_fit::RigFit},
+    calibrate::{fit::rig_fit::RigFit, known_attitudes::rig::unified_name},
     observe::pose::Poses,
     recording::SensorKind,
 };

@@ -5,13 +5,14 @@
 //! emulated device: does it compute the bits that the core computes here?
 
 pub mod board;
+pub mod fit_equivalence;
 pub mod fits;
 mod known_attitudes;
 pub mod reference;
 pub mod rounding;
 pub mod samples;
 
-pub use fits::{FitEquivalence, ParameterDifference};
+pub use fit_equivalence::{FitEquivalence, ParameterDifference};
 pub use samples::SampleEquivalence;
 
 /// Distance from `a` to `b` in units of the last place of `b` as `f32`.

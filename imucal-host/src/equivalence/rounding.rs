@@ -23,7 +23,7 @@
 //!
 //! Without terms of temperature it ends at y, with b′ = b. Sample, temperature and figures are taken as the `f32` that
 //! the device holds. What their conversion has cost before is h of each, and is no part of this bound: a sample in
-//! counts is exact, and a record's figures are compared one by one ([`super::samples`]).
+//! counts is exact, and a record's figures are compared one by one (`samples`).
 //!
 //! Of a diagonal gain that is 4 roundings at the most, 2.4e-7 of the value; of full scale, or of the largest sample,
 //! nothing is said. Source: Wilkinson 1986 (*Error analysis revisited*); Higham 2002, *Accuracy and Stability of
@@ -106,12 +106,15 @@ fn product(gain: &[[f64; 3]; 3], raw: [Bounded; 3], bias: [Bounded; 3]) -> [Boun
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::{recording::Unit, store::StoredTemperature};
     use imucal_core::{corrector::Corrector, temperature::TemperatureTerms, triad::Triad};
     use nalgebra::{Matrix3, Vector3};
-    use proptest::array::{uniform3, uniform9};
-    use proptest::prelude::*;
+    use proptest::{
+        array::{uniform3, uniform9},
+        prelude::*,
+    };
+
+    use super::*;
+    use crate::{recording::Unit, store::StoredTemperature};
 
     fn figures(gain: [[f64; 3]; 3], bias: [f64; 3], temperature: Option<StoredTemperature>) -> StoredTriad {
         StoredTriad {

@@ -1,7 +1,6 @@
 //! Recordings in a temporary directory, for the tests of this module.
 
-use std::fs;
-use std::path::PathBuf;
+use std::{fs, path::PathBuf};
 
 use tempfile::TempDir;
 

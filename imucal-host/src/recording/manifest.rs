@@ -1,32 +1,35 @@
 //! The manifest: what the samples of a recording are.
 
-use std::io;
-use std::path::{Path, PathBuf};
+pub mod check;
+pub mod fault;
+pub mod gravity;
+mod keys;
+mod rig;
+pub(crate) mod site;
+pub(crate) mod spelling;
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::manifest_check::{self, ManifestFault};
-use super::manifest_keys::KeyMap;
-use super::read_error::ReadError;
-use super::sensor_kind::SensorKind;
-use super::triple::{Nominal, Triple};
-use super::unit::{AngleUnit, TemperatureUnit, TimeUnit, Unit};
-use super::warning::Warning;
+pub use self::{
+    fault::FORMAT,
+    rig::{Axis, Rig, RigKind},
+    site::Site,
+};
+use self::{fault::ManifestFault, keys::KeyMap};
+use super::{
+    read_error::ReadError,
+    sensor_kind::SensorKind,
+    triple::{Nominal, Triple},
+    unit::{AngleUnit, TemperatureUnit, TimeUnit, Unit},
+    warning::Warning,
+};
 use crate::file::{Limits, ReadFault};
-
-pub use super::rig::{Axis, Rig, RigKind};
-pub use super::site::Site;
-
-/// The format string of a manifest.
-pub const FORMAT: &str = "imucal-recording/1";
-
-/// A least manifest, for messages.
-pub(crate) const MINIMAL: &str = "    format = \"imucal-recording/1\"
-    [units]
-    acc = \"m/s^2\"   # m/s^2 | g | mg | counts
-    gyr = \"rad/s\"   # rad/s | deg/s | counts
-    mag = \"uT\"      # uT | mG | G | nT | counts | a.u.";
 
 /// A recording's manifest; each section may be left out of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -287,7 +290,7 @@ impl Manifest {
     ///
     /// The first one found.
     pub fn check(&self) -> Result<(), ManifestFault> {
-        manifest_check::check(self)
+        check::check(self)
     }
 
     /// The manifest as TOML text.

@@ -5,55 +5,32 @@
 
 use std::path::{Path, PathBuf};
 
-mod absurd;
-mod assembly;
-mod column_guess;
-mod columns;
-mod csv;
-mod csv_rows;
-mod csv_writer;
-mod file_units;
+pub mod check;
 #[cfg(test)]
 mod fixture;
 mod format;
-pub mod gravity;
-pub mod header_fault;
-pub mod imu_tk;
-pub mod integrity;
-pub(crate) mod interval;
 pub mod manifest;
-pub mod manifest_check;
-mod manifest_keys;
-mod number;
-#[cfg(feature = "parquet")]
-mod parquet;
 mod place;
+pub mod read;
 mod read_error;
-mod rig;
-pub(crate) mod saturation;
 mod sensor_kind;
-mod site;
-pub(crate) mod spelling;
-mod stuck;
-mod text;
 mod triple;
 pub mod unit;
-mod unit_check;
 mod warning;
 mod write;
 mod write_error;
 
-pub use self::manifest::Manifest;
-pub use self::place::Place;
-pub use self::read_error::ReadError;
-pub use self::sensor_kind::SensorKind;
-pub use self::site::LEAST_DIP;
-pub use self::triple::{Nominal, Triple, median};
-pub use self::unit::Unit;
-pub use self::warning::Warning;
-pub use self::write_error::WriteError;
-
 use self::format::Format;
+pub use self::{
+    manifest::{Manifest, site::LEAST_DIP},
+    place::Place,
+    read_error::ReadError,
+    sensor_kind::SensorKind,
+    triple::{Nominal, Triple, median},
+    unit::Unit,
+    warning::Warning,
+    write_error::WriteError,
+};
 use crate::file::{Limits, OutputSet};
 
 /// A recording of an inertial measurement unit. All columns that are there have as many rows as `time`.
@@ -144,9 +121,9 @@ impl Recording {
         let manifest_path = Manifest::path_beside(path).unwrap_or_else(|| path.with_extension("toml"));
         let (manifest, warnings) = Manifest::read_within(&manifest_path, limits)?;
         let mut table = match format {
-            Format::Csv | Format::CsvGz => csv::read(path, limits)?,
+            Format::Csv | Format::CsvGz => read::csv::read(path, limits)?,
             #[cfg(feature = "parquet")]
-            Format::Parquet => parquet::read(path, limits)?,
+            Format::Parquet => read::parquet::read(path, limits)?,
             #[cfg(not(feature = "parquet"))]
             Format::Parquet => {
                 return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() });
@@ -157,7 +134,7 @@ impl Recording {
             warnings.iter().find(|warning| matches!(warning, Warning::UnknownKey { nearest: Some(_), .. }));
         let misspelt = misspelt.cloned().map(Box::new);
         table.warnings.splice(0..0, warnings);
-        assembly::assemble(path, manifest, table).map_err(|error| match misspelt {
+        read::assembly::assemble(path, manifest, table).map_err(|error| match misspelt {
             Some(warning) => ReadError::Misled { error: Box::new(error), warning },
             None => error,
         })
@@ -181,7 +158,7 @@ impl Recording {
     ///
     /// As [`Recording::write`].
     pub fn write_into(&self, path: &Path, files: &mut OutputSet) -> Result<(), WriteError> {
-        write::write(self, path, files)
+        write::writer::write(self, path, files)
     }
 
     /// Number of rows.

@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use super::header_fault::HeaderFault;
-use super::manifest_check::ManifestFault;
-use super::place::Place;
-use super::sensor_kind::SensorKind;
-use super::unit::{TimeUnit, Unit};
-use super::warning::Warning;
+use super::{
+    manifest::fault::ManifestFault,
+    place::Place,
+    read::header_fault::HeaderFault,
+    sensor_kind::SensorKind,
+    unit::{TimeUnit, Unit},
+    warning::Warning,
+};
 use crate::file::limits::{ReadFault, Size};
 
 /// A failure to read a recording; its text names the file, the place, what was found, what was
@@ -119,7 +121,7 @@ pub enum ReadError {
     /// No manifest.
     #[error(
         "{path}: not found, expected the manifest of the recording {recording} there; write it, for example:\n{}",
-        super::manifest::MINIMAL
+        super::manifest::fault::MINIMAL
     )]
     ManifestMissing { path: PathBuf, recording: String },
     /// A manifest that is not TOML or holds something of the wrong kind.
@@ -130,7 +132,7 @@ pub enum ReadError {
     /// A manifest of another format or version.
     #[error(
         "{path}, line {line}: found the format {found}, expected format = \"{}\"; write it so, or convert the recording",
-        super::manifest::FORMAT
+        super::manifest::fault::FORMAT
     )]
     ManifestFormat { path: PathBuf, line: usize, found: String },
     /// A manifest that contradicts itself.

@@ -1,8 +1,6 @@
 //! Units of a recording's files, and the only place of conversion factors.
 
-use std::f64::consts::PI;
-use std::fmt;
-use std::str::FromStr;
+use std::{f64::consts::PI, fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 

@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::place::Place;
-use super::sensor_kind::SensorKind;
-use super::unit::{TimeUnit, Unit};
+use super::{
+    place::Place,
+    sensor_kind::SensorKind,
+    unit::{TimeUnit, Unit},
+};
 
 /// Something noticed while reading; its text names the file, the place, what was found and what to do.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::manifest_check::ManifestFault;
+use super::manifest::fault::ManifestFault;
 use crate::file::OutputError;
 
 /// A failure to write a recording; its text names the file, what was found, what was expected and

@@ -6,10 +6,8 @@ use serde_json::{Value, json};
 use crate::{
     calibrate::{
         Calibration, FitSummary, SegmentationReport, SensorOutcome,
-        alignment::Alignment,
-        compare::Comparison,
+        fit::{alignment::Alignment, compare::Comparison, search::Search},
         outcome::{HigherOrder, RigFindings, entry_name},
-        search::Search,
     },
     recording::SensorKind,
     store::FORMAT,

@@ -5,7 +5,8 @@ use std::fmt::{self, Write};
 use super::measure::{degrees, measure, measured_degrees, percent, plain, rounded};
 use crate::{
     calibrate::{
-        Calibration, FitSummary, SegmentationReport, SensorOutcome, compare::Comparison, outcome::RigFindings,
+        Calibration, FitSummary, SegmentationReport, SensorOutcome, fit::compare::Comparison,
+        outcome::RigFindings,
     },
     recording::{SensorKind, unit::STANDARD_GRAVITY},
 };

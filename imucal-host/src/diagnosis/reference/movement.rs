@@ -5,9 +5,9 @@ use nalgebra::Vector3;
 
 use super::{model::Model, rest_to_rest::Held};
 use crate::{
-    observe::motion::{self, Attitudes},
+    observe::{motion, motion::Attitudes},
     recording::{
-        Recording, SensorKind, integrity::Integrity, manifest::Axis, median, unit::STANDARD_GRAVITY,
+        Recording, SensorKind, check::integrity::Integrity, manifest::Axis, median, unit::STANDARD_GRAVITY,
     },
     simulator::{Place, Recorded, Replay, Tracked},
 };

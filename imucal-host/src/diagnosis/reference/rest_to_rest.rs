@@ -22,11 +22,11 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use super::model::Model;
 use crate::{
     calibrate,
-    calibrate::{SensorOutcome, outlier::outliers},
+    calibrate::{SensorOutcome, fit::outlier::outliers},
     effect::{Machine, Truth},
     recording::{
         Recording, SensorKind,
-        integrity::Integrity,
+        check::integrity::Integrity,
         manifest::{Rig, RigKind},
     },
     simulator::{Motion, Place, Recorded, Tracked, recent::Recent},

@@ -8,7 +8,7 @@ use crate::{
     diagnosis::finding::Amount,
     effect,
     effect::{Effect, Truth},
-    recording::{Recording, SensorKind, integrity::Integrity},
+    recording::{Recording, SensorKind, check::integrity::Integrity},
     simulator::{Dose, Motion},
 };
 

@@ -13,7 +13,11 @@ use super::{
 use crate::{
     diagnosis::reference::{model::Model, movement, movement::Reference, rest_to_rest::Held, revisits},
     effect::{Act, DataRun, Effect, axis_swap},
-    recording::{Recording, SensorKind, Triple, integrity, integrity::Integrity, median},
+    recording::{
+        Recording, SensorKind, Triple,
+        check::{integrity, integrity::Integrity},
+        median,
+    },
     simulator::Recorded,
     store::StoredCalibration,
 };

@@ -4,7 +4,7 @@
 
 use super::conventions::unexplained;
 use crate::{
-    recording::{Recording, SensorKind, integrity::Integrity},
+    recording::{Recording, SensorKind, check::integrity::Integrity},
     simulator::Motion,
 };
 

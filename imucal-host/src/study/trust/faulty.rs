@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::{Cell, Hand, cell::Rests, fault::Fault, score::in_gauge_of};
 use crate::{
     calibrate::{Calibration, FitSummary, Options, Status, calibrate},
-    recording::{SensorKind, interval},
+    recording::{SensorKind, read::interval},
     simulator::random::{Purpose, Random},
 };
 
@@ -180,10 +180,12 @@ fn largest_error(fit: &FitSummary, twin: Option<&FitSummary>, truth: &Triad<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::Follows;
-    use crate::study::trust::{
-        cell::{Coverage, Noise, Quality, Rests},
-        fault::FAULTS,
+    use crate::{
+        calibrate::Follows,
+        study::trust::{
+            cell::{Coverage, Noise, Quality, Rests},
+            fault::FAULTS,
+        },
     };
 
     fn hand(rests: Rests, seed: u64) -> Hand {

@@ -14,7 +14,7 @@ use nalgebra::{SMatrix, SVector, Vector3};
 use super::{gimbal_order::FOLLOWS, pairs::Pairs};
 use crate::{
     effect::Truth,
-    recording::{Recording, SensorKind, integrity::Integrity},
+    recording::{Recording, SensorKind, check::integrity::Integrity},
 };
 
 /// Acceleration of a hand is stronger than this, root mean square, m/s².

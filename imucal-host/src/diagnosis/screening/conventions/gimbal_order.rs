@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::pairs::Pairs;
 use crate::{
     effect::{Machine, Truth},
-    recording::{Recording, SensorKind, integrity::Integrity, manifest::Axis},
+    recording::{Recording, SensorKind, check::integrity::Integrity, manifest::Axis},
     simulator::{Motion, gimbal::direction, programme::wrap, recent::Recent, truth::on_rig},
 };
 

@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::{Conventions, Finding, SURE};
-use crate::recording::{Triple, integrity::SensorIntegrity, median};
+use crate::recording::{Triple, check::integrity::SensorIntegrity, median};
 
 const WEIGHTS: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 /// Neighbouring differences are alike: so many of them count as one. 1 + 2 Σ ρ², with ρ = −56, 28, −8 and 1 of 70.

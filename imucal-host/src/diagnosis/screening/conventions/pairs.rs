@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::{
     effect::Truth,
-    recording::{Recording, SensorKind, integrity::Integrity},
+    recording::{Recording, SensorKind, check::integrity::Integrity},
 };
 
 /// Least spread of inputs or samples that stands out of any sensor's noise, by [`SensorKind::ALL`]: m/s², rad/s, µT.

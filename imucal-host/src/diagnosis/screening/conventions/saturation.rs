@@ -7,9 +7,11 @@
 use super::{Conventions, Finding, SURE};
 use crate::recording::{
     Triple,
-    integrity::{Saturation, SensorIntegrity},
+    check::{
+        integrity::SensorIntegrity,
+        saturation::{Saturation, pile_chance},
+    },
     median,
-    saturation::pile_chance,
 };
 
 /// Looks at one sensor.

@@ -6,7 +6,7 @@
 use statrs::distribution::{DiscreteCDF, Poisson};
 
 use super::{Conventions, Finding, SURE};
-use crate::recording::{Triple, integrity::SensorIntegrity};
+use crate::recording::{Triple, check::integrity::SensorIntegrity};
 
 /// Rows of a piece.
 const PIECE: usize = 100;

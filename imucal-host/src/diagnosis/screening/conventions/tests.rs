@@ -1,6 +1,6 @@
 use super::*;
 use crate::{
-    recording::{Triple, integrity, manifest::Axis},
+    recording::{Triple, check::integrity, manifest::Axis},
     simulator::{Place, Programme, Replay, Simulation, UnitKind},
 };
 

@@ -1,0 +1,434 @@
+//! Whether the residuals of accepted fits are the noise.
+//!
+//! A residual is suspected where a [score test](crate::calibrate::fit::score_test) is hardly passed by chance ([`CHANCE`] a sensor, all
+//! its tests together) and what it follows is material: an entry of the calibration would move by more than
+//! [`MATERIAL`] of the standard errors that are left once it is estimated. Noise that wanders slowly passes neither for
+//! long: it follows time, but moves next to nothing. A residual is suspected as well that exceeds what rests say of
+//! their own noise by more than 1/f noise does between rests, and rests are that turn.
+//!
+//! Source: ours. Not seen: what a fit takes wholly into its parameters; of a cloud, noise that is merely larger than
+//! that of its samples, as fields in buildings make it.
+
+use std::ops::Range;
+
+use imucal_core::{
+    model::{
+        Parameterisation,
+        norm::NormModel,
+        parameterisation::{DIAGONAL, FULL_GAIN, UPPER_TRIANGULAR},
+    },
+    observation::ShellPoint,
+    triad::Triad,
+};
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use super::{
+    gyr_residual, gyr_residual::Rates, norm_residual, norm_residual::Columns, residual_driver::Course,
+    turning_rest::Turning,
+};
+use crate::{
+    calibrate::{
+        fit::{
+            rows::Rows,
+            score_test::{Score, ScoreTest, upper_tail},
+        },
+        outcome::{Calibration, Evidence, FitSummary, KnownTurn, SensorOutcome, entry_name},
+        suspicion::{Follows, Status, Suspicion},
+    },
+    observe::{held, rest_halves},
+    recording::{Recording, SensorKind, check::integrity::Integrity, unit::STANDARD_GRAVITY},
+};
+
+/// Probability that a sensor with white noise is suspected by score tests.
+pub const CHANCE: f64 = 5e-4;
+/// Probability that 1/f noise as strong as `SLOWER` exceeds what rests say.
+pub const CHANCE_OF_EXCESS: f64 = 5e-3;
+/// Standard errors by which an entry moves where it matters.
+pub const MATERIAL: f64 = 2.5;
+/// Blocks that a cloud is cut into: few where its noise is alike for long, many where turns change what it does.
+const BLOCKS: [usize; 2] = [30, 100];
+/// Share of a cloud's squared residual below which nothing is said: of so many points any slow noise passes a test, and
+/// what follows time is slow; what follows direction comes back with it.
+fn least_explained(follows: Follows) -> f64 {
+    if follows == Follows::Direction { 0.015 } else { 0.04 }
+}
+/// Standard errors of the bias by which it may differ in motion from that at rest.
+const BIAS_ERRORS: f64 = 3.0;
+/// Variance between rests over that within them, as 1/f noise has it over a hundred rests' time: log₂ of that is 7.
+const SLOWER: f64 = 8.0;
+/// Share of the rows in motion that repeat the row before, above which samples are held.
+pub const HELD: f64 = 0.47;
+/// Earth's rotation, which a bias from rests takes for one direction, rad/s.
+const EARTH_RATE: f64 = 7.29e-5;
+
+/// Fills the suspicions of each fit that keeps its limits.
+pub fn examine(recording: &Recording, integrity: &Integrity, calibration: &mut Calibration) {
+    let rests = calibration.segmentation.as_ref().map_or_else(Vec::new, |cut| cut.rests.clone());
+    let scene = Scene { recording, integrity, rests: &rests };
+    let accelerometer_rms =
+        calibration.sensor(SensorKind::Acc).and_then(SensorOutcome::passed).map(|fit| fit.rms);
+    let square = matches!(
+        calibration.sensor(SensorKind::Acc).and_then(|acc| acc.evidence.as_ref()),
+        Some(Evidence::Shell { diagonal: true, .. })
+    );
+    let mut leant_on = None;
+    for outcome in &mut calibration.sensors {
+        if outcome.status() == Status::Refused {
+            continue;
+        }
+        let mut found = scene.suspicions(outcome, accelerometer_rms);
+        if square && matches!(outcome.evidence, Some(Evidence::Turns(_))) {
+            // Six parameters were asked for, and what they leave out is left in the turns.
+            calibration.warnings.extend(found.drain(..).map(|found| {
+                format!(
+                    "{}: {}; with six parameters the accelerometer's axes are taken as square, which turns show",
+                    outcome.kind, found.detail
+                )
+            }));
+        }
+        outcome.suspicions.extend(found);
+        outcome.suspicions.extend(scene.held(outcome.kind));
+        let leans = matches!(outcome.evidence, Some(Evidence::Turns(_)))
+            || outcome.fit.as_ref().is_some_and(|fit| fit.alignment.is_some());
+        if let Some(detail) = leant_on.as_ref().filter(|_| leans) {
+            outcome
+                .suspicions
+                .push(Suspicion { follows: Follows::Accelerometer, detail: String::clone(detail) });
+        }
+        if outcome.kind == SensorKind::Acc && outcome.status() == Status::Suspect {
+            leant_on = Some("it is calibrated against the accelerometer, which is suspect".to_owned());
+        }
+    }
+}
+
+/// What all examinations look at.
+struct Scene<'a> {
+    recording: &'a Recording,
+    integrity: &'a Integrity,
+    rests: &'a [Range<usize>],
+}
+
+impl Scene<'_> {
+    fn suspicions(&self, outcome: &SensorOutcome, accelerometer_rms: Option<f64>) -> Vec<Suspicion> {
+        let Some(fit) = &outcome.fit else { return Vec::new() };
+        match &outcome.evidence {
+            Some(Evidence::Shell { points, places, norm, diagonal, triad, std }) => {
+                let shell = Shell { points, places, norm: *norm, triad, std };
+                if *diagonal {
+                    self.of_norm(outcome.kind, &shell, DIAGONAL)
+                } else {
+                    self.of_norm(outcome.kind, &shell, UPPER_TRIANGULAR)
+                }
+            }
+            Some(Evidence::Turns(turns)) => self.of_turns(turns, fit, accelerometer_rms),
+            _ => Vec::new(),
+        }
+    }
+
+    fn usable(&self, kind: SensorKind) -> &[bool] {
+        self.integrity.sensor(kind).map_or(&[], |sensor| sensor.usable.as_slice())
+    }
+
+    /// Middle of a rest, a row.
+    fn middle(&self, rest: usize) -> usize {
+        self.rests.get(rest).map_or(0, |rows| rows.start.midpoint(rows.end))
+    }
+
+    fn courses(&self, rows: &[usize]) -> Vec<Course> {
+        let times: Vec<f64> = rows.iter().map(|row| self.recording.time[*row]).collect();
+        let temperature = self.recording.temperature.as_deref();
+        let temperatures: Vec<f64> =
+            rows.iter().map(|row| temperature.map_or(f64::NAN, |t| t[*row])).collect();
+        Course::all(&times, &temperatures)
+    }
+
+    fn of_norm<const P: usize>(
+        &self,
+        kind: SensorKind,
+        shell: &Shell<'_>,
+        form: Parameterisation<P>,
+    ) -> Vec<Suspicion> {
+        let model = NormModel { points: shell.points, norm: shell.norm, form };
+        let rows = Rows::of(&model, &form.theta(shell.triad));
+        let count = rows.residuals.len();
+        let all: Vec<usize> = (0..P).collect();
+        let Some(test) = ScoreTest::new(&rows.residuals, rows.derivatives(count, &all), count) else {
+            return Vec::new();
+        };
+        let at: Vec<usize> = match kind {
+            SensorKind::Mag => shell.places.to_vec(),
+            _ => shell.places.iter().map(|rest| self.middle(*rest)).collect(),
+        };
+        let directions: Vec<_> =
+            shell.points.iter().map(|p| shell.triad.correct(&p.value).normalize()).collect();
+        let mut tests: Vec<Tested> =
+            norm_residual::columns(&directions, &self.courses(&at), kind == SensorKind::Acc)
+                .iter()
+                .filter_map(|columns| {
+                    let score = match kind {
+                        SensorKind::Mag => test.test_in_blocks(&columns.values, &BLOCKS),
+                        _ => test.test(&columns.values, columns.values.ncols()),
+                    };
+                    Some(Tested::of(columns, score?))
+                })
+                .filter(|test| {
+                    kind != SensorKind::Mag || test.score.explained > least_explained(test.follows)
+                })
+                .collect();
+        let (mut excess, mut turning) = (None, None);
+        if kind == SensorKind::Acc {
+            tests.extend(
+                self.single(&test, 1, count, &|k| format!("the rest at {:.0} s", self.recording.time[at[k]])),
+            );
+            excess = self.excess_of_rests(shell, &directions, &rows.residuals, P);
+            turning =
+                self.turning(shell.norm).and_then(|t| t.of_accelerometer(shell.std.gain.diagonal().min()));
+        }
+        let std: Vec<f64> =
+            form.entries().iter().map(|entry| entry_of(&shell.std.gain, &shell.std.bias, *entry)).collect();
+        judged(tests, form.entries(), &std).into_iter().chain(excess).chain(turning).collect()
+    }
+
+    /// Each observation of so many residuals against all others.
+    fn single(
+        &self,
+        test: &ScoreTest,
+        each: usize,
+        residuals: usize,
+        name: &dyn Fn(usize) -> String,
+    ) -> Vec<Tested> {
+        let count = residuals / each;
+        // A direction has two residuals though its chord has three.
+        let rank = if each == 3 { 2 } else { each };
+        let mut tests = Vec::new();
+        for k in 0..count {
+            let column =
+                DMatrix::from_fn(residuals, each, |row, axis| f64::from(u8::from(row == each * k + axis)));
+            let name = format!("{} alone, against its neighbours", name(k));
+            tests.extend(test.test(&column, rank).map(|score| Tested {
+                follows: Follows::Neighbours,
+                name,
+                score,
+            }));
+        }
+        tests
+    }
+
+    fn excess_of_rests(
+        &self,
+        shell: &Shell<'_>,
+        directions: &[Vector3<f64>],
+        residuals: &[f64],
+        parameters: usize,
+    ) -> Option<Suspicion> {
+        let acc = self.recording.acc.as_ref()?;
+        let (variance, rests) =
+            rest_halves::mean_variance(&acc.values, self.usable(SensorKind::Acc), self.rests, SLOWER)?;
+        let along =
+            directions.iter().map(|u| u.map(|x| x * x).dot(&variance)).sum::<f64>() / directions.len() as f64;
+        let freedom = residuals.len() as f64 - parameters as f64;
+        let square = residuals.iter().map(|r| r * r).sum::<f64>() / freedom;
+        let chance = upper_tail(square / along, freedom, 2.0 * rests as f64)?;
+        (chance < CHANCE_OF_EXCESS).then(|| Suspicion {
+            follows: Follows::Excess,
+            detail: format!(
+                "its residual is {:.1e} m/s² ({:.2} % of g) where the rests' own noise explains {:.1e} m/s² at most",
+                square.sqrt(),
+                100.0 * square.sqrt() / shell.norm,
+                along.sqrt()
+            ),
+        })
+    }
+
+    /// What the accelerometer says of rests that turn.
+    fn turning(&self, gravity: f64) -> Option<Turning> {
+        let values = &self.recording.acc.as_ref()?.values;
+        let differences =
+            |parts| rest_halves::differences(values, self.usable(SensorKind::Acc), self.rests, parts);
+        let (halves, quarters) = (differences(2), differences(4));
+        let total: f64 = self.rests.iter().map(|rest| self.duration(rest)).sum();
+        let duration = total / self.rests.len() as f64;
+        (!quarters.is_empty()).then_some(Turning { halves, quarters, duration, gravity })
+    }
+
+    /// Samples that are held: a turn's rates are not those in between.
+    fn held(&self, kind: SensorKind) -> Option<Suspicion> {
+        let values = match kind {
+            SensorKind::Acc => &self.recording.acc.as_ref()?.values,
+            SensorKind::Gyr => &self.recording.gyr.as_ref()?.values,
+            // Of a cloud each sample counts once.
+            SensorKind::Mag => return None,
+        };
+        let share = held::share(values, self.usable(kind), self.rests);
+        (share > HELD).then(|| Suspicion {
+            follows: Follows::Clock,
+            detail: format!(
+                "{:.0} % of its rows in motion repeat the row before: samples are held, and noise and rates between them \
+                 are not what they seem; write a row for each sample",
+                100.0 * share
+            ),
+        })
+    }
+
+    fn of_turns(
+        &self,
+        turns: &[KnownTurn],
+        fit: &FitSummary,
+        accelerometer_rms: Option<f64>,
+    ) -> Vec<Suspicion> {
+        let Some(gyr) = &self.recording.gyr else { return Vec::new() };
+        let theta = FULL_GAIN.theta(&Triad { gain: fit.triad.gain, bias: Vector3::zeros() });
+        let rates = Rates {
+            time: &self.recording.time,
+            values: &gyr.values,
+            usable: self.usable(SensorKind::Gyr),
+            interval: self.recording.median_interval().unwrap_or(1.0),
+        };
+        let rows = gyr_residual::rows(turns, &theta);
+        let count = rows.residuals.len();
+        let all: Vec<usize> = (0..9).collect();
+        let Some(test) = ScoreTest::new(&rows.residuals, rows.derivatives(count, &all), 2 * turns.len())
+        else {
+            return Vec::new();
+        };
+        let at: Vec<usize> =
+            turns.iter().map(|turn| turn.data.rows.start.midpoint(turn.data.rows.end)).collect();
+        let columns = gyr_residual::columns(turns, rates, &theta, &rows, &self.courses(&at));
+        let at_rest = self.bias_errors(&gyr.values, fit);
+        let scores: Vec<(&Columns, Score)> =
+            columns.iter().filter_map(|columns| Some((columns, test.test(&columns.values, 3)?))).collect();
+        // What the bias' own error explains, other columns explain in part.
+        let explained = scores.iter().find(|(columns, score)| {
+            columns.name == gyr_residual::MOTION
+                && (0..3).all(|axis| score.coefficients[axis].abs() < BIAS_ERRORS * at_rest[axis])
+        });
+        let most = explained.map_or(1.0, |(_, score)| score.p);
+        let mut tests: Vec<Tested> = scores
+            .iter()
+            .filter(|(columns, score)| {
+                explained.is_none() || (columns.name != gyr_residual::MOTION && score.p < most)
+            })
+            .map(|(columns, score)| Tested::of(columns, score.clone()))
+            .collect();
+        let name = |k: usize| format!("the turn at {:.0} s", self.recording.time[at[k]]);
+        tests.extend(self.single(&test, 3, count, &name));
+        let std: Vec<f64> =
+            FULL_GAIN.entries().iter().map(|entry| entry_of(&fit.gain_std, &fit.bias_std, *entry)).collect();
+        let excess = self.excess_of_turns(turns, fit, &rows.residuals, accelerometer_rms);
+        let turning =
+            self.turning(STANDARD_GRAVITY).and_then(|turning| turning.of_gyroscope(fit.bias_std.min()));
+        judged(tests, FULL_GAIN.entries(), &std).into_iter().chain(excess).chain(turning).collect()
+    }
+
+    /// How well rests tell the bias: no better than a step of the converter allows, rad/s.
+    fn bias_errors(&self, values: &[Vector3<f64>], fit: &FitSummary) -> Vector3<f64> {
+        let noise = rest_halves::mean_variance(values, self.usable(SensorKind::Gyr), self.rests, 1.0);
+        let of_mean = noise.map_or_else(Vector3::zeros, |(variance, _)| variance);
+        fit.bias_std
+            .zip_map(&of_mean, |std, variance| (std * std + variance + EARTH_RATE * EARTH_RATE).sqrt())
+    }
+
+    /// Against the noise of the rates over each turn, the wander of the bias, and the directions of the rests.
+    fn excess_of_turns(
+        &self,
+        turns: &[KnownTurn],
+        fit: &FitSummary,
+        residuals: &[f64],
+        accelerometer_rms: Option<f64>,
+    ) -> Option<Suspicion> {
+        let (acc, gyr) = (self.recording.acc.as_ref()?, self.recording.gyr.as_ref()?);
+        let (of_mean, rests) =
+            rest_halves::mean_variance(&acc.values, self.usable(SensorKind::Acc), self.rests, 1.0)?;
+        let (of_rate, _) =
+            rest_halves::mean_variance(&gyr.values, self.usable(SensorKind::Gyr), self.rests, 1.0)?;
+        let g = STANDARD_GRAVITY;
+        let direction = of_mean.mean().max(accelerometer_rms.unwrap_or(0.0).powi(2)) / (g * g);
+        let long = self.rests.iter().map(|r| self.duration(r)).sum::<f64>() / self.rests.len() as f64;
+        let wander = fit.bias_wander.map_or(0.0, |wander| wander.spread.norm_squared() / 3.0);
+        // A rate's mean over a rest has its noise over the rest's duration; an angle has it times its own.
+        let expected = turns.iter().map(|turn| {
+            let t = self.duration(&turn.data.rows);
+            2.0 * direction + of_rate.mean() * long * t + (wander + EARTH_RATE * EARTH_RATE) * t * t
+        });
+        let expected = expected.sum::<f64>() / turns.len() as f64;
+        let freedom = 2.0 * turns.len() as f64 - 9.0;
+        let square = residuals.iter().map(|r| r * r).sum::<f64>() / freedom;
+        let chance = upper_tail(square / (SLOWER * expected), freedom, 2.0 * rests as f64)?;
+        (chance < CHANCE_OF_EXCESS).then(|| Suspicion {
+            follows: Follows::Excess,
+            detail: format!(
+                "its turns end {:.3}° off where noise of rates and directions explains {:.3}°",
+                square.sqrt().to_degrees(),
+                expected.sqrt().to_degrees()
+            ),
+        })
+    }
+
+    fn duration(&self, rows: &Range<usize>) -> f64 {
+        self.recording.time[rows.end - 1] - self.recording.time[rows.start]
+    }
+}
+
+/// A norm fit as its evidence keeps it.
+struct Shell<'a> {
+    points: &'a [ShellPoint<f64>],
+    places: &'a [usize],
+    norm: f64,
+    triad: &'a Triad<f64>,
+    std: &'a Triad<f64>,
+}
+
+fn entry_of(gain: &Matrix3<f64>, bias: &Vector3<f64>, entry: u8) -> f64 {
+    let entry = usize::from(entry);
+    if entry < 9 { gain[(entry / 3, entry % 3)] } else { bias[entry - 9] }
+}
+
+/// A test and what it came to.
+struct Tested {
+    follows: Follows,
+    name: String,
+    score: Score,
+}
+
+impl Tested {
+    fn of(columns: &Columns, score: Score) -> Self {
+        Self { follows: columns.follows, name: columns.name.clone(), score }
+    }
+
+    /// The entry that would move furthest, by how much, and in standard errors.
+    fn furthest(&self, entries: &[u8], std: &[f64]) -> Option<(u8, f64, f64)> {
+        let moved = self.score.shift.iter().zip(std).zip(entries);
+        moved
+            .filter(|((_, std), _)| **std > 0.0)
+            .map(|((shift, std), entry)| (*entry, *shift, shift.abs() / (std * self.score.tighter)))
+            .max_by(|a, b| a.2.total_cmp(&b.2))
+    }
+}
+
+/// Of each thing that is followed, the test that chance passes least, where it is material.
+fn judged(mut tests: Vec<Tested>, entries: &[u8], std: &[f64]) -> Vec<Suspicion> {
+    let count = tests.len() as f64;
+    tests.sort_by(|a, b| a.score.p.total_cmp(&b.score.p));
+    let mut found: Vec<Suspicion> = Vec::new();
+    for test in tests {
+        let chance = test.score.p * count;
+        let Some((entry, shift, errors)) = test.furthest(entries, std) else { continue };
+        if chance >= CHANCE || errors < MATERIAL || found.iter().any(|s| s.follows == test.follows) {
+            continue;
+        }
+        found.push(Suspicion {
+            follows: test.follows,
+            detail: format!(
+                "its residual follows {}: chance does so in {:.0e} of fits, it explains {:.0} % of the residual's square, \
+                 and {} would move by {:.2e}, {:.0} standard errors",
+                test.name,
+                chance.max(1e-99),
+                100.0 * test.score.explained,
+                entry_name(entry),
+                shift,
+                errors
+            ),
+        });
+    }
+    found
+}

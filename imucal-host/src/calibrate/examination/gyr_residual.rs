@@ -1,0 +1,130 @@
+//! What the residual of a gyroscope's turns could follow: columns for [`crate::calibrate::fit::score_test`].
+//!
+//! ```text
+//! w' = w + ε e_j f(w),   f = w_j³, w_j², |w_j|, 1
+//! z  = (r(w') − r(w)) / ε
+//! ```
+//!
+//! Each turn is integrated again with rates that differ a little: soft saturation is a cubic term, vibration and
+//! asymmetry are even ones, and a bias that differs in motion from that at rest is the last. Gains that follow a course
+//! take the model's own derivatives times the course. Source: ours, from models.md 3. Not tested: g-sensitivity, which
+//! turns between rests hardly show.
+
+use imucal_core::{
+    model::{parameterisation::FULL_GAIN, turn::TurnModel},
+    observation::Turn,
+};
+use nalgebra::{DMatrix, SVector, Vector3};
+use rayon::prelude::*;
+
+use super::{norm_residual::Columns, residual_driver::Course};
+use crate::{
+    calibrate::{
+        fit::rows::{Residuals, Rows},
+        outcome::KnownTurn,
+        suspicion::Follows,
+    },
+    observe::turn::{TurnData, compress_rows},
+};
+
+/// Rates are altered by this share of the largest.
+const SHARE: f64 = 1e-3;
+
+/// A gyroscope's samples as turns are made of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Rates<'a> {
+    /// Time, s.
+    pub time: &'a [f64],
+    /// Rates, nominal rad/s.
+    pub values: &'a [Vector3<f64>],
+    /// Rows in which they are usable.
+    pub usable: &'a [bool],
+    /// Usual interval, s.
+    pub interval: f64,
+}
+
+/// How a rate is altered, and what a residual with it follows.
+type Alteration = (&'static str, fn(f64) -> f64);
+
+/// Name of the columns of a bias that is another in motion.
+pub const MOTION: &str = "motion, as a bias makes it that is another at rest";
+
+/// See the module's equation.
+const ALTERATIONS: [Alteration; 4] = [
+    ("rate, as cubic terms or soft saturation make it", |w| w * w * w),
+    ("rate, as quadratic terms or rectified vibration make it", |w| w * w),
+    ("rate, as gains make it that differ by sign", f64::abs),
+    (MOTION, |_| 1.0),
+];
+
+fn known<'a>(turns: &'a [KnownTurn], data: &'a [TurnData]) -> Vec<Turn<'a, f64>> {
+    turns.iter().zip(data).map(|(turn, data)| data.between(turn.before, turn.after)).collect()
+}
+
+/// Residuals and derivatives of the turns by the gain's nine entries.
+pub fn rows(turns: &[KnownTurn], theta: &SVector<f64, 9>) -> Rows<9> {
+    let data: Vec<TurnData> = turns.iter().map(|turn| turn.data.clone()).collect();
+    Rows::of(&TurnModel { turns: &known(turns, &data), form: FULL_GAIN }, theta)
+}
+
+/// The largest rate of any turn, bias taken off, rad/s.
+fn largest(turns: &[KnownTurn], rates: Rates<'_>) -> f64 {
+    let of = |turn: &KnownTurn| {
+        let rows = turn.data.rows.clone().filter(|k| rates.usable[*k]);
+        rows.map(|k| (rates.values[k] - turn.data.bias.at(rates.time[k])).amax()).fold(0.0, f64::max)
+    };
+    turns.iter().map(of).fold(0.0, f64::max)
+}
+
+/// Residuals with altered rates, less those without, by the alteration's size; `None` where nothing moves.
+fn column(
+    turns: &[KnownTurn],
+    rates: Rates<'_>,
+    theta: &SVector<f64, 9>,
+    as_is: &[f64],
+    (axis, of): (usize, fn(f64) -> f64),
+) -> Option<Vec<f64>> {
+    let most = largest(turns, rates);
+    let size = SHARE * most / of(most);
+    let mut values = rates.values.to_vec();
+    for turn in turns {
+        for k in turn.data.rows.clone() {
+            let was = rates.values[k][axis];
+            values[k][axis] = was + size * of(was - turn.data.bias.at(rates.time[k])[axis]);
+        }
+    }
+    let again = |turn: &KnownTurn| {
+        let ends = (turn.data.rest_before, turn.data.rest_after);
+        let rows = turn.data.rows.clone();
+        compress_rows(rates.time, &values, rates.usable, rates.interval, rows, ends, &turn.data.bias).ok()
+    };
+    let data: Option<Vec<TurnData>> = turns.iter().map(again).collect();
+    let data = data?;
+    let altered = Residuals::of(&TurnModel { turns: &known(turns, &data), form: FULL_GAIN }, theta);
+    (size > 0.0).then(|| altered.iter().zip(as_is).map(|(a, b)| (a - b) / size).collect())
+}
+
+/// All columns to test, three an axis, of courses over the turns.
+pub fn columns(
+    turns: &[KnownTurn],
+    rates: Rates<'_>,
+    theta: &SVector<f64, 9>,
+    rows: &Rows<9>,
+    courses: &[Course],
+) -> Vec<Columns> {
+    let count = rows.residuals.len();
+    let altered = ALTERATIONS.par_iter().filter_map(|(name, of)| {
+        let axes: Option<Vec<_>> =
+            (0..3).map(|axis| column(turns, rates, theta, &rows.residuals, (axis, *of))).collect();
+        let axes = axes?;
+        let values = DMatrix::from_fn(count, 3, |row, axis| axes[axis][row]);
+        Some(Columns { follows: Follows::Rate, name: (*name).into(), values })
+    });
+    let mut all: Vec<Columns> = altered.collect();
+    all.extend(courses.iter().map(|course| Columns {
+        follows: course.follows,
+        name: format!("{}, as a gain makes it that changes", course.name),
+        values: DMatrix::from_fn(count, 3, |row, axis| rows.jacobian[row][4 * axis] * course.values[row / 3]),
+    }));
+    all
+}

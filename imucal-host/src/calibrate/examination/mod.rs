@@ -1,0 +1,14 @@
+//! Whether the residual of an accepted fit is the noise: if it depends on something else, the sensor is suspect.
+//!
+//! | goes in | comes out |
+//! | --- | --- |
+//! | a calibration with its residuals | suspicions: what the residual depends on, how clearly, and what it may have done to the parameters |
+//!
+//! Statistics: Rao's score test of the residual against time, temperature, direction, rate and neighbours, with the number
+//! of tests counted; a suspicion that changes no parameter by much is left out.
+
+pub mod examine;
+pub mod gyr_residual;
+pub mod norm_residual;
+pub mod residual_driver;
+pub mod turning_rest;

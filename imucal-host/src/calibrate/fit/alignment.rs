@@ -1,0 +1,287 @@
+//! A magnetometer brought into the accelerometer's axes: the rotation that makes the dip the same in every rest.
+
+use imucal_core::{
+    model::dip::{DipModel, DirectionPair},
+    rotation::{cross_matrix, exp_with_jacobian},
+    solver::{LevenbergMarquardt, lm::Settings},
+    triad::Triad,
+};
+use nalgebra::{DMatrix, DVector, Matrix3, MatrixXx3, SMatrix, SVector, Vector3};
+
+use super::{
+    directions::Directions,
+    rows::{Residuals, Rows, influence},
+};
+use crate::noise::interval::{Parts, Scale};
+
+/// Rests at least: four parameters, and some to check them.
+const LEAST_RESTS: usize = 8;
+/// Largest standard error of the rotation, rad (2°).
+const LIMIT: f64 = 0.035;
+/// Noise of the field at rest against that of the directions, in multiples of what rests show of both.
+const RATIOS: [(f64, f64); 4] = [(1.0, 0.5), (4.0, 0.2), (16.0, 0.2), (64.0, 0.1)];
+
+/// Where the magnetometer's axes lie against the accelerometer's.
+#[derive(Clone, Copy, Debug)]
+pub struct Alignment {
+    /// Rotation from the magnetometer's axes to the accelerometer's.
+    pub rotation: Matrix3<f64>,
+    /// Rotation vector of it, rad.
+    pub phi: Vector3<f64>,
+    /// Covariance of the rotation's error, accelerometer axes, rad²: of the directions' own errors, for triads as
+    /// they are.
+    pub covariance: Matrix3<f64>,
+    /// How the rotation moves with an error of the magnetometer's triad, b → b + E b + c: by E by rows, then c, in
+    /// lengths of the field. See [`Self::turn`].
+    by_mag: SMatrix<f64, 3, 12>,
+    /// Mean length of the field in the pairs.
+    field: f64,
+    /// Dip of the field, rad, positive down, and its standard error.
+    pub dip: (f64, f64),
+    /// Rms of the dip over the rests, rad.
+    pub rms: f64,
+    /// The same for rests left out in turn.
+    pub held_out_rms: Option<f64>,
+    /// Rests used.
+    pub rests: usize,
+}
+
+/// A magnetometer at rest.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldAtRest {
+    /// Index of the rest.
+    pub rest: usize,
+    /// Mean output, nominal SI.
+    pub mean: Vector3<f64>,
+    /// Variance of the mean that its own samples explain, per axis.
+    pub variance: Vector3<f64>,
+}
+
+/// Finds the rotation from what was seen at rests, with errors that follow from those of both sensors' means and of the
+/// accelerometer's calibration; `triad` is the magnetometer's. `None` where the rests cannot tell it.
+pub fn align_at_rests(
+    directions: &Directions,
+    at_rest: &[FieldAtRest],
+    triad: &Triad<f64>,
+) -> Option<Alignment> {
+    let pairs: Vec<_> =
+        at_rest.iter().map(|seen| (directions.calibrated(seen.rest), triad.correct(&seen.mean))).collect();
+    if pairs.len() < LEAST_RESTS || pairs.iter().any(|(f, b)| !(f + b).iter().all(|x| x.is_finite())) {
+        return None;
+    }
+    let errors = |model: &DipModel<'_, f64>, theta: &SVector<f64, 4>| {
+        let rotation = imucal_core::rotation::exp(&theta.xyz());
+        let by_direction: Vec<(usize, MatrixXx3<f64>)> = (at_rest.iter().zip(model.pairs).enumerate())
+            .map(|(k, (seen, pair))| {
+                let mut by = MatrixXx3::zeros(at_rest.len());
+                by.set_row(k, &(rotation * pair.u_b).transpose());
+                (seen.rest, by)
+            })
+            .collect();
+        let of_field = DVector::from_iterator(
+            at_rest.len(),
+            at_rest.iter().zip(model.pairs).zip(&pairs).map(|((seen, pair), (_, field))| {
+                let along = rotation.tr_mul(&pair.u_f);
+                let across = (along - pair.u_b * pair.u_b.dot(&along)) / field.norm();
+                triad.gain.tr_mul(&across).map(|x| x * x).dot(&seen.variance)
+            }),
+        );
+        let parts = Parts {
+            parts: [&directions.propagated(&by_direction), &DMatrix::from_diagonal(&of_field)],
+            ratios: &RATIOS,
+            scale: Scale::AtLeastOne,
+            five: false,
+        };
+        let rows = Rows::of(model, theta);
+        let jacobian = rows.derivatives(at_rest.len(), &[0, 1, 2, 3]);
+        let residuals = DVector::from_column_slice(&rows.residuals);
+        let errors = parts.errors(&residuals, &jacobian, &influence(&jacobian)?)?;
+        Some(SMatrix::from_fn(|i, j| errors.covariance[(i, j)]))
+    };
+    align_with(&pairs, &errors)
+}
+
+/// Finds the rotation from calibrated pairs (specific force, field) alone, each as good as the next; `None` where the
+/// rests cannot tell it.
+pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Alignment> {
+    align_with(pairs, &|_, _| None)
+}
+
+/// Covariance of a fit's four parameters; `None` for that of residuals that are independent and alike.
+type Covariance<'a> = &'a dyn Fn(&DipModel<'_, f64>, &SVector<f64, 4>) -> Option<SMatrix<f64, 4, 4>>;
+
+fn align_with(pairs: &[(Vector3<f64>, Vector3<f64>)], errors: Covariance<'_>) -> Option<Alignment> {
+    let field = pairs.iter().map(|(_, b)| b.norm()).sum::<f64>() / pairs.len() as f64;
+    let pairs: Vec<DirectionPair<f64>> = pairs
+        .iter()
+        .map(|(f, b)| DirectionPair { u_f: f.normalize(), u_b: b.normalize() })
+        .filter(|pair| pair.u_f.iter().chain(pair.u_b.iter()).all(|x| x.is_finite()))
+        .collect();
+    if pairs.len() < LEAST_RESTS {
+        return None;
+    }
+    let model = DipModel { pairs: &pairs };
+    let solver = best(&model);
+    let covariance = errors(&model, solver.theta()).or_else(|| solver.covariance())?;
+    let (rotation, jacobian) = exp_with_jacobian(&solver.theta().xyz());
+    let own = jacobian * covariance.fixed_view::<3, 3>(0, 0) * jacobian.transpose();
+    let error = own.diagonal().max().sqrt();
+    if !solver.report().termination.was_successful() || error.is_nan() || error > LIMIT {
+        return None;
+    }
+    let by_mag = moved_by_mag(&model, solver.theta(), &jacobian)?;
+    let cos = solver.theta().w.clamp(-1.0, 1.0);
+    // An error of the cosine is one of the angle, by the sine between gravity and field.
+    let per_angle = (1.0 - cos * cos).sqrt().max(1e-3);
+    Some(Alignment {
+        rotation,
+        phi: solver.theta().xyz(),
+        covariance: own,
+        by_mag,
+        field,
+        dip: ((-cos).asin(), covariance[(3, 3)].sqrt() / per_angle),
+        rms: solver.variance()?.sqrt() / per_angle,
+        held_out_rms: held_out(&model, solver.theta()).map(|rms| rms / per_angle),
+        rests: pairs.len(),
+    })
+}
+
+/// Derivative of the rotation's error δ by an error of the magnetometer's triad, b → b + E b + c with |b| = 1:
+/// `dr = u_fᵀ R (1 − u_b u_bᵀ)(E u_b + c)` moves the optimum by `−(JᵀJ)⁻¹ Jᵀ dr`.
+fn moved_by_mag(
+    model: &DipModel<'_, f64>,
+    theta: &SVector<f64, 4>,
+    jacobian: &Matrix3<f64>,
+) -> Option<SMatrix<f64, 3, 12>> {
+    let rows = Rows::of(model, theta);
+    let rotation = imucal_core::rotation::exp(&theta.xyz());
+    let (mut normal, mut right) = (SMatrix::<f64, 4, 4>::zeros(), SMatrix::<f64, 4, 12>::zeros());
+    for (pair, row) in model.pairs.iter().zip(&rows.jacobian) {
+        let seen = rotation.tr_mul(&pair.u_f);
+        let across = seen - pair.u_b * pair.u_b.dot(&seen);
+        let by = SVector::<f64, 12>::from_fn(|k, _| match k {
+            0..9 => across[k / 3] * pair.u_b[k % 3],
+            _ => across[k - 9],
+        });
+        normal += row * row.transpose();
+        right += row * by.transpose();
+    }
+    let moved = -(normal.try_inverse()? * right);
+    Some(jacobian * moved.fixed_rows::<3>(0))
+}
+
+/// The best of fits from the 24 ways in which axes can be relabelled without a mirror: a magnetometer may lie any way
+/// round on its board.
+fn best(model: &DipModel<'_, f64>) -> LevenbergMarquardt<f64, 4> {
+    let fit = |start: SVector<f64, 4>| {
+        let mut solver = LevenbergMarquardt::new(start, Settings::default());
+        solver.run(model);
+        solver
+    };
+    let mut chosen = fit(SVector::zeros());
+    for rotation in relabellings() {
+        let phi = nalgebra::Rotation3::from_matrix_unchecked(rotation).scaled_axis();
+        let other = fit(SVector::<f64, 4>::new(phi.x, phi.y, phi.z, 0.0));
+        // The nearest to no rotation wins a tie: only rounding tells them apart.
+        if other.report().cost < 0.99 * chosen.report().cost {
+            chosen = other;
+        }
+    }
+    chosen
+}
+
+fn relabellings() -> impl Iterator<Item = Matrix3<f64>> {
+    let axes = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z(), -Vector3::z()];
+    axes.into_iter()
+        .flat_map(move |a| axes.into_iter().map(move |b| (a, b)))
+        .filter(|(a, b)| a.dot(b) == 0.0)
+        .map(|(a, b)| Matrix3::from_columns(&[a, b, a.cross(&b)]))
+}
+
+fn held_out(model: &DipModel<'_, f64>, theta: &SVector<f64, 4>) -> Option<f64> {
+    let rows = Rows::of(model, theta);
+    let mut sum = 0.0;
+    for k in 0..model.pairs.len() {
+        let there = theta + rows.step_without(k..k + 1)?;
+        sum += Residuals::of(&DipModel { pairs: &model.pairs[k..=k] }, &there)
+            .iter()
+            .map(|r| r * r)
+            .sum::<f64>();
+    }
+    Some((sum / model.pairs.len() as f64).sqrt())
+}
+
+impl Alignment {
+    /// The triad in the accelerometer's axes, and the covariance of its twelve entries (gain by rows, bias).
+    /// `covariance` is that of the entries `of` before.
+    ///
+    /// With `dG' = R dG + [δ]× R G`. An error of the triad moves the rotation with it, most of all one that turns its
+    /// axes: δ is that of the directions plus what follows dG and db, by `E = dG G⁻¹`, `c = −G db`.
+    pub fn turn(
+        &self,
+        triad: &Triad<f64>,
+        covariance: &DMatrix<f64>,
+        of: &[u8],
+    ) -> (Triad<f64>, SMatrix<f64, 12, 12>) {
+        let gain = self.rotation * triad.gain;
+        let mut by_rotation = SMatrix::<f64, 12, 3>::zeros();
+        for axis in 0..3 {
+            let moved = cross_matrix(&Vector3::ith(axis, 1.0)) * gain;
+            for k in 0..9 {
+                by_rotation[(k, axis)] = moved[(k / 3, k % 3)];
+            }
+        }
+        let inverse = triad.gain.try_inverse().unwrap_or_else(Matrix3::zeros);
+        let mut by_entries = DMatrix::zeros(12, of.len());
+        for (column, entry) in of.iter().enumerate() {
+            let mut moved = SVector::<f64, 12>::zeros();
+            let mut carried = SVector::<f64, 12>::zeros();
+            match usize::from(*entry) {
+                k @ 0..9 => {
+                    for at in 0..3 {
+                        moved[3 * at + k % 3] = self.rotation[(at, k / 3)];
+                        carried[3 * (k / 3) + at] = inverse[(k % 3, at)];
+                    }
+                }
+                k => {
+                    moved[k] = 1.0;
+                    let shift = -triad.gain.column(k - 9) / self.field;
+                    carried.fixed_rows_mut::<3>(9).copy_from(&shift);
+                }
+            }
+            by_entries.set_column(column, &(moved + by_rotation * (self.by_mag * carried)));
+        }
+        let own = &by_entries * covariance * by_entries.transpose();
+        let turned = by_rotation * self.covariance * by_rotation.transpose();
+        let total = SMatrix::<f64, 12, 12>::from_fn(|i, j| own[(i, j)] + turned[(i, j)]);
+        (Triad { gain, bias: triad.bias }, total)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use imucal_core::rotation::exp;
+
+    use super::*;
+
+    #[test]
+    fn a_magnetometer_mounted_upside_down_is_found_so() {
+        let mounted =
+            Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0)) * exp(&Vector3::new(0.02, -0.03, 0.01));
+        let pairs: Vec<_> = (0..20)
+            .map(|k| {
+                let k = f64::from(k);
+                let c_n_s =
+                    exp(&Vector3::new(2.0 * (1.3 * k).sin(), 2.5 * (2.1 * k).cos(), 1.5 * (0.7 * k).sin()));
+                let noise = Vector3::new((7.0 * k).sin(), (11.0 * k).sin(), (13.0 * k).sin()) * 1e-3;
+                (
+                    c_n_s * Vector3::new(0.0, 0.0, -9.8),
+                    mounted.transpose() * (c_n_s * Vector3::new(25.0, 2.0, 40.0)) + noise,
+                )
+            })
+            .collect();
+        let alignment = align(&pairs).unwrap();
+        assert!((alignment.rotation - mounted).norm() < 1e-3, "{}", alignment.rotation);
+        assert!((alignment.dip.0 - (40.0f64 / 25.0f64.hypot(2.0)).atan()).abs() < 1e-3);
+    }
+}

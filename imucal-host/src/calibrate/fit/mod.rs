@@ -1,0 +1,35 @@
+//! What the fits of all sensors share: rows, least squares, outliers, covariances, held-out residuals.
+//!
+//! | goes in | comes out |
+//! | --- | --- |
+//! | observations and a model of the core | parameters, standard errors that allow for serial correlation and few residuals, residuals |
+//!
+//! | file | what |
+//! | --- | --- |
+//! | [`rows`] | derivatives as a dense matrix, its covariance and leverages |
+//! | [`norm_fit`], [`rig_fit`], [`reference_fit`], [`gyr_rig_fit`] | least squares by the core's solver for each kind of observation |
+//! | [`outlier`] | observations that are left out |
+//! | [`autocorrelation`] | by how much serial correlation of residuals inflates standard errors |
+//! | [`rest_noise`], [`rest_bias`], [`shell_errors`] | errors of the observations |
+//! | [`alignment`], [`directions`] | the rotation between two triads, from directions that both see at rest |
+//! | [`lag`] | the latency of a reference |
+//! | [`score_test`] | Rao's score test of a residual against a covariate |
+//! | [`search`] | the particle swarm of the core |
+//! | [`compare`] | forms of a model by held-out residuals |
+
+pub mod alignment;
+pub mod autocorrelation;
+pub mod compare;
+pub mod directions;
+pub mod gyr_rig_fit;
+pub mod lag;
+pub mod norm_fit;
+pub mod outlier;
+pub mod reference_fit;
+pub mod rest_bias;
+pub mod rest_noise;
+pub mod rig_fit;
+pub mod rows;
+pub mod score_test;
+pub mod search;
+pub mod shell_errors;

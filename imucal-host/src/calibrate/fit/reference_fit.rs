@@ -1,0 +1,214 @@
+//! A fit of the unified model to samples along an attitude reference: start, outliers, honest errors, held-out parts.
+//!
+//! The start is found and not guessed, since neither the sensor's mounting on the body that the reference tracks nor the
+//! field in the reference's frame is known. Without errors, each output is
+//!
+//! ```text
+//! m_i = Σ_jl W_(ij)l C_jl + b_i,   W_(ij)l = K_ij e_l,   C = C_p_t
+//! ```
+//!
+//! linear in W and b. W, nine rows of three, has rank one; its leading singular vectors are K and the direction of e.
+//! What is told then: K with the mounting in it, b and the direction of e, but of K's size and the length of e their
+//! product alone. K's determinant is taken as positive: a left-handed sensor would show the field reversed.
+//!
+//! How far the sensor is behind the reference ([`super::lag`]) is one more parameter that K is hardly told apart from,
+//! since a hand turns about one axis more than about others. Standard errors allow for it: what a lag does to each output
+//! is taken out of the Jacobian's columns, which leaves the covariance of the others whatever the lag is.
+
+use imucal_core::{
+    accept,
+    model::{
+        rig::{Pose, ReferencePose},
+        unified::{Terms, UnifiedModel, UnifiedParameters},
+    },
+    solver::triangular::Triangular,
+};
+use nalgebra::{DMatrix, Matrix3, SMatrix, SVector, Vector3};
+use rayon::prelude::*;
+
+use super::{
+    autocorrelation,
+    norm_fit::dynamic,
+    outlier::{MOST, outliers},
+    rig_fit::{RigFit, Solved, solve},
+    rows::{Residuals, Rows},
+};
+
+/// Rounds of leaving out gross outliers.
+const ROUNDS: usize = 3;
+/// Contiguous parts that are held out in turn.
+const FOLDS: usize = 5;
+/// Coefficients of the start for each axis: nine of W, one of b.
+const LINEAR: usize = 10;
+/// A singular value below this share of the largest tells nothing.
+const SINGULAR: f64 = 1e-6;
+
+/// A fit along a reference.
+#[derive(Clone, Debug)]
+pub struct ReferenceFit {
+    /// The fit, with standard errors that allow for residuals alike in time.
+    pub fit: RigFit,
+    /// Samples used.
+    pub kept: Vec<ReferencePose<f64>>,
+    /// Indices left out, with their size in robust standard deviations.
+    pub left_out: Vec<(usize, f64)>,
+    /// Largest factor on a standard error for residuals alike in time.
+    pub inflation: f64,
+    /// Departure from a parabola within one standard error.
+    pub nonlinearity: f64,
+}
+
+/// Parameters to start from, by the module's equation, the field's length such that K's determinant is one; `None`
+/// where the samples do not tell them.
+pub fn start(poses: &[ReferencePose<f64>]) -> Option<UnifiedParameters<f64>> {
+    let mut normal = SMatrix::<f64, LINEAR, LINEAR>::zeros();
+    let mut right = SMatrix::<f64, LINEAR, 3>::zeros();
+    for pose in poses {
+        let c = pose.rotations(&()).c_p_t;
+        let row = SVector::<f64, LINEAR>::from_fn(|k, _| if k < 9 { c[(k / 3, k % 3)] } else { 1.0 });
+        normal += row * row.transpose();
+        right += row * pose.value.transpose();
+    }
+    let svd = normal.svd(true, true);
+    let linear = svd.solve(&right, SINGULAR * svd.singular_values.max()).ok()?;
+    // Rows (i, j), columns l.
+    let w = SMatrix::<f64, 9, 3>::from_fn(|row, l| linear[(3 * (row % 3) + l, row / 3)]);
+    let svd = w.svd(true, true);
+    let (u, v) = (svd.u?, svd.v_t?);
+    let leading = svd.singular_values.imax();
+    let by_rows = u.column(leading) * svd.singular_values[leading];
+    let sensitivity = Matrix3::from_fn(|i, j| by_rows[3 * i + j]);
+    // Negative where both are reversed.
+    let size = sensitivity.determinant().cbrt();
+    let mut parameters = UnifiedParameters::nominal(v.row(leading).transpose() * size);
+    parameters.sensitivity = sensitivity / size;
+    parameters.bias = linear.row(9).transpose();
+    let finite = size != 0.0 && parameters.to_vector().iter().all(|x| x.is_finite());
+    finite.then_some(parameters)
+}
+
+/// Samples with their attitudes, and how these turn with the lag.
+#[derive(Clone, Debug)]
+pub struct Tracked {
+    /// The samples.
+    pub poses: Vec<ReferencePose<f64>>,
+    /// Change of `C_p_t` with the lag, 1/s; empty where no lag was found.
+    pub by_lag: Vec<Matrix3<f64>>,
+}
+
+/// Fits `terms` from `base`, leaving out gross outliers; where that would be more than [`MOST`], none is.
+pub fn fit<const P: usize>(
+    tracked: &Tracked,
+    base: &UnifiedParameters<f64>,
+    terms: Terms<P>,
+) -> ReferenceFit {
+    let found = fit_leaving_out(tracked, base, terms, ROUNDS);
+    let too_many = found.left_out.len() as f64 > MOST * tracked.poses.len() as f64;
+    if too_many { fit_leaving_out(tracked, base, terms, 0) } else { found }
+}
+
+/// Rms residual of an axis at the plain fit.
+pub fn rms<const P: usize>(
+    poses: &[ReferencePose<f64>],
+    base: &UnifiedParameters<f64>,
+    terms: Terms<P>,
+) -> f64 {
+    solve(poses, (), base, terms, None).solver.variance().map_or(f64::NAN, f64::sqrt)
+}
+
+fn fit_leaving_out<const P: usize>(
+    tracked: &Tracked,
+    base: &UnifiedParameters<f64>,
+    terms: Terms<P>,
+    rounds: usize,
+) -> ReferenceFit {
+    let mut used: Vec<usize> = (0..tracked.poses.len()).collect();
+    let mut kept = tracked.poses.clone();
+    let mut left_out = Vec::new();
+    let mut round = 0;
+    let (fit, inflation, nonlinearity) = loop {
+        let solved = solve(&kept, (), base, terms, None);
+        let found = outliers(&distances(&solved.model, solved.solver.theta()));
+        if found.is_empty() || round == rounds {
+            let by_lag: Vec<_> = used.iter().filter_map(|k| tracked.by_lag.get(*k).copied()).collect();
+            break summarise(&solved, &by_lag);
+        }
+        for (index, size) in found.into_iter().rev() {
+            left_out.push((used.remove(index), size));
+            kept.remove(index);
+        }
+        round += 1;
+    };
+    left_out.sort_by_key(|(index, _)| *index);
+    ReferenceFit { fit, kept, left_out, inflation, nonlinearity }
+}
+
+/// Distance of each output from what it ought to be.
+fn distances<const P: usize>(
+    model: &UnifiedModel<'_, f64, P, ReferencePose<f64>>,
+    theta: &SVector<f64, P>,
+) -> Vec<f64> {
+    let residuals = Residuals::of(model, theta);
+    let of_poses = &residuals[..3 * model.poses.len()];
+    of_poses.chunks_exact(3).map(|r| Vector3::from_column_slice(r).norm()).collect()
+}
+
+/// The fit, its inflation and its departure from a parabola.
+fn summarise<const P: usize>(
+    solved: &Solved<'_, P, ReferencePose<f64>>,
+    by_lag: &[Matrix3<f64>],
+) -> (RigFit, f64, f64) {
+    let Solved { model, solver, .. } = solved;
+    let mut rows = Rows::of(model, solver.theta());
+    let now = model.terms.parameters(&model.base, solver.theta());
+    let lagging = by_lag.iter().flat_map(|by| {
+        let moved = now.sensitivity * (by * now.vector_n);
+        [moved.x, moved.y, moved.z]
+    });
+    take_out(&mut rows, &lagging.collect::<Vec<_>>());
+    let mut factor = Triangular::default();
+    rows.residuals.iter().zip(&rows.jacobian).for_each(|(r, j)| factor.push(*r, j));
+    let told = factor.covariance(1.0).zip(solver.variance());
+    let (inflation, covariance) = match told {
+        Some((unscaled, variance)) => {
+            let inflation = autocorrelation::inflation(&rows, &unscaled, 3);
+            let scale = SMatrix::from_diagonal(&inflation);
+            (inflation, dynamic(&(scale * unscaled * scale * variance)))
+        }
+        None => (SVector::repeat(1.0), DMatrix::repeat(P, P, f64::INFINITY)),
+    };
+    let bend = accept::nonlinearity(solver, model, inflation.max());
+    (solved.fit(covariance, held_out(solved)), inflation.max(), bend)
+}
+
+/// Takes out of each column of the Jacobian what is like `direction`; rows beyond its end have none of it.
+fn take_out<const P: usize>(rows: &mut Rows<P>, direction: &[f64]) {
+    let length: f64 = direction.iter().map(|x| x * x).sum();
+    if length <= 0.0 {
+        return;
+    }
+    let like: SVector<f64, P> = rows.jacobian.iter().zip(direction).map(|(row, x)| row * *x).sum();
+    for (row, x) in rows.jacobian.iter_mut().zip(direction) {
+        *row -= like * (x / length);
+    }
+}
+
+/// Rms residual of an axis in contiguous parts left out in turn, each time fitted anew; `None` where one does not
+/// converge.
+fn held_out<const P: usize>(solved: &Solved<'_, P, ReferencePose<f64>>) -> Option<f64> {
+    let (model, poses) = (&solved.model, solved.model.poses);
+    let base = model.terms.parameters(&model.base, solved.solver.theta());
+    let sums: Option<Vec<f64>> = (0..FOLDS)
+        .into_par_iter()
+        .map(|fold| {
+            let (from, to) = (fold * poses.len() / FOLDS, (fold + 1) * poses.len() / FOLDS);
+            let others = [&poses[..from], &poses[to..]].concat();
+            let again = solve(&others, (), &base, model.terms, None);
+            let alone = UnifiedModel { poses: &poses[from..to], held: 0, ..again.model };
+            let converged = again.solver.report().termination.was_successful();
+            let residuals = Residuals::of(&alone, again.solver.theta());
+            converged.then(|| residuals.iter().map(|r| r * r).sum())
+        })
+        .collect();
+    Some((sums?.iter().sum::<f64>() / (3 * poses.len()) as f64).sqrt())
+}

@@ -1,0 +1,20 @@
+//! The gyroscope, by turns between rests (K12), along a rig or along a reference attitude.
+//!
+//! | goes in | comes out |
+//! | --- | --- |
+//! | rests, the rates between them, the calibrated accelerometer's directions | an outcome: the fit with its standard errors, or a refusal |
+//!
+//! | file | what |
+//! | --- | --- |
+//! | [`turns`] | turns between rests: the field form |
+//! | [`turn_errors`] | what the accelerometer's errors add to a turn's |
+//! | [`motions`], [`rig`] | turns along a reference attitude, or a rig's encoders |
+//! | [`bias_smoother`] | a bias that drifts between the rests |
+//! | [`ladder`] | forms of the model, compared by held-out residuals |
+
+pub mod bias_smoother;
+pub mod ladder;
+pub mod motions;
+pub mod rig;
+pub mod turn_errors;
+pub mod turns;

@@ -1,0 +1,163 @@
+//! Standard errors of a gyroscope's gain from turns: what each turn's ends, its rates and the bias err by.
+//!
+//! ```text
+//! r = Cᵀu − u',   δr = Cᵀ δu − δu' + B δb + [Cᵀu]× δφ
+//! V = s² (V_a + ρ V_g)
+//! ```
+//!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | u, u' | directions before and after, which neighbouring turns share ([`Directions`]): V_a, with the accelerometer's own covariance |
+//! | δφ | angle random walk: the rate's white noise over the turn |
+//! | δb, B | error of the bias, and how the turn follows it: one for all turns, or of the rests at both ends where it is interpolated |
+//! | V_g | what δφ and δb come to |
+//! | ρ | how much larger the gyroscope's part is than rests say: rates in motion are not those at rest |
+//!
+//! s and ρ come from the turns' own residuals ([`crate::noise::interval`]). Each turn is two rows, across the direction
+//! after it. Not modelled: noise of rates that differs by axis, drift within a turn beyond the bias path.
+
+use imucal_core::{
+    model::{
+        parameterisation::FULL,
+        turn::{TurnModel, attitude},
+    },
+    observation::Turn,
+    triad::Triad,
+};
+use nalgebra::{DMatrix, DVector, Matrix3, MatrixXx3, SMatrix, Vector3};
+
+use crate::{
+    calibrate::fit::{
+        directions::Directions,
+        rows::{Rows, influence},
+    },
+    noise::interval::{Errors, Parts, Scale},
+};
+
+/// See ρ, with prior weights.
+const RATIOS: [(f64, f64); 4] = [(1.0, 0.85), (4.0, 0.1), (16.0, 0.04), (64.0, 0.01)];
+
+/// A turn and which rests it is between.
+#[derive(Clone, Copy, Debug)]
+pub struct Between<'a> {
+    /// The turn.
+    pub turn: Turn<'a, f64>,
+    /// The rests before and after.
+    pub rests: (usize, usize),
+}
+
+/// What is known of the rates.
+#[derive(Clone, Copy, Debug)]
+pub struct RateNoise {
+    /// Density of their white noise, (rad/s)²·s, mean of the axes.
+    pub density: f64,
+    /// Covariance of the bias that all turns share, (rad/s)².
+    pub bias: Vector3<f64>,
+    /// The bias of a turn is that of the rests at its ends.
+    pub interpolated: bool,
+}
+
+/// How one turn's two rows follow what errs.
+struct Linear {
+    rests: (usize, usize),
+    duration: f64,
+    residual: [f64; 2],
+    by_gain: DMatrix<f64>,
+    by_bias: MatrixXx3<f64>,
+    by_before: MatrixXx3<f64>,
+    by_after: MatrixXx3<f64>,
+}
+
+fn linear(between: &Between<'_>, gain: &Matrix3<f64>) -> Linear {
+    let triad = Triad { gain: *gain, bias: Vector3::zeros() };
+    let turn = [between.turn];
+    let rows = Rows::of(&TurnModel { turns: &turn, form: FULL }, &FULL.theta(&triad));
+    let across = across(&turn[0].after);
+    let jacobian = SMatrix::<f64, 3, 12>::from_fn(|row, k| rows.jacobian[row][k]);
+    let told = &across * jacobian;
+    let c = attitude(&triad, &turn[0]);
+    let residual = Vector3::from_column_slice(&rows.residuals);
+    let residual = &across * residual;
+    Linear {
+        rests: between.rests,
+        duration: (0..turn[0].blocks.len()).map(|k| turn[0].durations.get(k)).sum(),
+        residual: [residual[0], residual[1]],
+        by_gain: DMatrix::from_fn(2, 9, |row, k| told[(row, k)]),
+        by_bias: told.fixed_columns::<3>(9).into(),
+        by_before: &across * c.transpose(),
+        by_after: -across,
+    }
+}
+
+/// Two unit vectors across a direction, as rows.
+fn across(direction: &Vector3<f64>) -> MatrixXx3<f64> {
+    let least = direction.iamin();
+    let one = direction.cross(&Vector3::ith(least, 1.0)).normalize();
+    let other = direction.cross(&one);
+    MatrixXx3::from_fn(2, |row, axis| if row == 0 { one[axis] } else { other[axis] })
+}
+
+/// Errors of the gain's nine entries; `None` where nothing is left over.
+pub fn errors(
+    turns: &[Between<'_>],
+    gain: &Matrix3<f64>,
+    directions: &Directions,
+    rates: &RateNoise,
+) -> Option<Errors> {
+    let turns: Vec<Linear> = turns.iter().map(|turn| linear(turn, gain)).collect();
+    let rows = 2 * turns.len();
+    let mut rests: Vec<usize> = turns.iter().flat_map(|turn| [turn.rests.0, turn.rests.1]).collect();
+    rests.sort_unstable();
+    rests.dedup();
+    let (mut jacobian, mut residuals) = (DMatrix::zeros(rows, 9), DVector::zeros(rows));
+    let mut by_direction: Vec<(usize, MatrixXx3<f64>)> =
+        rests.iter().map(|rest| (*rest, MatrixXx3::zeros(rows))).collect();
+    for (k, turn) in turns.iter().enumerate() {
+        jacobian.rows_mut(2 * k, 2).copy_from(&turn.by_gain);
+        residuals.rows_mut(2 * k, 2).copy_from_slice(&turn.residual);
+        for (rest, by) in [(turn.rests.0, &turn.by_before), (turn.rests.1, &turn.by_after)] {
+            if let Ok(at) = rests.binary_search(&rest) {
+                let mut there = by_direction[at].1.rows_mut(2 * k, 2);
+                there += by;
+            }
+        }
+    }
+    let of_directions = directions.propagated(&by_direction);
+    let of_rates = of_rates(&turns, &rests, directions, rates);
+    let parts =
+        Parts { parts: [&of_directions, &of_rates], ratios: &RATIOS, scale: Scale::Near, five: false };
+    parts.errors(&residuals, &jacobian, &influence(&jacobian)?)
+}
+
+/// V_g.
+fn of_rates(turns: &[Linear], rests: &[usize], directions: &Directions, rates: &RateNoise) -> DMatrix<f64> {
+    let rows = 2 * turns.len();
+    let mut covariance = DMatrix::zeros(rows, rows);
+    let mut by_bias = MatrixXx3::zeros(rows);
+    for (k, turn) in turns.iter().enumerate() {
+        // An angle about an axis across the direction turns it by as much; the gain is near one.
+        covariance[(2 * k, 2 * k)] = rates.density * turn.duration;
+        covariance[(2 * k + 1, 2 * k + 1)] = rates.density * turn.duration;
+        by_bias.rows_mut(2 * k, 2).copy_from(&turn.by_bias);
+    }
+    covariance += &by_bias * Matrix3::from_diagonal(&rates.bias) * by_bias.transpose();
+    if !rates.interpolated {
+        return covariance;
+    }
+    for rest in rests {
+        let span = &directions.spans[*rest];
+        let mut by = MatrixXx3::zeros(rows);
+        for (k, turn) in turns.iter().enumerate() {
+            if turn.rests.0 == *rest || turn.rests.1 == *rest {
+                by.rows_mut(2 * k, 2).copy_from(&(&turn.by_bias * 0.5));
+            }
+        }
+        covariance += &by * by.transpose() * (rates.density / (span.end - span.start));
+    }
+    covariance
+}
+
+/// The errors' covariance as a matrix of fixed size.
+pub fn fixed(errors: &Errors) -> SMatrix<f64, 9, 9> {
+    SMatrix::from_fn(|i, j| errors.covariance[(i, j)])
+}

@@ -1,0 +1,384 @@
+//! The gyroscope from turns between rests: full gain in the accelerometer's axes, bias from the rests.
+
+use std::ops::Range;
+
+use imucal_core::{
+    accept::{self, Limits, Refusal},
+    coverage::Coverage,
+    model::{parameterisation::FULL_GAIN, turn::TurnModel},
+    observation::{Rest, Turn},
+    solver::LevenbergMarquardt,
+    triad::Triad,
+};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use super::{
+    turn_errors,
+    turn_errors::{Between, RateNoise},
+};
+use crate::{
+    calibrate::{
+        fit::{
+            directions::Directions,
+            norm_fit::dynamic,
+            outlier::outliers,
+            rest_bias,
+            rest_bias::BiasErrors,
+            rest_noise::AtRest,
+            rows::{Residuals, Rows, weakest_inflation},
+            search::{SWARM_OBSERVATIONS, Search, Searched},
+        },
+        outcome::{BiasWander, Evidence, FitSummary, KnownTurn, Refused, SensorOutcome},
+    },
+    observe::{
+        quantum::quantum,
+        turn::{BiasPath, TurnData, compress},
+    },
+    recording::{SensorKind, Triple, Unit},
+};
+
+/// Name of the model in files: K, nine entries.
+pub const MODEL: &str = "K9";
+/// Turns at least: nine parameters from two residuals a turn, and some to check them.
+const LEAST_TURNS: usize = 8;
+/// A turn tells something once a direction moves by this much, rad (15°).
+const LEAST_ANGLE: f64 = 0.26;
+/// The bias wanders where the rests' means spread this many times wider than their own noise explains.
+const WANDER: f64 = 1.5;
+/// Largest rms error of a turn, rad (5.7°): beyond it axes are swapped or a unit is wrong.
+const LARGEST_RMS: f64 = 0.1;
+/// How far a swarm looks, each entry of the gain to either side of nominal: as far as a gain is plausible below it.
+const REACH: f64 = 0.5;
+
+/// What the gyroscope is calibrated from.
+#[derive(Clone, Copy, Debug)]
+pub struct GyrInput<'a> {
+    /// Time, s.
+    pub time: &'a [f64],
+    /// The gyroscope.
+    pub sensor: &'a Triple,
+    /// Rows in which it is usable.
+    pub usable: &'a [bool],
+    /// Usual interval, s.
+    pub interval: f64,
+    /// Rows of the rests, with what was observed in each.
+    pub rows: &'a [Range<usize>],
+    /// The rests.
+    pub rests: &'a [Rest<f64>],
+    /// Rests whose direction is to be trusted.
+    pub used: &'a [usize],
+    /// The accelerometer's calibration, nominal SI in.
+    pub acc: &'a Triad<f64>,
+    /// How its directions err, where that is asked for.
+    pub directions: Option<&'a Directions>,
+    /// Part of Earth's rotation along the vertical, rad/s, upwards positive; 0 where the latitude is not known.
+    pub vertical_rate: f64,
+}
+
+/// Turns and the bias they are counted from.
+struct Turns {
+    data: Vec<TurnData>,
+    bias: Vector3<f64>,
+    wander: BiasWander,
+    left_out: Vec<String>,
+}
+
+impl GyrInput<'_> {
+    fn turns(&self) -> Turns {
+        let means = self.rest_means();
+        let (bias, wander) = wander(self.rests, &means);
+        let mut turns = Turns { data: Vec::new(), bias, wander, left_out: Vec::new() };
+        for pair in self.used.windows(2) {
+            let (i, j) = (pair[0], pair[1]);
+            let mean = |k: usize| {
+                if wander.interpolated { means[k] } else { bias }
+            };
+            let path =
+                BiasPath { before: (self.rests[i].time, mean(i)), after: (self.rests[j].time, mean(j)) };
+            let ends = (i, &self.rows[i], j, &self.rows[j]);
+            match compress(self.time, &self.sensor.values, self.usable, self.interval, ends, &path) {
+                Ok(data) => turns.data.push(data),
+                Err(gap) => turns.left_out.push(format!("turn from rest {} to {}: {gap}", i + 1, j + 1)),
+            }
+        }
+        turns
+    }
+
+    fn at_rest(&self) -> AtRest<'_> {
+        AtRest {
+            time: self.time,
+            values: &self.sensor.values,
+            usable: self.usable,
+            interval: self.interval,
+            rows: self.rows,
+        }
+    }
+
+    /// Mean rate of each rest, less Earth's about the vertical.
+    fn rest_means(&self) -> Vec<Vector3<f64>> {
+        let mean = |k: usize| self.rests[k].gyr.mean() - self.direction(k) * self.vertical_rate;
+        (0..self.rests.len()).map(mean).collect()
+    }
+
+    fn direction(&self, rest: usize) -> Vector3<f64> {
+        self.acc.correct(&self.rests[rest].acc.mean()).normalize()
+    }
+
+    fn with_directions<'a>(&self, data: &'a [TurnData]) -> Vec<Turn<'a, f64>> {
+        data.iter()
+            .map(|turn| turn.between(self.direction(turn.rest_before), self.direction(turn.rest_after)))
+            .collect()
+    }
+}
+
+/// Mean rate at rest, and how it moved from rest to rest.
+fn wander(rests: &[Rest<f64>], means: &[Vector3<f64>]) -> (Vector3<f64>, BiasWander) {
+    let bias = rest_bias::mean(rests, means);
+    let count = rests.len().max(2) as f64;
+    let spread = means.iter().map(|m| (m - bias).map(|d| d * d)).sum::<Vector3<f64>>() / (count - 1.0);
+    let noise =
+        rests.iter().map(|r| r.gyr.variance() / f64::from(r.gyr.count().max(1))).sum::<Vector3<f64>>()
+            / count;
+    let (spread, expected) = (spread.map(f64::sqrt), noise.map(f64::sqrt));
+    let interpolated = (0..3).any(|axis| spread[axis] > WANDER * expected[axis]);
+    (bias, BiasWander { spread, expected, interpolated })
+}
+
+/// From the nominal gain; a swarm looks at the shortest turns.
+fn solve(turns: &[Turn<'_, f64>]) -> (LevenbergMarquardt<f64, 9>, Search) {
+    let mut shortest = turns.to_vec();
+    shortest.sort_by_key(|turn| turn.blocks.len());
+    shortest.truncate(SWARM_OBSERVATIONS);
+    let searched = Searched {
+        model: &TurnModel { turns, form: FULL_GAIN },
+        cost: &TurnModel { turns: &shortest, form: FULL_GAIN },
+        start: FULL_GAIN.theta(&Triad::identity()),
+        reach: SVector::repeat(REACH),
+        rms: &|theta| rms(&turn_errors(turns, theta)),
+        limit: LARGEST_RMS,
+    };
+    searched.solve()
+}
+
+/// Chord between the carried and the measured direction of each turn, rad.
+fn turn_errors(turns: &[Turn<'_, f64>], theta: &SVector<f64, 9>) -> Vec<f64> {
+    Residuals::of(&TurnModel { turns, form: FULL_GAIN }, theta)
+        .chunks_exact(3)
+        .map(|r| r.iter().map(|x| x * x).sum::<f64>().sqrt())
+        .collect()
+}
+
+fn rms(errors: &[f64]) -> f64 {
+    (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
+}
+
+/// Gain's diagonal at one segmentation, for comparing segmentations; `None` where there are too few turns.
+///
+/// One Gauss–Newton step from `near`, the gain at the chosen segmentation: segmentations differ by parts in a
+/// thousand, so what a second step would add is a part in a million.
+pub fn trial(input: &GyrInput<'_>, near: &Matrix3<f64>) -> Option<Vector3<f64>> {
+    let turns = input.turns();
+    if turns.data.len() < LEAST_TURNS {
+        return None;
+    }
+    let near = FULL_GAIN.theta(&Triad { gain: *near, bias: Vector3::zeros() });
+    let known = input.with_directions(&turns.data);
+    let step = Rows::of(&TurnModel { turns: &known, form: FULL_GAIN }, &near).step_without(0..0)?;
+    Some(FULL_GAIN.triad(&(near + step)).gain.diagonal())
+}
+
+/// The outcome of a gyroscope whose accelerometer gives no directions.
+pub fn without_accelerometer(refusal: Refusal) -> SensorOutcome {
+    let advice =
+        "a gyroscope without a rig is calibrated from the directions that an accepted accelerometer gives \
+                  at rest; see the accelerometer's reason"
+            .into();
+    SensorOutcome {
+        suspicions: Vec::new(),
+        kind: SensorKind::Gyr,
+        model: MODEL,
+        verdict: Err(Refused { refusal, advice }),
+        fit: None,
+        evidence: None,
+    }
+}
+
+/// Calibrates from turns between rests.
+pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
+    let mut turns = input.turns();
+    if let Err(refusal) = check_turns(input, &turns) {
+        return refuse(refusal, None);
+    }
+    let (mut solver, mut search) = solve(&input.with_directions(&turns.data));
+    let gross = outliers(&turn_errors(&input.with_directions(&turns.data), solver.theta()));
+    for (index, size) in gross.iter().rev() {
+        let turn = turns.data.remove(*index);
+        turns.left_out.push(format!(
+            "turn from rest {} to {}: {size:.1} robust standard deviations",
+            turn.rest_before + 1,
+            turn.rest_after + 1
+        ));
+    }
+    let known = input.with_directions(&turns.data);
+    if !gross.is_empty() {
+        (solver, search) = solve(&known);
+    }
+    let summary = summarise(input, &turns, &known, (&solver, search));
+    match judge(&solver, &summary) {
+        Ok(()) => SensorOutcome {
+            suspicions: Vec::new(),
+            kind: SensorKind::Gyr,
+            model: MODEL,
+            verdict: Ok(()),
+            fit: Some(summary),
+            evidence: Some(Evidence::Turns(
+                known
+                    .iter()
+                    .zip(&turns.data)
+                    .map(|(turn, data)| KnownTurn {
+                        data: data.clone(),
+                        before: turn.before,
+                        after: turn.after,
+                    })
+                    .collect(),
+            )),
+        },
+        Err(refusal) => refuse(refusal, Some(summary)),
+    }
+}
+
+/// Turns that move a direction, and enough of them.
+fn check_turns(input: &GyrInput<'_>, turns: &Turns) -> Result<(), Refusal> {
+    let telling = turns
+        .data
+        .iter()
+        .filter(|t| input.direction(t.rest_before).angle(&input.direction(t.rest_after)) > LEAST_ANGLE)
+        .count();
+    match telling {
+        0 if turns.left_out.is_empty() => Err(Refusal::NoMotion),
+        have if have < LEAST_TURNS => Err(Refusal::TooFewObservations { have, need: LEAST_TURNS }),
+        _ => Ok(()),
+    }
+}
+
+fn judge(solver: &LevenbergMarquardt<f64, 9>, summary: &FitSummary) -> Result<(), Refusal> {
+    let limits = Limits { rms: LARGEST_RMS, ..Limits::for_norm(9, LEAST_TURNS) };
+    accept::check_report(&solver.report())?;
+    let std = Triad { gain: summary.gain_std, bias: Vector3::zeros() };
+    let error = accept::relative_error(&summary.triad.gain, &std, 1.0);
+    accept::check_precision(error, &limits)?;
+    accept::check_nonlinearity(summary.nonlinearity, error, &limits)?;
+    accept::check_plausibility(&summary.triad, true, summary.rms, &limits)
+}
+
+fn refuse(refusal: Refusal, fit: Option<FitSummary>) -> SensorOutcome {
+    let advice = match refusal {
+        Refusal::NoMotion | Refusal::TooFewObservations { .. } => {
+            "turn the sensor by 30° or more between rests, ten times or more, each time about another axis"
+        }
+        Refusal::IllConditioned { .. } | Refusal::Imprecise { .. } | Refusal::TooNonlinear { .. } => {
+            "turn the sensor about all three of its axes between rests, by large angles and in both senses"
+        }
+        Refusal::Implausible { .. } => {
+            "check the gyroscope's unit, axes and signs against the accelerometer's"
+        }
+        _ => "check the recording for clipping and wrong units",
+    };
+    SensorOutcome {
+        suspicions: Vec::new(),
+        kind: SensorKind::Gyr,
+        model: MODEL,
+        verdict: Err(Refused { refusal, advice: advice.into() }),
+        fit,
+        evidence: None,
+    }
+}
+
+/// Rms error of turns left out of the fit, one at a time. Each time the fit takes one Gauss–Newton step from the
+/// optimum of all; the held turn is then integrated afresh.
+fn held_out_rms(known: &[Turn<'_, f64>], theta: &SVector<f64, 9>) -> Option<f64> {
+    let rows = Rows::of(&TurnModel { turns: known, form: FULL_GAIN }, theta);
+    let errors: Option<Vec<f64>> = (0..known.len())
+        .map(|left| {
+            let step = rows.step_without(3 * left..3 * left + 3)?;
+            turn_errors(&known[left..=left], &(theta + step)).first().copied()
+        })
+        .collect();
+    Some(rms(&errors?))
+}
+
+fn summarise(
+    input: &GyrInput<'_>,
+    turns: &Turns,
+    known: &[Turn<'_, f64>],
+    (solver, search): (&LevenbergMarquardt<f64, 9>, Search),
+) -> FitSummary {
+    let report = solver.report();
+    let gain = FULL_GAIN.triad(solver.theta()).gain;
+    let classical = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
+    let bias = rest_bias::errors(input.rests, &input.rest_means(), &input.at_rest());
+    let covariance = gain_covariance(input, turns, known, &gain, &bias).unwrap_or(classical);
+    let inflation = covariance.diagonal().component_div(&classical.diagonal()).map(f64::sqrt).max();
+    FitSummary {
+        triad: Triad { gain, bias: turns.bias },
+        gain_std: FULL_GAIN.triad(&covariance.diagonal().map(f64::sqrt)).gain,
+        bias_std: bias.std,
+        covariance: dynamic(&covariance),
+        covariance_of: FULL_GAIN.entries().to_vec(),
+        unit_in: input.sensor.unit,
+        unit_out: Unit::RadianPerSecond,
+        nominal: input.sensor.nominal,
+        rms: rms(&turn_errors(known, solver.theta())),
+        held_out_rms: held_out_rms(known, solver.theta()),
+        observations: known.len(),
+        parameters: 9,
+        condition: report.condition,
+        coverage: Coverage::of(known.iter().flat_map(|t| turn_axis(t))).share,
+        nonlinearity: accept::nonlinearity(
+            solver,
+            &TurnModel { turns: known, form: FULL_GAIN },
+            weakest_inflation(solver, &covariance),
+        ),
+        inflation,
+        iterations: report.iterations,
+        termination: report.termination,
+        field_norm: None,
+        left_out: turns.left_out.clone(),
+        gain_spread: None,
+        bias_wander: Some(turns.wander),
+        rig: None,
+        alignment: None,
+        search: Some(search),
+    }
+}
+
+/// Covariance of the gain; `None` where it is not known how directions err.
+fn gain_covariance(
+    input: &GyrInput<'_>,
+    turns: &Turns,
+    known: &[Turn<'_, f64>],
+    gain: &Matrix3<f64>,
+    bias: &BiasErrors,
+) -> Option<SMatrix<f64, 9, 9>> {
+    let between: Vec<Between<'_>> = known
+        .iter()
+        .zip(&turns.data)
+        .map(|(turn, data)| Between { turn: *turn, rests: (data.rest_before, data.rest_after) })
+        .collect();
+    // In motion the steps of the converter are noise, whatever they are at rest.
+    let rounding =
+        quantum(&input.sensor.values, input.usable).map(|step| step * step / 12.0) * input.interval;
+    let interpolated = turns.wander.interpolated;
+    let rates = RateNoise {
+        density: input.at_rest().density().zip_map(&rounding, f64::max).mean(),
+        bias: if interpolated { bias.steps } else { bias.std.map(|std| std * std) },
+        interpolated,
+    };
+    turn_errors::errors(&between, gain, input.directions?, &rates).map(|errors| turn_errors::fixed(&errors))
+}
+
+/// The axis that carries one direction of gravity to the next, both senses: a turn and its reverse tell the same.
+fn turn_axis(turn: &Turn<'_, f64>) -> impl Iterator<Item = Vector3<f64>> + Clone + use<> {
+    let axis = turn.before.cross(&turn.after).try_normalize(1e-6);
+    axis.into_iter().flat_map(|a| [a, -a])
+}

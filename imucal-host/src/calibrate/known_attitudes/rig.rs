@@ -1,0 +1,347 @@
+//! A triad on a rig: a rung of its ladder made a calibration, with what belongs to the machine kept apart.
+
+use imucal_core::{
+    accept::{self, Limits, Refusal},
+    coverage::Coverage,
+    model::{rig::Pose, unified::UnifiedParameters},
+};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use super::{ladder, ladder::Rung};
+use crate::{
+    calibrate::{
+        Options,
+        fit::{compare, rig_fit::RigFit},
+        outcome::{
+            Calibration, Evidence, FitSummary, HigherOrder, Refused, RigFindings, SensorOutcome, entry_name,
+        },
+    },
+    observe::pose::{self, Poses},
+    recording::{Recording, SensorKind, Triple, Unit},
+};
+
+/// Poses at least: the affine part has twelve parameters, and each pose tells three.
+const LEAST_POSES: usize = 6;
+
+/// A tilt with a larger standard error is not told, rad: a spirit level knows it to 0.2°.
+const LEVELLED: f64 = 3.5e-3;
+/// A tilt is one from so many standard errors on.
+const SIGNIFICANT_TILT: f64 = 4.0;
+
+/// The accelerometer on a rig; `None` where there is none, or the field form is asked for.
+pub fn accelerometer(
+    recording: &Recording,
+    sensor: &Triple,
+    usable: &[bool],
+    gravity: f64,
+    options: &Options,
+    calibration: &mut Calibration,
+) -> Option<SensorOutcome> {
+    let name = options.rig_acc?;
+    let poses = poses(recording, sensor, usable, calibration)?;
+    let down = Vector3::new(0.0, 0.0, -gravity);
+    if options.compare {
+        let steps = ladder::ACCELEROMETER.iter().filter_map(|(name, _)| ladder::rung(name, &poses, down));
+        calibration
+            .comparisons
+            .extend(compare::climb(SensorKind::Acc, steps.map(|rung| rung.step()).collect()));
+    }
+    let Some(mut rung) = ladder::rung(name, &poses, down) else {
+        return Some(too_few(SensorKind::Acc, name, &poses));
+    };
+    if !tells_tilt(&rung.fit)
+        && let Some(lower) = ladder::rung("T12", &poses, down)
+    {
+        calibration.warnings.push(format!(
+            "acc: the poses cannot tell the base's tilt from K; kept T12 instead of {name}, base taken as level"
+        ));
+        rung = lower;
+    }
+    Some(outcome(SensorKind::Acc, &rung, &poses, sensor, gravity))
+}
+
+/// The poses tell the base's tilt, where it was asked for. Held is the exact case; noise, scatter of the stops and a
+/// tilted base leave poses that ought to be exact a little of their own, and an error far beyond any base.
+fn tells_tilt(fit: &RigFit) -> bool {
+    [12, 13].iter().all(|entry| {
+        let held = fit.held.iter().any(|(held, _)| held == entry);
+        !held && fit.std(*entry).is_none_or(|std| std <= LEVELLED)
+    })
+}
+
+/// The base's tilt as the accelerometer has it, and its standard errors, rad.
+fn tilt(calibration: &Calibration) -> Option<([f64; 2], [f64; 2])> {
+    calibration.sensor(SensorKind::Acc)?.passed()?.rig.as_ref()?.tilt
+}
+
+/// The base's tilt; `None` where it is none or hardly told: an error of its own would pass for one of the field.
+fn known_tilt(calibration: &Calibration) -> Option<[f64; 2]> {
+    let (tilt, std) = tilt(calibration)?;
+    tilt.iter().zip(std).any(|(tilt, std)| tilt.abs() > SIGNIFICANT_TILT * std).then_some(tilt)
+}
+
+/// The magnetometer on a rig whose site has a known field; `None` otherwise, or where the field form is asked for.
+pub fn magnetometer(
+    recording: &Recording,
+    sensor: &Triple,
+    usable: &[bool],
+    options: &Options,
+    calibration: &mut Calibration,
+) -> Option<SensorOutcome> {
+    let name = options.rig_mag?;
+    let field = Vector3::from(recording.manifest.site.field_ned_ut?);
+    let poses = poses(recording, sensor, usable, calibration)?;
+    // The base stands for both sensors: a tilt of 0.05° is 0.1 % of the horizontal field, and of K where that alone
+    // tells its scale.
+    let mut base = UnifiedParameters::nominal(field);
+    if let Some(tilt) = known_tilt(calibration) {
+        base.tilt = tilt;
+    }
+    if options.compare {
+        let steps =
+            ladder::MAGNETOMETER.iter().filter_map(|(name, _)| ladder::rung_from(name, &poses, &base));
+        calibration
+            .comparisons
+            .extend(compare::climb(SensorKind::Mag, steps.map(|rung| rung.step()).collect()));
+    }
+    let Some(mut rung) = ladder::rung_from(name, &poses, &base) else {
+        return Some(too_few(SensorKind::Mag, name, &poses));
+    };
+    let pointed = match name {
+        "X18" => Some("X21"),
+        "M12" => Some("M15"),
+        _ => None,
+    };
+    let pointed = pointed.and_then(|name| ladder::rung_from(name, &poses, &base));
+    if let Some(pointed) = pointed
+        && compare::p_value(&rung.step(), &pointed.step()).is_some_and(|p| p < compare::SIGNIFICANT)
+    {
+        let (name, better) = (rung.name, pointed.name);
+        calibration.warnings.push(format!(
+            "mag: {name} takes the field's direction as known, and the poses contradict it: the base's heading or \
+             [site] field is off; use mag={better}, or point the base"
+        ));
+    }
+    if let Some((_, std)) = tilt(calibration) {
+        allow_for_tilt(&mut rung, &poses, &base, std);
+    }
+    Some(outcome(SensorKind::Mag, &rung, &poses, sensor, field.norm()))
+}
+
+/// Adds to a rung's covariance what errors of the base's tilt, of these standard deviations in rad, do to it.
+fn allow_for_tilt(rung: &mut Rung, poses: &Poses, base: &UnifiedParameters<f64>, std: [f64; 2]) {
+    let values = |rung: &Rung| {
+        let all = rung.fit.parameters.to_vector();
+        let held = |entry: u8| rung.fit.held.iter().any(|(held, _)| *held == entry);
+        let value = |entry: &u8| if held(*entry) { 0.0 } else { all[usize::from(*entry)] };
+        DVector::from_iterator(rung.fit.entries.len(), rung.fit.entries.iter().map(value))
+    };
+    for (axis, std) in std.into_iter().enumerate() {
+        let mut leaning = *base;
+        leaning.tilt[axis] += std;
+        if let Some(other) = ladder::rung_from(rung.name, poses, &leaning) {
+            let moved = values(&other) - values(rung);
+            rung.fit.covariance += &moved * moved.transpose();
+        }
+    }
+}
+
+/// The poses of a recording that has encoders; what is wrong with them is said once.
+fn poses(
+    recording: &Recording,
+    sensor: &Triple,
+    usable: &[bool],
+    calibration: &mut Calibration,
+) -> Option<Poses> {
+    recording.gimbal.as_ref()?;
+    let found = pose::poses(recording, sensor, usable);
+    let warning = match &found {
+        Err(why) => Some(format!("the rig is not used: {why}")),
+        Ok(poses) => {
+            let (locked, all) = (poses.in_gimbal_lock(), poses.poses.len());
+            (2 * locked > all).then(|| {
+                format!(
+                    "{locked} of {all} poses are in gimbal lock: outer and inner gimbal turn about one axis there, and \
+                     two angles tell what one does; turn the middle gimbal away from it"
+                )
+            })
+        }
+    };
+    calibration.warnings.extend(warning.filter(|warning| !calibration.warnings.contains(warning)));
+    found.ok()
+}
+
+fn too_few(kind: SensorKind, name: &'static str, poses: &Poses) -> SensorOutcome {
+    refused(kind, name, Refusal::TooFewObservations { have: poses.poses.len(), need: LEAST_POSES }, None)
+}
+
+/// What the affine part of a rung is judged by.
+pub(crate) fn limits() -> Limits {
+    Limits { observations: LEAST_POSES, directions: LEAST_POSES, ..Limits::for_norm(12, LEAST_POSES) }
+}
+
+/// The outcome of one rung.
+fn outcome(kind: SensorKind, rung: &Rung, poses: &Poses, sensor: &Triple, norm: f64) -> SensorOutcome {
+    let summary = rung.fit.triad().map(|(triad, covariance)| {
+        let directions = poses.poses.iter().map(|pose| triad.correct(&pose.value).normalize());
+        let coverage = Coverage::of(directions);
+        let unit_out = Unit::of(kind)[0];
+        let mut summary = summarise(&rung.fit, sensor, unit_out, triad, covariance, coverage.share);
+        if let Some(rig) = &mut summary.rig {
+            rig.higher_order = higher_order(&rung.fit, poses);
+        }
+        (summary, coverage)
+    });
+    let Some((summary, coverage)) = summary else {
+        return refused(kind, rung.name, Refusal::NotFinite, None);
+    };
+    match judge(&rung.fit, &summary, &coverage, norm) {
+        Ok(()) => SensorOutcome {
+            suspicions: Vec::new(),
+            kind,
+            model: rung.name,
+            verdict: Ok(()),
+            fit: Some(summary),
+            evidence: Some(Evidence::Gimbals(poses.clone(), Box::new(rung.fit.clone()))),
+        },
+        Err(refusal) => refused(kind, rung.name, refusal, Some(summary)),
+    }
+}
+
+/// A refusal with what to do.
+fn refused(
+    kind: SensorKind,
+    model: &'static str,
+    refusal: Refusal,
+    fit: Option<FitSummary>,
+) -> SensorOutcome {
+    let advice = match refusal {
+        Refusal::NoRest | Refusal::TooFewObservations { .. } => {
+            "hold the table still for 2 s or more in 24 poses, faces and oblique ones"
+        }
+        Refusal::PoorCoverage { .. }
+        | Refusal::IllConditioned { .. }
+        | Refusal::Imprecise { .. }
+        | Refusal::NotRedundant { .. } => "add poses upside down and oblique ones; turn all three gimbals",
+        Refusal::Implausible { .. } => {
+            "check [units], [rig] axes, the encoders' unit and signs, and [site] of the recording's TOML"
+        }
+        _ => "check the recording for motion during poses, clipping and wrong units",
+    };
+    SensorOutcome {
+        suspicions: Vec::new(),
+        kind,
+        model,
+        verdict: Err(Refused { refusal, advice: advice.into() }),
+        fit,
+        evidence: None,
+    }
+}
+
+fn judge(fit: &RigFit, summary: &FitSummary, coverage: &Coverage<f64>, norm: f64) -> Result<(), Refusal> {
+    let limits = limits();
+    accept::check_observations(coverage, fit.free(), &limits)?;
+    if fit.residuals <= fit.free() {
+        let need = fit.free() / 3 + 1;
+        return Err(Refusal::TooFewObservations { have: fit.residuals / 3, need });
+    }
+    accept::check_report(&fit.report)?;
+    accept::check_precision(summary.relative_error(norm), &limits)?;
+    accept::check_plausibility(&summary.triad, true, fit.rms / norm, &limits)
+}
+
+/// The figures of a fit; `triad` and `covariance` are [`RigFit::triad`]'s.
+pub(crate) fn summarise(
+    fit: &RigFit,
+    sensor: &Triple,
+    unit_out: Unit,
+    triad: imucal_core::triad::Triad<f64>,
+    covariance: DMatrix<f64>,
+    coverage: f64,
+) -> FitSummary {
+    let std = |k: usize| covariance[(k, k)].sqrt();
+    FitSummary {
+        triad,
+        gain_std: Matrix3::from_fn(|i, j| std(3 * i + j)),
+        bias_std: Vector3::from_fn(|i, _| std(9 + i)),
+        covariance,
+        covariance_of: (0..12).collect(),
+        unit_in: sensor.unit,
+        unit_out,
+        nominal: sensor.nominal,
+        rms: fit.rms,
+        held_out_rms: fit.held_out_rms,
+        observations: fit.residuals / 3,
+        parameters: fit.free(),
+        condition: fit.report.condition,
+        coverage,
+        nonlinearity: 0.0,
+        inflation: 1.0,
+        iterations: fit.report.iterations,
+        termination: fit.report.termination,
+        field_norm: None,
+        left_out: Vec::new(),
+        gain_spread: None,
+        bias_wander: None,
+        rig: Some(findings(fit)),
+        alignment: None,
+        search: None,
+    }
+}
+
+fn findings(fit: &RigFit) -> RigFindings {
+    let three = |from: u8| Vector3::from_fn(|k, _| fit.std(from + k as u8).unwrap_or(0.0));
+    let now = &fit.parameters;
+    RigFindings {
+        tilt: fit.std(12).zip(fit.std(13)).map(|(alpha, beta)| (now.tilt, [alpha, beta])),
+        sources: fit
+            .entries
+            .contains(&17)
+            .then(|| [(now.outer_source, three(17)), (now.middle_source, three(20))]),
+        field_n: fit.entries.contains(&14).then_some(now.vector_n),
+        not_told: fit
+            .held
+            .iter()
+            .map(|(entry, like)| match like {
+                Some(like) => format!("{} (like {})", unified_name(*entry), unified_name(*like)),
+                None => unified_name(*entry),
+            })
+            .collect(),
+        ..RigFindings::default()
+    }
+}
+
+/// Quadratic, cubic and cross terms, and what a device leaves of them; `None` where none is estimated.
+fn higher_order(fit: &RigFit, poses: &Poses) -> Option<HigherOrder> {
+    let now = &fit.parameters;
+    let all =
+        [("quadratic", 23, now.quadratic), ("cubic", 26, now.cubic), ("cross-axis", 29, now.cross_product)];
+    let std = |from: u8| Vector3::from_fn(|k, _| fit.std(from + k as u8).unwrap_or(0.0));
+    let estimated = all.into_iter().filter(|(_, from, _)| fit.entries.contains(from));
+    let terms: Vec<_> = estimated.map(|(name, from, value)| (name, value, std(from))).collect();
+    let gain = now.sensitivity.try_inverse().filter(|_| !terms.is_empty())?;
+    let none = Vector3::zeros();
+    let affine = UnifiedParameters { quadratic: none, cubic: none, cross_product: none, ..*now };
+    let left = poses.poses.iter().map(|pose| {
+        let at = pose.rotations(&poses.axes);
+        (gain * (now.predict(&at) - affine.predict(&at))).norm()
+    });
+    Some(HigherOrder { terms, uncorrected: left.fold(0.0, f64::max) })
+}
+
+/// Name of an entry of the unified model.
+pub fn unified_name(entry: u8) -> String {
+    let axis = |from: u8| ["x", "y", "z"][usize::from((entry - from) % 3)];
+    match entry {
+        0..9 => entry_name(entry).replace("gain", "K"),
+        9..12 => entry_name(entry),
+        12 => "tilt_x".into(),
+        13 => "tilt_y".into(),
+        14..17 => format!("field_{}", axis(14)),
+        17..20 => format!("outer_hard_iron_{}", axis(17)),
+        20..23 => format!("middle_hard_iron_{}", axis(20)),
+        23..26 => format!("quadratic_{}", axis(23)),
+        26..29 => format!("cubic_{}", axis(26)),
+        _ => format!("cross_product_{}", axis(29)),
+    }
+}

@@ -1,0 +1,70 @@
+//! Samples that no sensor can have measured: a digit or a decimal point lost on the way.
+//!
+//! One of them would drown the noise of all rows in any sum. They become missing, with a warning.
+
+use crate::recording::{Recording, place::Places, sensor_kind::SensorKind, triple::Triple, warning::Warning};
+
+/// Beyond ten thousand times gravity, m/s², nothing that is calibrated survives.
+const ACCELERATION: f64 = 1e5;
+/// More than a hundred thousand turns a minute, rad/s.
+const RATE: f64 = 1e4;
+/// The Earth's field has no such neighbour: this many times the median.
+const FIELD: f64 = 1e4;
+
+/// Takes absurd samples out, and notes the first of each axis and their number.
+pub(crate) fn mask(recording: &mut Recording, places: &Places) {
+    let path = recording.path.clone();
+    for kind in SensorKind::ALL {
+        let triple = match kind {
+            SensorKind::Acc => &mut recording.acc,
+            SensorKind::Gyr => &mut recording.gyr,
+            SensorKind::Mag => &mut recording.mag,
+        };
+        let Some(triple) = triple else { continue };
+        let Some(limit) = limit(kind, triple) else { continue };
+        for (axis, column) in kind.columns().into_iter().enumerate() {
+            let absurd: Vec<usize> =
+                (0..triple.values.len()).filter(|row| triple.values[*row][axis].abs() > limit).collect();
+            let Some(first) = absurd.first().copied() else { continue };
+            recording.warnings.push(Warning::Absurd {
+                path: path.clone(),
+                place: places.of(first),
+                column: column.to_owned(),
+                found: triple.nominal.to_raw(triple.values[first][axis]),
+                unit: triple.unit,
+                more: absurd.len() - 1,
+            });
+            absurd.iter().for_each(|row| triple.values[*row][axis] = f64::NAN);
+        }
+    }
+}
+
+/// Largest sample on the SI side; none where most are beyond it, which the unit explains and not a lost digit.
+fn limit(kind: SensorKind, triple: &Triple) -> Option<f64> {
+    let median = triple.median_norm()?;
+    let limit = match kind {
+        SensorKind::Acc => ACCELERATION,
+        SensorKind::Gyr => RATE,
+        SensorKind::Mag => FIELD * median,
+    };
+    (limit > 0.0 && median < limit).then_some(limit)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::recording::fixture::{assert_says, csv};
+
+    #[test]
+    fn a_sample_that_lost_its_decimal_point_is_taken_out_and_named() {
+        let fixture = csv("t,acc_x,acc_y,acc_z\n0,0,0,9.8\n1,0,98012345,9.8\n2,0,0,9.8\n3,0,-1e300,9.8\n");
+        let values = fixture.read().acc.unwrap().values;
+        assert!(values[1].y.is_nan() && values[3].y.is_nan() && values[1].z == 9.8 && values[2].y == 0.0);
+        assert_says(&fixture.warnings()[0], &["run.csv, line 3, column `acc_y`", "9.801e7 m/s^2", "1 more"]);
+    }
+
+    #[test]
+    fn a_magnetometer_in_any_unit_is_measured_against_itself() {
+        let fixture = csv("t,mag_x,mag_y,mag_z\n0,40,0,0\n1,40,0,1e9\n2,0,40,0\n");
+        assert!(fixture.read().mag.unwrap().values[1].z.is_nan());
+    }
+}

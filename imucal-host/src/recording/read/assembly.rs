@@ -1,0 +1,261 @@
+//! From a table in file units to a recording in SI units, with the checks all formats share.
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+use super::{
+    columns::{GIMBAL, REFERENCE, SEGMENT, TEMPERATURE, TIME, Table, slot_of},
+    interval,
+};
+use crate::recording::{
+    Recording,
+    check::{absurd, unit_check},
+    manifest::Manifest,
+    place::Places,
+    read_error::ReadError,
+    sensor_kind::SensorKind,
+    triple::{Nominal, Triple, median},
+    unit::TimeUnit,
+    warning::Warning,
+};
+
+/// Makes a recording of a table, or says what is wrong with it.
+pub(crate) fn assemble(path: &Path, manifest: Manifest, mut table: Table) -> Result<Recording, ReadError> {
+    let unit = manifest.units.t;
+    let time = std::mem::take(&mut table.columns[TIME]);
+    if time.is_empty() {
+        return Err(ReadError::NoRows { path: path.to_path_buf() });
+    }
+    check_time(path, &time, unit, &table.places)?;
+    let segment = segments(path, &table)?;
+    let mut sensors = Vec::with_capacity(3);
+    for kind in SensorKind::ALL {
+        sensors.push(triple(path, &manifest, &table, kind)?);
+    }
+    let [acc, gyr, mag] = <[Option<Triple>; 3]>::try_from(sensors).unwrap_or_default();
+    let angle = 1.0 / manifest.units.gimbal.per_si();
+    let mut recording = Recording {
+        name: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
+        path: path.to_path_buf(),
+        time: scaled(time, unit.per_si()),
+        acc,
+        gyr,
+        mag,
+        gimbal: rows::<3>(&table.columns[GIMBAL..REFERENCE])
+            .map(|rows| rows.into_iter().map(|row| row.map(|value| value * angle)).collect()),
+        reference: rows::<4>(&table.columns[REFERENCE..SEGMENT]),
+        temperature: Some(std::mem::take(&mut table.columns[TEMPERATURE]))
+            .filter(|column| !column.is_empty()),
+        segment,
+        extra: table.extra,
+        warnings: table.warnings,
+        manifest,
+    };
+    keep_assumed(&mut recording);
+    note_extra(&mut recording);
+    interval::check(&mut recording)?;
+    unit_check::check(&mut recording)?;
+    absurd::mask(&mut recording, &table.places);
+    Ok(recording)
+}
+
+fn check_time(path: &Path, time: &[f64], unit: TimeUnit, places: &Places) -> Result<(), ReadError> {
+    if let Some(row) = time.iter().position(|t| t.is_nan()) {
+        return Err(ReadError::TimeMissing { path: path.to_path_buf(), place: places.of(row) });
+    }
+    let Some(at) = time.windows(2).position(|pair| pair[1] <= pair[0]) else {
+        return Ok(());
+    };
+    Err(ReadError::TimeOrder {
+        path: path.to_path_buf(),
+        place: places.of(at + 1),
+        found: time[at + 1],
+        before: time[at],
+        remedy: order_remedy(time, at, unit),
+    })
+}
+
+fn order_remedy(time: &[f64], at: usize, unit: TimeUnit) -> String {
+    let mut remedy = if time[at + 1] < time[at] {
+        "sort the rows by time, or split the file where the clock was reset".to_owned()
+    } else {
+        "remove the duplicate row, or export the times with more decimals".to_owned()
+    };
+    let steps = time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
+    let interval = median(steps).map(|step| step / unit.per_si());
+    if interval.is_some_and(interval::is_unusual) {
+        remedy.push_str(&format!("; check the unit of t too, with `{unit}` most intervals are unusual"));
+    }
+    remedy
+}
+
+fn scaled(mut time: Vec<f64>, per_si: f64) -> Vec<f64> {
+    if per_si != 1.0 {
+        time.iter_mut().for_each(|t| *t /= per_si);
+    }
+    time
+}
+
+fn triple(
+    path: &Path,
+    manifest: &Manifest,
+    table: &Table,
+    kind: SensorKind,
+) -> Result<Option<Triple>, ReadError> {
+    let first = slot_of(kind);
+    let (x, y, z) = (&table.columns[first], &table.columns[first + 1], &table.columns[first + 2]);
+    if x.is_empty() {
+        return Ok(None);
+    }
+    let manifest_path = || Manifest::path_beside(path).unwrap_or_else(|| path.to_path_buf());
+    let fault = |fault| ReadError::Manifest { path: manifest_path(), line: 1, fault };
+    let nominal = manifest.nominal(kind).map_err(fault)?;
+    let raw = x.iter().zip(y).zip(z).map(|((x, y), z)| Vector3::new(*x, *y, *z));
+    let values = if nominal == Nominal::IDENTITY {
+        raw.collect()
+    } else {
+        raw.map(|value| value.map(|component| nominal.to_si(component))).collect()
+    };
+    manifest.triple(kind, values).map(Some).map_err(fault)
+}
+
+fn rows<const N: usize>(columns: &[Vec<f64>]) -> Option<Vec<[f64; N]>> {
+    let count = columns.first()?.len();
+    let row = |row: usize| std::array::from_fn(|column| columns[column][row]);
+    (count > 0).then(|| (0..count).map(row).collect())
+}
+
+fn segments(path: &Path, table: &Table) -> Result<Option<Vec<Option<i64>>>, ReadError> {
+    /// Above, neighbouring integers are one f64.
+    const LARGEST: f64 = 9_007_199_254_740_992.0;
+    let column = &table.columns[SEGMENT];
+    let whole = |label: f64| label.is_nan() || (label.fract() == 0.0 && label.abs() <= LARGEST);
+    if let Some(row) = column.iter().position(|label| !whole(*label)) {
+        return Err(ReadError::SegmentNotInteger {
+            path: path.to_path_buf(),
+            place: table.places.of(row),
+            found: column[row],
+        });
+    }
+    let label = |label: &f64| (!label.is_nan()).then_some(*label as i64);
+    Ok((!column.is_empty()).then(|| column.iter().map(label).collect()))
+}
+
+/// A unit that is left out is assumed only where there is a column in it.
+fn keep_assumed(recording: &mut Recording) {
+    let measured: Vec<&str> = [
+        ("t", true),
+        ("acc", recording.acc.is_some()),
+        ("gyr", recording.gyr.is_some()),
+        ("mag", recording.mag.is_some()),
+        ("gimbal", recording.gimbal.is_some()),
+    ]
+    .into_iter()
+    .filter_map(|(key, there)| there.then_some(key))
+    .collect();
+    recording.warnings.retain_mut(|warning| match warning {
+        Warning::UnitsAssumed { assumed, .. } => {
+            assumed.retain(|(key, _)| measured.contains(key));
+            !assumed.is_empty()
+        }
+        _ => true,
+    });
+}
+
+fn note_extra(recording: &mut Recording) {
+    for column in &recording.extra {
+        recording
+            .warnings
+            .push(Warning::UnknownColumn { path: recording.path.clone(), column: column.name.clone() });
+    }
+    if SensorKind::ALL.iter().all(|kind| recording.sensor(*kind).is_none()) {
+        recording.warnings.push(Warning::NoSensor { path: recording.path.clone() });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::recording::fixture::{Fixture, assert_says, csv};
+
+    fn with_times(times: &[&str]) -> Fixture {
+        csv(times.iter().fold("t,acc_x,acc_y,acc_z\n".to_owned(), |text, t| text + t + ",0,0,9.8\n"))
+    }
+
+    #[test]
+    fn time_that_runs_back_names_the_line_and_both_times() {
+        let message = with_times(&["0", "0.02", "0.01"]).error();
+        assert_says(
+            &message,
+            &["run.csv, line 4, column `t`", "found 0.01 after 0.02", "increasing", "sort"],
+        );
+        assert!(!message.contains("unit of t"), "{message}");
+    }
+
+    #[test]
+    fn time_that_repeats_advises_to_remove_the_duplicate() {
+        let message = with_times(&["0", "0.01", "0.01"]).error();
+        assert_says(&message, &["line 4", "found 0.01 after 0.01", "remove the duplicate", "more decimals"]);
+    }
+
+    #[test]
+    fn odd_intervals_beside_a_wrong_order_hint_at_the_unit() {
+        assert_says(&with_times(&["0", "10", "20", "20"]).error(), &["check the unit of t", "`s`"]);
+    }
+
+    #[test]
+    fn a_row_without_time_is_refused() {
+        let message = with_times(&["0", "", "1"]).error();
+        assert_says(&message, &["run.csv, line 3, column `t`", "no time", "in each row", "remove the row"]);
+    }
+
+    #[test]
+    fn times_are_converted_to_seconds() {
+        let samples = "t,acc_x,acc_y,acc_z\n1000,0,0,9.8\n1010,0,0,9.8\n";
+        let fixture = Fixture::new("run.csv", "[units]\nt = \"ms\"\n", samples);
+        assert_eq!(fixture.read().time, [1.0, 1.01]);
+        assert_says(&csv(samples).warnings()[0], &["median interval is 1e1 s", "`s`", "check t of [units]"]);
+    }
+
+    #[test]
+    fn a_label_that_is_no_integer_is_refused() {
+        let message = csv("t,segment\n0,1\n1,1.5\n").error();
+        assert_says(
+            &message,
+            &["run.csv, line 3, column `segment`", "1.5", "expected an integer", "correct"],
+        );
+    }
+
+    #[test]
+    fn a_file_without_sensors_is_warned_about() {
+        assert_says(&csv("t,temp\n0,20\n1,20\n").warnings()[0], &["no sensor columns", "acc_x"]);
+    }
+
+    #[test]
+    fn units_that_are_left_out_are_said_to_be_assumed_where_they_matter() {
+        let samples = "t,acc_x,acc_y,acc_z,mag_x,mag_y,mag_z\n0,0,0,9.8,40,0,0\n0.01,0,0,9.8,40,0,0\n";
+        let assumed = |sections: &str| -> Vec<String> {
+            let warnings = Fixture::new("run.csv", sections, samples).read().warnings;
+            warnings.iter().map(ToString::to_string).filter(|text| text.contains("leaves out")).collect()
+        };
+        assert_says(&assumed("")[0], &["run.toml", "t = \"s\", acc = \"m/s^2\", mag = \"uT\""]);
+        assert_says(
+            &assumed("[units]\nt = \"s\"\nacc = \"m/s^2\"\n")[0],
+            &["leaves out mag = \"uT\", which is"],
+        );
+        assert!(assumed("[units]\nt = \"s\"\nacc = \"m/s^2\"\nmag = \"uT\"\n").is_empty());
+    }
+
+    #[test]
+    fn each_unit_arrives_as_si() {
+        let sections = "[units]\nacc = \"g\"\ngyr = \"counts\"\nmag = \"G\"\n[ranges]\nacc = 2\n
+            [counts]\ngyr = { offset = 100, per_unit = 50 }\n";
+        let samples = "t,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,mag_x,mag_y,mag_z\n0,0,0,1,150,100,50,0.5,0,0\n";
+        let recording = Fixture::new("run.csv", sections, samples).read();
+        let acc = recording.acc.unwrap();
+        assert_eq!(acc.values[0].z, 9.80665);
+        assert!((acc.full_scale_si().unwrap() - 2.0 * 9.80665).abs() < 1e-12);
+        assert_eq!(recording.gyr.unwrap().values[0].as_slice(), [1.0, 0.0, -1.0]);
+        assert!((recording.mag.unwrap().values[0].x - 50.0).abs() < 1e-12);
+    }
+}

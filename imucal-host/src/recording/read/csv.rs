@@ -1,0 +1,288 @@
+//! Reading samples as CSV, plain or gzipped.
+
+use std::path::Path;
+
+use super::{
+    columns::{Layout, Table, Target},
+    csv_rows::Rows,
+    number::{self, NotANumber},
+};
+use crate::{
+    file::{Limits, limits::Size},
+    recording::{
+        place::{Place, Places},
+        read_error::ReadError,
+        warning::Warning,
+    },
+};
+
+/// Reads the samples of a CSV file in file units.
+pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Table, ReadError> {
+    let mut rows = Rows::open(path, limits)?;
+    table(path, &mut rows, limits).map_err(|error| {
+        // Of a damaged stream nothing that is wrong in its text says more.
+        let damage = if error.is_limit() { None } else { rows.text.damage() };
+        damage.unwrap_or(error)
+    })
+}
+
+fn table(path: &Path, rows: &mut Rows<'_>, limits: &Limits) -> Result<Table, ReadError> {
+    let blank = |rows: &Rows<'_>| rows.fields().all(|field| field.trim_ascii().is_empty()) && rows.len() == 1;
+    if !rows.advance()? || (blank(rows) && !rows.advance()?) {
+        return Err(ReadError::Empty { path: path.to_path_buf() });
+    }
+    let names: Result<Vec<&str>, _> = rows.fields().map(std::str::from_utf8).collect();
+    let names = names.map_err(|_| ReadError::NotUtf8 { path: path.to_path_buf(), line: rows.line })?;
+    let layout = Layout::new(&names, path)?;
+    let names: Vec<String> = names.iter().map(|name| name.trim().to_owned()).collect();
+    CsvReader { path, layout, names, limit: limits.size, taken: 0 }.read(rows)
+}
+
+struct CsvReader<'a> {
+    path: &'a Path,
+    layout: Layout,
+    names: Vec<String>,
+    /// Bytes that the samples may take in memory, and those they take.
+    limit: u64,
+    taken: u64,
+}
+
+/// What is wrong with a field, before the place is known.
+struct BadField {
+    column: usize,
+    problem: NotANumber,
+}
+
+impl CsvReader<'_> {
+    fn read(mut self, rows: &mut Rows<'_>) -> Result<Table, ReadError> {
+        // A guess that is a little high; it spares the growing columns their copies.
+        let row = (self.layout.row_size() + size_of::<u64>()) as u64;
+        let guess =
+            (rows.text.expected / (self.names.len() * 7).max(1) as u64).min(self.limit / row) as usize;
+        let mut table = self.layout.table(guess, Places::Lines(Vec::new()));
+        let mut lines = Vec::with_capacity(guess);
+        while rows.advance()? {
+            let last = rows.cut;
+            if last && self.drop_cut_line(rows, &mut table) {
+                break;
+            }
+            if rows.len() != self.names.len() {
+                return Err(self.field_count(rows));
+            }
+            self.check_text(rows)?;
+            self.push(rows, &mut table).map_err(|bad| self.bad_field(rows, &bad))?;
+            lines.push(rows.line);
+            self.take(rows)?;
+        }
+        if rows.text.truncated {
+            table
+                .warnings
+                .push(Warning::TruncatedStream { path: self.path.to_path_buf(), rows: lines.len() });
+        }
+        table.places = Places::Lines(lines);
+        Ok(table)
+    }
+
+    /// Counts what a row takes in memory, its line included.
+    fn take(&mut self, rows: &Rows<'_>) -> Result<(), ReadError> {
+        let text = |(field, target): (&[u8], &Target)| match target {
+            Target::Extra(_) => field.len(),
+            Target::Known(_) => 0,
+        };
+        let texts: usize = rows.fields().zip(&self.layout.targets).map(text).sum();
+        self.taken += (self.layout.row_size() + size_of::<u64>() + texts) as u64;
+        if self.taken > self.limit {
+            let path = self.path.to_path_buf();
+            return Err(ReadError::TooManySamples { path, limit: Size(self.limit) });
+        }
+        Ok(())
+    }
+
+    fn push(&self, rows: &Rows<'_>, table: &mut Table) -> Result<(), BadField> {
+        for (column, (field, target)) in rows.fields().zip(&self.layout.targets).enumerate() {
+            match *target {
+                Target::Known(slot) => {
+                    let value = number::parse(field).map_err(|problem| BadField { column, problem })?;
+                    table.columns[slot].push(value);
+                }
+                Target::Extra(extra) => {
+                    table.extra[extra].values.push(String::from_utf8_lossy(field).into_owned());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Unknown columns are kept as they are, so they have to be text.
+    fn check_text(&self, rows: &Rows<'_>) -> Result<(), ReadError> {
+        let foreign = |(field, target): (&[u8], &Target)| {
+            matches!(target, Target::Extra(_)) && std::str::from_utf8(field).is_err()
+        };
+        match rows.fields().zip(&self.layout.targets).any(foreign) {
+            true => Err(ReadError::NotUtf8 { path: self.path.to_path_buf(), line: rows.line }),
+            false => Ok(()),
+        }
+    }
+
+    /// Notes what became of a cut line; true if it is to be dropped.
+    fn drop_cut_line(&self, rows: &Rows<'_>, table: &mut Table) -> bool {
+        let last = rows.len().saturating_sub(1);
+        let field = rows.field(last);
+        let whole = rows.len() == self.names.len() && self.is_whole(last, field);
+        let truncated = rows.text.truncated;
+        let path = self.path.to_path_buf();
+        let place = Place::Line(rows.line);
+        if rows.len() > self.names.len() {
+            return false;
+        }
+        table.warnings.push(if whole && !truncated {
+            let found = String::from_utf8_lossy(field).into_owned();
+            Warning::UnterminatedLine { path, place, column: self.names[last].clone(), found }
+        } else {
+            Warning::TruncatedLine { path, place, found: last, expected: self.names.len() }
+        });
+        !whole || truncated
+    }
+
+    fn is_whole(&self, column: usize, field: &[u8]) -> bool {
+        match self.layout.targets.get(column) {
+            Some(Target::Known(_)) => number::parse(field).is_ok_and(|value| !value.is_nan()),
+            _ => true,
+        }
+    }
+
+    fn field_count(&self, rows: &Rows<'_>) -> ReadError {
+        ReadError::FieldCount {
+            path: self.path.to_path_buf(),
+            place: Place::Line(rows.line),
+            found: rows.len(),
+            expected: self.names.len(),
+        }
+    }
+
+    fn bad_field(&self, rows: &Rows<'_>, bad: &BadField) -> ReadError {
+        let path = self.path.to_path_buf();
+        let place = Place::Line(rows.line);
+        let column = self.names[bad.column].clone();
+        let text = String::from_utf8_lossy(rows.field(bad.column));
+        let found: String = text.chars().take(40).collect();
+        match bad.problem {
+            NotANumber::Unparsable => ReadError::NotANumber { path, place, column, found },
+            NotANumber::Infinite => ReadError::Infinite { path, place, column, found },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use crate::recording::{
+        Warning,
+        fixture::{Fixture, assert_says, csv},
+    };
+
+    const HEADER: &str = "t,acc_x,acc_y,acc_z\n";
+
+    fn rows(lines: &str) -> String {
+        format!("{HEADER}{lines}")
+    }
+
+    #[test]
+    fn a_file_with_mark_blanks_and_windows_line_ends_is_read() {
+        let recording = csv("\u{feff}acc_x, t ,acc_y,acc_z\r\n1,0.5,2,9.5\r\n\r\n 1 , 1.5 ,NaN,9\r\n").read();
+        assert_eq!(recording.time, [0.5, 1.5]);
+        let acc = recording.acc.unwrap().values;
+        assert_eq!(acc[0], Vector3::new(1.0, 2.0, 9.5));
+        assert!(acc[1].y.is_nan() && acc[1].x == 1.0);
+        let assumed = |warning: &Warning| matches!(warning, Warning::UnitsAssumed { .. });
+        assert!(recording.warnings.iter().all(assumed), "{:?}", recording.warnings);
+        assert_eq!(recording.name, "run.csv");
+    }
+
+    #[test]
+    fn gimbal_reference_segment_and_temperature_are_read() {
+        let header = "t,gimbal_outer,gimbal_middle,gimbal_inner,ref_qw,ref_qx,ref_qy,ref_qz,segment,temp";
+        let text = format!("{header}\n0,180,0,-90,1,0,0,0,3,21.5\n1,,,,,,,,,\n");
+        let recording = Fixture::new("run.csv", "[units]\ngimbal = \"deg\"\n", text).read();
+        let gimbal = recording.gimbal.unwrap();
+        assert!((gimbal[0][0] - std::f64::consts::PI).abs() < 1e-15 && gimbal[1][2].is_nan());
+        assert_eq!(recording.reference.unwrap()[0], [1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(recording.segment.unwrap(), [Some(3), None]);
+        assert_eq!(recording.temperature.unwrap()[0], 21.5);
+    }
+
+    #[test]
+    fn unknown_columns_are_kept_as_they_are_and_reported() {
+        let fixture = csv("t,acc_x,acc_y,acc_z,note\n0,0,0,9.8,\"a, b\"\n1,0,0,9.8,007\n");
+        assert_eq!(fixture.read().extra[0].values, ["a, b", "007"]);
+        assert_says(&fixture.warnings()[0], &["run.csv, column `note`", "kept as it is", "rename"]);
+    }
+
+    #[test]
+    fn text_in_a_number_column_names_line_column_and_text() {
+        let message = csv(rows("0,0,0,9.8\n1,0,zero,9.8\n2,0,0,9.8\n")).error();
+        assert_says(
+            &message,
+            &["run.csv, line 3, column `acc_y`", "`zero`", "expected a number", "correct it"],
+        );
+    }
+
+    #[test]
+    fn lines_are_counted_with_the_blank_ones() {
+        assert_says(&csv(rows("0,0,0,9.8\n\n\n1,0,x,9.8\n")).error(), &["line 5"]);
+        let windows = "t,acc_x,acc_y,acc_z\r\n0,0,0,9.8\r\n\r\n1,0,x,9.8\r\n";
+        assert_says(&csv(windows).error(), &["line 4"]);
+        assert_says(&csv(windows.replace("\r\n\r\n", "\r\n")).error(), &["line 3"]);
+    }
+
+    #[test]
+    fn infinity_is_refused() {
+        let message = csv(rows("0,0,0,9.8\n1,0,0,-inf\n")).error();
+        assert_says(&message, &["line 3, column `acc_z`", "`-inf`", "expected a finite", "leave it empty"]);
+    }
+
+    #[test]
+    fn a_line_with_another_number_of_fields_is_refused() {
+        let few = csv(rows("0,0,0,9.8\n1,0,0\n2,0,0,9.8\n")).error();
+        assert_says(&few, &["run.csv, line 3", "found 3 fields, expected 4", "correct or remove"]);
+        assert_says(&csv(rows("0,0,0,9.8,5\n")).error(), &["line 2", "found 5 fields"]);
+        // A line end says that the line was meant so.
+        assert_says(&csv(rows("0,0,0,9.8\n1,0\n")).error(), &["line 3", "found 2 fields"]);
+    }
+
+    #[test]
+    fn a_cut_last_line_is_dropped_with_a_warning() {
+        for cut in ["1,0", "1,0,0,", "1,0,0,-", "1", "1,0,0,9e"] {
+            let fixture = csv(rows(&format!("0,0,0,9.8\n{cut}")));
+            assert_eq!(fixture.read().rows(), 1, "{cut}");
+            assert_says(
+                &fixture.warnings()[0],
+                &["run.csv, line 3", "of 4 whole fields", "dropped", "again"],
+            );
+        }
+    }
+
+    #[test]
+    fn a_whole_last_line_without_line_end_is_kept_with_a_warning() {
+        let fixture = csv(rows("0,0,0,9.8\n1,0,0,9.8"));
+        assert_eq!(fixture.read().rows(), 2);
+        assert_says(&fixture.warnings()[0], &["line 3", "no line end", "`9.8`", "column `acc_z`"]);
+    }
+
+    #[test]
+    fn a_stray_quote_that_swallows_lines_is_no_cut_line() {
+        let message = csv(rows("0,0,0,9.8\n1,0,0,\"9.8\n2,0,0,9.8\n3,0,0,9.8")).error();
+        assert_says(&message, &["line 3"]);
+    }
+
+    #[test]
+    fn a_missing_file_and_another_ending_are_refused() {
+        let fixture = csv(rows("0,0,0,9.8\n"));
+        let read = |name: &str| {
+            crate::recording::Recording::read(&fixture.folder.path().join(name)).unwrap_err().to_string()
+        };
+        assert_says(&read("none.csv"), &["none.csv", "no such file", "check the path"]);
+        assert_says(&read("run.toml"), &["run.toml", "`.toml`", "expected .csv", "give the samples file"]);
+    }
+}

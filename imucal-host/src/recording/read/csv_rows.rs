@@ -1,0 +1,187 @@
+//! The rows of a CSV text, one at a time, none longer than the limits allow.
+
+use std::path::Path;
+
+use csv_core::{ReadRecordResult, Reader};
+
+use super::text::Text;
+use crate::{
+    file::{Limits, limits::Size},
+    recording::read_error::ReadError,
+};
+
+/// Room for a row at first; it grows up to the limits.
+const ROOM: usize = 1 << 10;
+
+/// Rows, and the last of them that was read.
+pub(crate) struct Rows<'a> {
+    path: &'a Path,
+    pub(crate) text: Text<'a>,
+    limits: &'a Limits,
+    reader: Reader,
+    bytes: Vec<u8>,
+    ends: Vec<usize>,
+    fields: usize,
+    /// Line of the next byte, from 1.
+    next_line: u64,
+    /// Line of the row, from 1.
+    pub(crate) line: u64,
+    /// The text ended within the row: its line has no end.
+    pub(crate) cut: bool,
+}
+
+impl<'a> Rows<'a> {
+    pub(crate) fn open(path: &'a Path, limits: &'a Limits) -> Result<Self, ReadError> {
+        Ok(Self {
+            path,
+            text: Text::open(path, limits)?,
+            limits,
+            reader: Reader::new(),
+            bytes: vec![0; ROOM.min(limits.line())],
+            ends: vec![0; ROOM.min(limits.columns)],
+            fields: 0,
+            next_line: 1,
+            line: 1,
+            cut: false,
+        })
+    }
+
+    /// Reads the next row that is not blank; false at the end of the text.
+    pub(crate) fn advance(&mut self) -> Result<bool, ReadError> {
+        self.skip_blank_lines()?;
+        self.line = self.next_line;
+        let (mut length, mut fields) = (0, 0);
+        loop {
+            let input = self.text.next()?;
+            let at_end = input.is_empty();
+            let (result, read, written, ended) =
+                self.reader.read_record(input, &mut self.bytes[length..], &mut self.ends[fields..]);
+            self.next_line += count_lines(&input[..read]);
+            self.text.consume(read);
+            (length, fields) = (length + written, fields + ended);
+            match result {
+                ReadRecordResult::InputEmpty => {}
+                ReadRecordResult::OutputFull => self.make_room()?,
+                ReadRecordResult::OutputEndsFull => self.make_room_for_fields()?,
+                ReadRecordResult::End => return Ok(false),
+                ReadRecordResult::Record => {
+                    self.fields = fields;
+                    // A stray quote swallows lines; that is no cut.
+                    self.cut = at_end && !self.text.ends_line() && !self.bytes[..length].contains(&b'\n');
+                    return Ok(true);
+                }
+            }
+        }
+    }
+
+    /// Number of fields of the row.
+    pub(crate) fn len(&self) -> usize {
+        self.fields
+    }
+
+    /// A field of the row, without its quotes; nothing beyond the last.
+    pub(crate) fn field(&self, index: usize) -> &[u8] {
+        let start = index.checked_sub(1).map_or(0, |before| self.ends[before]);
+        if index < self.fields { &self.bytes[start..self.ends[index]] } else { &[] }
+    }
+
+    /// The fields of the row in their order.
+    pub(crate) fn fields(&self) -> impl Iterator<Item = &[u8]> {
+        (0..self.fields).map(|index| self.field(index))
+    }
+
+    /// The parser skips them too, but does not say how many there were.
+    fn skip_blank_lines(&mut self) -> Result<(), ReadError> {
+        loop {
+            let input = self.text.next()?;
+            let blank = input.iter().take_while(|byte| matches!(byte, b'\n' | b'\r')).count();
+            if blank == 0 {
+                return Ok(());
+            }
+            self.next_line += count_lines(&input[..blank]);
+            self.text.consume(blank);
+        }
+    }
+
+    fn make_room(&mut self) -> Result<(), ReadError> {
+        let limit = self.limits.line();
+        if self.bytes.len() >= limit {
+            let path = self.path.to_path_buf();
+            return Err(ReadError::LineTooLong { path, line: self.line, limit: Size(limit as u64) });
+        }
+        self.bytes.resize((2 * self.bytes.len()).min(limit), 0);
+        Ok(())
+    }
+
+    fn make_room_for_fields(&mut self) -> Result<(), ReadError> {
+        let limit = self.limits.columns;
+        if self.ends.len() >= limit {
+            return Err(ReadError::TooManyColumns { path: self.path.to_path_buf(), line: self.line, limit });
+        }
+        self.ends.resize((2 * self.ends.len()).min(limit), 0);
+        Ok(())
+    }
+}
+
+fn count_lines(bytes: &[u8]) -> u64 {
+    bytes.iter().filter(|byte| **byte == b'\n').count() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::text::tests::packed;
+    use crate::{
+        file::Limits,
+        recording::{
+            Recording,
+            fixture::{Fixture, assert_says, csv},
+        },
+    };
+
+    const SMALL: Limits = Limits { size: 1 << 14, columns: 10 };
+
+    fn error(fixture: &Fixture) -> String {
+        Recording::read_within(&fixture.path, &SMALL).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_line_that_does_not_end_is_refused_at_its_limit() {
+        for text in ["0".repeat(700), format!("t,temp\n\n0,{}\n", "0".repeat(700))] {
+            assert_says(
+                &error(&csv(&text)),
+                &["longer than 640 bytes", "raise the limit with --max-columns"],
+            );
+        }
+        assert_says(&error(&csv(format!("t\n\n{}", "0".repeat(700)))), &["run.csv, line 3"]);
+    }
+
+    #[test]
+    fn more_columns_than_allowed_are_refused() {
+        let message = error(&csv(",".repeat(10)));
+        assert_says(&message, &["run.csv, line 1", "more than 10 columns", "--max-columns"]);
+        let known = "t,acc_x,acc_y,acc_z,a,b,c,d,e,f\n0,0,0,9.8,,,,,,\n";
+        assert_eq!(Recording::read_within(&csv(known).path, &SMALL).unwrap().extra.len(), 6);
+    }
+
+    #[test]
+    fn a_text_beyond_its_limit_is_refused_also_when_compressed() {
+        let text = "\n".repeat(1 << 15);
+        let found = ["more than 16 KiB", "raise the limit with --max-size"];
+        assert_says(&error(&csv(&text)), &found);
+        assert_says(&error(&Fixture::new("run.csv.gz", "", packed(&text))), &found);
+    }
+
+    #[test]
+    fn samples_are_counted_by_the_memory_that_they_take() {
+        // 5 bytes of text a row, and 40 bytes of numbers and line.
+        let rows: String = (0..1000).map(|row| format!("{}{:02},,,\n", row / 100, row % 100)).collect();
+        let text = format!("t,acc_x,acc_y,acc_z\n{rows}");
+        assert!(text.len() < 1 << 14);
+        assert_says(&error(&csv(&text)), &["samples", "more than 16 KiB", "--max-size"]);
+        let half = &text[..text.len() / 3];
+        assert!(Recording::read_within(&csv(half).path, &SMALL).is_ok());
+        // An empty text has no character, and takes memory all the same.
+        let extra: String = (0..200).map(|row| format!("{row},,,\n")).collect();
+        assert_says(&error(&csv(format!("t,a,b,c\n{extra}"))), &["samples", "more than 16 KiB"]);
+    }
+}

@@ -1,0 +1,355 @@
+//! Samples as Parquet: the columns of the CSV, numbers as doubles, unknown columns as text.
+
+use std::{cell::Cell, fs::File, io, path::Path, sync::Arc};
+
+use ::parquet::{
+    basic::{Compression, ConvertedType, Repetition, Type as Physical},
+    column::reader::{ColumnReader, ColumnReaderImpl},
+    data_type::{ByteArray, ByteArrayType, DataType, DoubleType},
+    errors::ParquetError,
+    file::{
+        metadata::ParquetMetaData,
+        properties::WriterProperties,
+        reader::{FileReader, RowGroupReader, SerializedFileReader},
+        writer::SerializedFileWriter,
+    },
+    schema::types::{ColumnDescriptor, Type},
+};
+
+use super::columns::{KNOWN, Layout, NAMES, Table, Target};
+use crate::{
+    file::{Limits, limits::Size},
+    recording::{place::Places, read_error::ReadError},
+};
+
+/// Reads the samples of a Parquet file in file units; columns may be doubles, floats or integers.
+pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Table, ReadError> {
+    let file = File::open(path)
+        .map_err(|cause| ReadError::Unreadable { path: path.to_path_buf(), found: cause.to_string() })?;
+    let damaged = |cause: ParquetError| damaged(path, &cause);
+    let reader = SerializedFileReader::new(file).map_err(damaged)?;
+    refuse_too_long(path, reader.metadata(), limits)?;
+    let schema = reader.metadata().file_metadata().schema_descr_ptr();
+    let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
+    let layout = Layout::new(&names.iter().map(String::as_str).collect::<Vec<_>>(), path)?;
+    let rows: u64 = reader.metadata().row_groups().iter().map(|group| group.num_rows().max(0) as u64).sum();
+    let memory = Memory { path, limit: limits.size, taken: Cell::new(0) };
+    memory.take(rows.saturating_mul(layout.row_size() as u64));
+    memory.check()?;
+    let mut table = layout.table(rows as usize, Places::Rows);
+    for group in 0..reader.num_row_groups() {
+        let group = reader.get_row_group(group).map_err(damaged)?;
+        for (at, target) in layout.targets.iter().enumerate() {
+            let descriptor = &schema.column(at);
+            let column = ColumnOfGroup { path, at, group: group.as_ref(), descriptor, memory: &memory };
+            match *target {
+                Target::Known(slot) => column.append_numbers(&mut table.columns[slot])?,
+                Target::Extra(extra) => column.append_texts(&mut table.extra[extra].values)?,
+            }
+        }
+    }
+    refuse_infinite(path, &table)?;
+    Ok(table)
+}
+
+fn damaged(path: &Path, cause: &ParquetError) -> ReadError {
+    ReadError::Damaged {
+        path: path.to_path_buf(),
+        found: cause.to_string(),
+        expected: "an intact Parquet file",
+    }
+}
+
+fn refuse_infinite(path: &Path, table: &Table) -> Result<(), ReadError> {
+    for (slot, column) in table.columns.iter().enumerate() {
+        if let Some(row) = column.iter().position(|value| value.is_infinite()) {
+            return Err(ReadError::Infinite {
+                path: path.to_path_buf(),
+                place: table.places.of(row),
+                column: NAMES[slot].to_owned(),
+                found: column[row].to_string(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// What the file says of itself, before anything is made of it.
+fn refuse_too_long(path: &Path, found: &ParquetMetaData, limits: &Limits) -> Result<(), ReadError> {
+    if found.file_metadata().schema_descr().num_columns() > limits.columns {
+        let (path, limit) = (path.to_path_buf(), limits.columns);
+        return Err(ReadError::TooManyColumns { path, line: 1, limit });
+    }
+    let sizes = found.row_groups().iter().flat_map(|group| group.columns());
+    let size = sizes.fold(0u64, |sum, column| sum.saturating_add(column.uncompressed_size().max(0) as u64));
+    if size > limits.size {
+        return Err(ReadError::TooLong { path: path.to_path_buf(), limit: Size(limits.size) });
+    }
+    Ok(())
+}
+
+/// Bytes that the samples take in memory, against those they may take.
+struct Memory<'a> {
+    path: &'a Path,
+    limit: u64,
+    taken: Cell<u64>,
+}
+
+impl Memory<'_> {
+    /// Counts so many more; whether they are allowed.
+    fn take(&self, bytes: u64) -> bool {
+        self.taken.set(self.taken.get().saturating_add(bytes));
+        self.taken.get() <= self.limit
+    }
+
+    fn check(&self) -> Result<(), ReadError> {
+        if self.take(0) {
+            return Ok(());
+        }
+        Err(ReadError::TooManySamples { path: self.path.to_path_buf(), limit: Size(self.limit) })
+    }
+}
+
+/// One column of one row group.
+struct ColumnOfGroup<'a> {
+    path: &'a Path,
+    at: usize,
+    group: &'a dyn RowGroupReader,
+    descriptor: &'a ColumnDescriptor,
+    memory: &'a Memory<'a>,
+}
+
+impl ColumnOfGroup<'_> {
+    fn append_numbers(&self, out: &mut Vec<f64>) -> Result<(), ReadError> {
+        // A decimal's integers are not its values.
+        if self.descriptor.converted_type() == ConvertedType::DECIMAL {
+            return Err(self.type_error());
+        }
+        match self.reader()? {
+            ColumnReader::DoubleColumnReader(column) => self.append(column, out, |v| v, f64::NAN),
+            ColumnReader::FloatColumnReader(column) => self.append(column, out, f64::from, f64::NAN),
+            ColumnReader::Int32ColumnReader(column) => self.append(column, out, f64::from, f64::NAN),
+            ColumnReader::Int64ColumnReader(column) => self.append(column, out, |v| v as f64, f64::NAN),
+            _ => Err(self.type_error()),
+        }
+    }
+
+    fn append_texts(&self, out: &mut Vec<String>) -> Result<(), ReadError> {
+        let none = String::new();
+        match self.reader()? {
+            ColumnReader::BoolColumnReader(column) => self.append(column, out, |v| v.to_string(), none),
+            ColumnReader::Int32ColumnReader(column) => self.append(column, out, |v| v.to_string(), none),
+            ColumnReader::Int64ColumnReader(column) => self.append(column, out, |v| v.to_string(), none),
+            ColumnReader::FloatColumnReader(column) => self.append(column, out, |v| v.to_string(), none),
+            ColumnReader::DoubleColumnReader(column) => self.append(column, out, |v| v.to_string(), none),
+            ColumnReader::ByteArrayColumnReader(column) => {
+                // A dictionary may repeat a long text in few bytes.
+                let text = |v: ByteArray| match self.memory.take(v.len() as u64) {
+                    true => String::from_utf8_lossy(v.data()).into_owned(),
+                    false => String::new(),
+                };
+                self.append(column, out, text, none)?;
+                self.memory.check()
+            }
+            _ => Err(self.type_error()),
+        }
+    }
+
+    fn reader(&self) -> Result<ColumnReader, ReadError> {
+        if self.descriptor.max_rep_level() > 0 {
+            return Err(self.type_error());
+        }
+        self.group.get_column_reader(self.at).map_err(|cause| damaged(self.path, &cause))
+    }
+
+    fn type_error(&self) -> ReadError {
+        let converted = match self.descriptor.converted_type() {
+            ConvertedType::NONE => String::new(),
+            converted => format!(" ({converted})"),
+        };
+        ReadError::ColumnType {
+            path: self.path.to_path_buf(),
+            column: self.descriptor.path().string(),
+            found: format!("{}{converted}", self.descriptor.physical_type()),
+        }
+    }
+
+    /// Appends the group's rows; null becomes `none`.
+    fn append<T: DataType, V: Clone>(
+        &self,
+        mut column: ColumnReaderImpl<T>,
+        out: &mut Vec<V>,
+        convert: impl Fn(T::T) -> V,
+        none: V,
+    ) -> Result<(), ReadError> {
+        let rows = usize::try_from(self.group.metadata().num_rows()).unwrap_or(0);
+        let whole = self.descriptor.max_def_level();
+        let (mut values, mut levels) = (Vec::new(), Vec::new());
+        let mut done = 0;
+        while done < rows {
+            let levels = (whole > 0).then_some(&mut levels);
+            let (records, ..) = column
+                .read_records(rows - done, levels, None, &mut values)
+                .map_err(|cause| damaged(self.path, &cause))?;
+            if records == 0 {
+                let cause = ParquetError::General(format!("{done} of {rows} rows in a row group"));
+                return Err(damaged(self.path, &cause));
+            }
+            done += records;
+        }
+        if whole == 0 {
+            out.extend(values.into_iter().map(convert));
+            return Ok(());
+        }
+        let mut values = values.into_iter();
+        out.extend(levels.iter().map(|level| {
+            let value = if *level == whole { values.next() } else { None };
+            value.map_or_else(|| none.clone(), &convert)
+        }));
+        Ok(())
+    }
+}
+
+/// The columns of a table as Parquet; what was not measured is NaN.
+pub(crate) fn write(table: &Table, rows: usize, out: &mut (impl io::Write + Send)) -> io::Result<()> {
+    write_group(table, rows, out).map_err(io::Error::other)
+}
+
+fn write_group(table: &Table, rows: usize, out: &mut (impl io::Write + Send)) -> Result<(), ParquetError> {
+    let present: Vec<usize> = (0..KNOWN).filter(|slot| !table.columns[*slot].is_empty()).collect();
+    let mut fields = Vec::new();
+    for slot in &present {
+        fields.push(field(NAMES[*slot], Physical::DOUBLE, ConvertedType::NONE)?);
+    }
+    for column in &table.extra {
+        fields.push(field(&column.name, Physical::BYTE_ARRAY, ConvertedType::UTF8)?);
+    }
+    let schema = Arc::new(Type::group_type_builder("recording").with_fields(fields).build()?);
+    let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
+    let mut writer = SerializedFileWriter::new(out, schema, Arc::new(properties))?;
+    let mut group = writer.next_row_group()?;
+    for slot in &present {
+        let Some(mut column) = group.next_column()? else {
+            break;
+        };
+        column.typed::<DoubleType>().write_batch(&table.columns[*slot][..rows], None, None)?;
+        column.close()?;
+    }
+    for extra in &table.extra {
+        let Some(mut column) = group.next_column()? else {
+            break;
+        };
+        let texts: Vec<ByteArray> = extra.values.iter().map(|text| text.as_str().into()).collect();
+        column.typed::<ByteArrayType>().write_batch(&texts, None, None)?;
+        column.close()?;
+    }
+    group.close()?;
+    writer.close().map(|_| ())
+}
+
+fn field(name: &str, physical: Physical, converted: ConvertedType) -> Result<Arc<Type>, ParquetError> {
+    Type::primitive_type_builder(name, physical)
+        .with_repetition(Repetition::REQUIRED)
+        .with_converted_type(converted)
+        .build()
+        .map(Arc::new)
+}
+
+#[cfg(test)]
+mod tests {
+    use ::parquet::data_type::{FloatType, Int64Type};
+
+    use super::*;
+    use crate::recording::{
+        Recording,
+        fixture::{Fixture, assert_says},
+    };
+
+    /// Nullable floats, integers and a text, as other programs write them.
+    fn foreign() -> Vec<u8> {
+        let field = |name, physical| {
+            Arc::new(
+                Type::primitive_type_builder(name, physical)
+                    .with_repetition(Repetition::OPTIONAL)
+                    .build()
+                    .unwrap(),
+            )
+        };
+        let fields = vec![
+            field("t", Physical::INT64),
+            field("acc_x", Physical::FLOAT),
+            field("acc_y", Physical::FLOAT),
+            field("acc_z", Physical::INT64),
+        ];
+        let schema = Arc::new(Type::group_type_builder("schema").with_fields(fields).build().unwrap());
+        let mut bytes = Vec::new();
+        let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::default()).unwrap();
+        for start in [0i64, 2] {
+            let mut group = writer.next_row_group().unwrap();
+            for at in 0..4 {
+                let mut column = group.next_column().unwrap().unwrap();
+                match at {
+                    0 => column.typed::<Int64Type>().write_batch(&[start, start + 1], Some(&[1, 1]), None),
+                    3 => column.typed::<Int64Type>().write_batch(&[10, 9], Some(&[1, 1]), None),
+                    _ => column.typed::<FloatType>().write_batch(&[0.5], Some(&[0, 1]), None),
+                }
+                .unwrap();
+                column.close().unwrap();
+            }
+            group.close().unwrap();
+        }
+        writer.close().unwrap();
+        bytes
+    }
+
+    #[test]
+    fn nullable_floats_and_integers_in_several_groups_are_read() {
+        let recording = Fixture::new("run.parquet", "", foreign()).read();
+        assert_eq!(recording.time, [0.0, 1.0, 2.0, 3.0]);
+        let acc = recording.acc.unwrap().values;
+        assert!(acc[0].x.is_nan() && acc[2].y.is_nan());
+        assert_eq!((acc[1].x, acc[3].y, acc[2].z), (0.5, 0.5, 10.0));
+    }
+
+    #[test]
+    fn a_damaged_file_and_text_for_numbers_are_refused() {
+        let mut bytes = foreign();
+        bytes.truncate(40);
+        let message = Fixture::new("run.parquet", "", bytes).error();
+        assert_says(&message, &["run.parquet", "damaged", "expected an intact Parquet file", "copy"]);
+
+        let layout = Layout::new(&["t", "speed"], Path::new("a")).unwrap();
+        let mut table = layout.table(1, Places::Rows);
+        table.columns[0].push(0.0);
+        table.extra[0].name = "temp".to_owned();
+        table.extra[0].values.push("warm".to_owned());
+        let mut bytes = Vec::new();
+        write(&table, 1, &mut bytes).unwrap();
+        let message = Fixture::new("run.parquet", "", bytes).error();
+        assert_says(
+            &message,
+            &["run.parquet, column `temp`", "BYTE_ARRAY", "expected floating-point", "f64"],
+        );
+    }
+
+    #[test]
+    fn more_than_the_limits_allow_is_refused_before_it_is_read() {
+        let fixture = Fixture::new("run.parquet", "", foreign());
+        let error = |limits| Recording::read_within(&fixture.path, &limits).unwrap_err().to_string();
+        assert_says(
+            &error(Limits { columns: 3, ..Limits::default() }),
+            &["more than 3 columns", "--max-columns"],
+        );
+        let layout = Layout::new(&["t", "note"], Path::new("a")).unwrap();
+        let mut table = layout.table(0, Places::Rows);
+        table.columns[0] = (0..300).map(f64::from).collect();
+        table.extra[0].values = vec!["long ".repeat(300); 300];
+        let mut bytes = Vec::new();
+        write(&table, 300, &mut bytes).unwrap();
+        assert!(bytes.len() < 1 << 16, "the dictionary keeps one text: {}", bytes.len());
+        let fixture = Fixture::new("run.parquet", "", bytes);
+        let limits = Limits { size: 1 << 16, ..Limits::default() };
+        let message = Recording::read_within(&fixture.path, &limits).unwrap_err().to_string();
+        assert_says(&message, &["run.parquet", "samples that take more than 64 KiB", "--max-size"]);
+    }
+}

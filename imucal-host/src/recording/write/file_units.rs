@@ -1,0 +1,58 @@
+//! From a recording in SI units back to a table in file units.
+
+use crate::recording::{
+    Recording,
+    place::Places,
+    read::{
+        columns::{GIMBAL, KNOWN, REFERENCE, SEGMENT, TEMPERATURE, TIME, Table, slot_of},
+        number::round_to_digits,
+    },
+    sensor_kind::SensorKind,
+    triple::{Nominal, Triple},
+};
+
+/// Digits kept of a converted value: less than a conversion's rounding, more than any sensor has.
+const DIGITS: usize = 14;
+/// Digits kept of a time: microseconds since 1970 have sixteen.
+const TIME_DIGITS: usize = 16;
+
+/// The recording in file units.
+pub(crate) fn table_of(recording: &Recording) -> Table {
+    let units = &recording.manifest.units;
+    let mut columns = vec![Vec::new(); KNOWN];
+    columns[TIME] = converted(recording.time.iter().copied(), units.t.per_si(), TIME_DIGITS);
+    for kind in SensorKind::ALL {
+        if let Some(triple) = recording.sensor(kind) {
+            for axis in 0..3 {
+                columns[slot_of(kind) + axis] = raw(triple, axis);
+            }
+        }
+    }
+    columns[TEMPERATURE] = recording.temperature.clone().unwrap_or_default();
+    for (axis, column) in columns[GIMBAL..REFERENCE].iter_mut().enumerate() {
+        let angles = recording.gimbal.iter().flatten().map(|row| row[axis]);
+        *column = converted(angles, units.gimbal.per_si(), DIGITS);
+    }
+    for (part, column) in columns[REFERENCE..SEGMENT].iter_mut().enumerate() {
+        *column = recording.reference.iter().flatten().map(|row| row[part]).collect();
+    }
+    let label = |label: &Option<i64>| label.map_or(f64::NAN, |label| label as f64);
+    columns[SEGMENT] = recording.segment.iter().flatten().map(label).collect();
+    let extra = recording.extra.clone();
+    Table { columns, extra, places: Places::Rows, warnings: Vec::new() }
+}
+
+fn converted(values: impl Iterator<Item = f64>, per_si: f64, digits: usize) -> Vec<f64> {
+    if per_si == 1.0 {
+        return values.collect();
+    }
+    values.map(|value| round_to_digits(value * per_si, digits)).collect()
+}
+
+fn raw(triple: &Triple, axis: usize) -> Vec<f64> {
+    let values = triple.values.iter().map(|value| value[axis]);
+    if triple.nominal == Nominal::IDENTITY {
+        return values.collect();
+    }
+    values.map(|value| round_to_digits(triple.nominal.to_raw(value), DIGITS)).collect()
+}

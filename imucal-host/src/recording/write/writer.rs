@@ -1,0 +1,253 @@
+//! Writing a recording: back to file units, into the files of a set.
+
+use std::{io, path::Path};
+
+use flate2::{Compression, write::GzEncoder};
+
+use super::file_units::table_of;
+use crate::{
+    file::{Output, OutputError, OutputSet},
+    recording::{
+        Recording,
+        format::Format,
+        manifest::Manifest,
+        read::columns::{GIMBAL, NAMES, REFERENCE, SEGMENT, TEMPERATURE, TIME, Table},
+        sensor_kind::SensorKind,
+        write_error::WriteError,
+    },
+};
+
+/// Writes the samples to `path` and the manifest beside it.
+pub(crate) fn write(recording: &Recording, path: &Path, files: &mut OutputSet) -> Result<(), WriteError> {
+    let format =
+        Format::of(path).map_err(|found| WriteError::UnknownFormat { path: path.to_path_buf(), found })?;
+    check(recording, path)?;
+    let table = table_of(recording);
+    check_table(&table, path)?;
+    let manifest_path = Manifest::path_beside(path)
+        .ok_or_else(|| failed(path, io::Error::other("the name has no ending of a recording")))?;
+    let manifest = recording.manifest.to_toml().map_err(|error| failed(path, io::Error::other(error)))?;
+    write_samples(format, &table, recording.rows(), path, files.create(path)?)?;
+    Ok(files.add(&manifest_path, manifest.as_bytes())?)
+}
+
+fn failed(path: &Path, cause: io::Error) -> WriteError {
+    OutputError::System { path: path.to_path_buf(), cause }.into()
+}
+
+fn write_samples(
+    format: Format,
+    table: &Table,
+    rows: usize,
+    path: &Path,
+    file: &mut Output,
+) -> Result<(), WriteError> {
+    let unwritable = |cause: io::Error| failed(path, cause);
+    match format {
+        Format::Csv => super::csv_writer::write(table, rows, file).map_err(unwritable),
+        Format::CsvGz => {
+            let mut encoder = GzEncoder::new(file, Compression::default());
+            super::csv_writer::write(table, rows, &mut encoder).map_err(unwritable)?;
+            encoder.finish().map(|_| ()).map_err(unwritable)
+        }
+        #[cfg(feature = "parquet")]
+        Format::Parquet => crate::recording::read::parquet::write(table, rows, file).map_err(unwritable),
+        #[cfg(not(feature = "parquet"))]
+        Format::Parquet => Err(WriteError::ParquetNotBuilt { path: path.to_path_buf() }),
+    }
+}
+
+fn check(recording: &Recording, path: &Path) -> Result<(), WriteError> {
+    let fault = |fault| WriteError::Manifest { path: path.to_path_buf(), fault };
+    recording.manifest.check().map_err(fault)?;
+    let expected = recording.rows();
+    for (column, found) in lengths(recording) {
+        if found != expected {
+            return Err(WriteError::RowsDiffer { path: path.to_path_buf(), column, found, expected });
+        }
+    }
+    Ok(())
+}
+
+fn lengths(recording: &Recording) -> Vec<(String, usize)> {
+    let mut lengths = Vec::new();
+    for kind in SensorKind::ALL {
+        lengths
+            .extend(recording.sensor(kind).map(|triple| (kind.columns()[0].to_owned(), triple.values.len())));
+    }
+    let named = |slot: usize| NAMES[slot].to_owned();
+    lengths.extend(recording.temperature.as_ref().map(|column| (named(TEMPERATURE), column.len())));
+    lengths.extend(recording.gimbal.as_ref().map(|column| (named(GIMBAL), column.len())));
+    lengths.extend(recording.reference.as_ref().map(|column| (named(REFERENCE), column.len())));
+    lengths.extend(recording.segment.as_ref().map(|column| (named(SEGMENT), column.len())));
+    lengths.extend(recording.extra.iter().map(|column| (column.name.clone(), column.values.len())));
+    lengths
+}
+
+fn check_table(table: &Table, path: &Path) -> Result<(), WriteError> {
+    let times = &table.columns[TIME];
+    if let Some(at) = times.windows(2).position(|pair| pair[1] <= pair[0] || !pair[1].is_finite()) {
+        let (before, found) = (times[at], times[at + 1]);
+        return Err(WriteError::TimeOrder { path: path.to_path_buf(), row: at + 2, found, before });
+    }
+    for (slot, column) in table.columns.iter().enumerate() {
+        if let Some(at) = column.iter().position(|value| value.is_infinite()) {
+            let column = NAMES[slot].to_owned();
+            return Err(WriteError::Infinite { path: path.to_path_buf(), row: at + 1, column });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use nalgebra::Vector3;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::recording::{
+        ExtraColumn,
+        fixture::{Fixture, assert_says},
+        unit::{AngleUnit, TimeUnit, Unit},
+    };
+
+    /// Three rows in SI units with everything a recording can hold.
+    fn full() -> Recording {
+        let mut recording = Recording::new("run.csv", Manifest::default(), vec![0.0, 0.01, 0.02]);
+        recording.manifest.units.t = TimeUnit::Millisecond;
+        recording.manifest.units.acc = Unit::Gravity;
+        recording.manifest.units.gimbal = AngleUnit::Degree;
+        let values = vec![Vector3::new(0.1, f64::NAN, 9.7), Vector3::new(0.2, 0.0, 9.8), Vector3::z() * 9.9];
+        recording.acc = recording.manifest.triple(SensorKind::Acc, values).ok();
+        recording.temperature = Some(vec![20.0, f64::NAN, 21.5]);
+        recording.gimbal = Some(vec![[0.1, -0.2, 3.0]; 3]);
+        recording.reference = Some(vec![[1.0, 0.0, 0.0, 0.0]; 3]);
+        recording.segment = Some(vec![Some(1), None, Some(-2)]);
+        let values = ["a", "b, \"c\"", ""].map(str::to_owned).to_vec();
+        recording.extra = vec![ExtraColumn { name: "note".to_owned(), values }];
+        recording
+    }
+
+    fn near(a: f64, b: f64) -> bool {
+        (a.is_nan() && b.is_nan()) || (a - b).abs() <= 1e-12 * b.abs()
+    }
+
+    fn assert_same(back: &Recording, recording: &Recording) {
+        assert_eq!(back.manifest, recording.manifest);
+        assert!(back.time.iter().zip(&recording.time).all(|(a, b)| near(*a, *b)));
+        for kind in SensorKind::ALL {
+            let components = |recording: &Recording| -> Option<Vec<f64>> {
+                Some(
+                    recording
+                        .sensor(kind)?
+                        .values
+                        .iter()
+                        .flat_map(|value| [value.x, value.y, value.z])
+                        .collect(),
+                )
+            };
+            let (back, recording) = (components(back), components(recording));
+            assert_eq!(back.as_ref().map(Vec::len), recording.as_ref().map(Vec::len));
+            assert!(back.into_iter().flatten().zip(recording.into_iter().flatten()).all(|(a, b)| near(a, b)));
+        }
+        let angles = |recording: &Recording| recording.gimbal.clone().unwrap_or_default().concat();
+        assert!(angles(back).iter().zip(angles(recording)).all(|(a, b)| near(*a, b)));
+        assert_eq!((&back.segment, &back.extra), (&recording.segment, &recording.extra));
+        assert_eq!(back.reference, recording.reference);
+    }
+
+    fn round_trip(name: &str) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        full().write(&path).unwrap();
+        assert_same(&Recording::read(&path).unwrap(), &full());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+
+    #[test]
+    fn a_recording_reads_back_what_it_writes() {
+        round_trip("run.csv");
+        round_trip("run.csv.gz");
+    }
+
+    #[cfg(feature = "parquet")]
+    #[test]
+    fn a_recording_reads_back_what_it_writes_as_parquet() {
+        round_trip("run.parquet");
+    }
+
+    #[cfg(not(feature = "parquet"))]
+    #[test]
+    fn without_parquet_both_ways_say_what_to_do() {
+        let fixture = Fixture::new("run.parquet", "", "");
+        assert_says(&fixture.error(), &["run.parquet", "expected .csv", "--features parquet"]);
+        let message = full().write(&fixture.path).unwrap_err().to_string();
+        assert_says(&message, &["run.parquet", "expected .csv", "--features parquet"]);
+    }
+
+    #[test]
+    fn counts_stay_integers_and_the_text_the_same() {
+        let sections = "\n[units]\nt = \"us\"\nacc = \"counts\"\n[counts]\nacc = { offset = 32768.0, per_unit = 415.0 }\n";
+        let samples = "t,acc_x,acc_y,acc_z\n29840,33108,33329,36429\n39857,33096,,36437\n";
+        let fixture = Fixture::new("run.csv", sections, samples);
+        let copy = fixture.folder.path().join("copy.csv");
+        fixture.read().write(&copy).unwrap();
+        assert_eq!(fs::read_to_string(copy).unwrap(), samples);
+    }
+
+    #[test]
+    fn a_place_that_cannot_be_written_is_named_and_nothing_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = full().write(&folder.path().join("none/run.csv")).unwrap_err().to_string();
+        assert_says(&missing, &["none/run.csv", "cannot be written", "check the folder"]);
+        fs::create_dir(folder.path().join("run.csv")).unwrap();
+        let taken = full().write(&folder.path().join("run.csv")).unwrap_err().to_string();
+        assert_says(&taken, &["run.csv", "a folder of this name"]);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        let ending = full().write(&folder.path().join("run.txt")).unwrap_err().to_string();
+        assert_says(&ending, &["run.txt", "`.txt`", "expected .csv", "give the file such a name"]);
+    }
+
+    #[test]
+    fn a_recording_that_contradicts_itself_is_not_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        let refused = |change: fn(&mut Recording)| {
+            let mut recording = full();
+            change(&mut recording);
+            recording.write(&path).unwrap_err().to_string()
+        };
+        let short = refused(|recording| recording.segment = Some(vec![None]));
+        assert_says(&short, &["run.csv, column `segment`", "found 1 rows, expected 3", "correct"]);
+        let order = refused(|recording| recording.time[2] = 0.01);
+        assert_says(&order, &["run.csv, row 3, column `t`", "strictly increasing", "sort"]);
+        let infinite = refused(|recording| recording.temperature = Some(vec![0.0, f64::INFINITY, 0.0]));
+        assert_says(&infinite, &["row 2, column `temp`", "infinite", "NaN for not measured"]);
+        let unit = refused(|recording| recording.manifest.units.gyr = Unit::Gauss);
+        assert_says(&unit, &["run.csv", "gyr = \"G\"", "expected rad/s"]);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn any_samples_survive_the_round_trip(
+            values in proptest::collection::vec(prop::array::uniform3(-400.0..400.0f64), 1..20),
+            unit in prop::sample::select(Unit::of(SensorKind::Gyr).to_vec()),
+            start in -1e3..2e9f64,
+        ) {
+            let time = (0..values.len()).map(|row| start.floor() + row as f64 * 0.0625).collect();
+            let mut recording = Recording::new("run.csv", Manifest::default(), time);
+            recording.manifest.units.gyr = unit;
+            recording.manifest.counts.gyr = Some(crate::recording::manifest::Counts { offset: 0.0, per_unit: 7505.75 });
+            let vectors = values.into_iter().map(|value| Vector3::from(value) * 0.1).collect();
+            recording.gyr = recording.manifest.triple(SensorKind::Gyr, vectors).ok();
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("run.csv");
+            recording.write(&path).unwrap();
+            assert_same(&Recording::read(&path).unwrap(), &recording);
+        }
+    }
+}
