@@ -9,7 +9,7 @@ use super::{
     setting::{self, logarithmic},
 };
 use crate::{
-    effect::{Act, CATALOGUE, Effect, Role, class::class},
+    effect::{CATALOGUE, Effect, Part, Role, Spoils, class::class},
     simulator::{
         Dose, Simulation, SimulationError,
         random::{Purpose, Random},
@@ -70,15 +70,13 @@ pub enum Omission {
 
 /// Why an effect is not drawn; `None` for those that are.
 pub fn omission(effect: &Effect) -> Option<Omission> {
-    let ends = |names: &[&str]| names.iter().any(|name| effect.id.ends_with(name));
-    let baseline = ["rig.level_tilt", "rig.heading", "acc.gravity_error", "mag.hard_iron", "mag.soft_iron"];
-    if matches!(effect.act, Act::Triad(..)) || baseline.contains(&effect.id.as_str()) {
-        return Some(Omission::Baseline);
+    match effect.part {
+        _ if effect.absorbed => Some(Omission::Baseline),
+        Part::TriadTerm | Part::RigTerm(_) | Part::Nuisance(_) => Some(Omission::Baseline),
+        Part::Fault(Spoils::Nothing) => Some(Omission::Convention),
+        Part::Fault(Spoils::Passage | Spoils::Repeats) => Some(Omission::NoMean),
+        Part::Fault(Spoils::BeyondLimit) | Part::Candidate | Part::ClockTerm => None,
     }
-    if ends(&[".axis_swap", ".unit_error"]) {
-        return Some(Omission::Convention);
-    }
-    ends(&[".noise_burst", ".stuck_samples"]).then_some(Omission::NoMean)
 }
 
 /// What is sealed.

@@ -6,7 +6,7 @@ use crate::{
     diagnosis::{
         Options, Verdict, diagnose,
         library::{
-            candidates::{Candidates, Setting, is_shaped},
+            candidates::{Candidates, Setting},
             evidence::Projected,
         },
         mixed_model::{
@@ -161,7 +161,7 @@ fn a_signature_that_lasts_from_one_fit_to_the_next_is_the_one_taken_anew() {
         let noise = linear.weighing.white(&fit.residual);
         let about = |before| Linear::new(linear.scene, linear.candidates, &fit, &noise, before).unwrap();
         let (lasting, anew) = (about(Some(&linear)), about(None));
-        for other in linear.candidates.effects.iter().filter(|other| !is_shaped(other)) {
+        for other in linear.candidates.effects.iter().filter(|other| !other.is_shaped()) {
             let columns = |linear: &Linear<'_>| -> Vec<f64> {
                 let of = |(id, channel): (usize, &Channel)| -> Vec<f64> {
                     let at = channel.ids.iter().position(|own| *own == id);

@@ -1,6 +1,6 @@
 //! Successive gimbal axes are not at right angles: `rig.axis_nonorthogonality`.
 
-use super::{Act, Effect, Machine, Parameter, Words};
+use super::{Act, Effect, Machine, Needs, Parameter, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -15,6 +15,7 @@ pub(super) fn effect() -> Effect {
         Parameter::amplitudes(&names, "rad", 1e-3),
         words,
     )
+    .needing(Needs::GIMBALS)
     .like("rig.wobble", "full turns of the outer gimbal at several middle angles")
     .like("rig.encoder_offset", "full turns of the outer gimbal at middle angles of 0 and 90 degrees")
 }

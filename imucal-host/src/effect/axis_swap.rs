@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use super::{Act, DataRun, Effect, Parameter, SensorKind, Words, member_id};
+use super::{Act, DataRun, Effect, Parameter, Part, SensorKind, Spoils, Words, member_id};
 
 /// Orders of the axes; the first changes nothing.
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
@@ -14,6 +14,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         needs: "Input along two axes.",
     };
     Effect::member(kind, "axis_swap", Act::Data(kind, alter), vec![Parameter::choice("code", 47.0)], words)
+        .part(Part::Fault(Spoils::Nothing))
         .like(&member_id(kind, "misalignment"), "its size: a swap is a right angle or more")
 }
 

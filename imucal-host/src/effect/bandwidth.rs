@@ -4,7 +4,7 @@
 //! τ ẏ = x − y      exact for an input that is straight between rows
 //! ```
 
-use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, of};
+use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, of};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -14,6 +14,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     };
     let tau = Parameter::magnitude("tau", "s", of(kind, 5e-3, 4e-3, 0.016), 0.2);
     let effect = Effect::member(kind, "bandwidth", Act::Sensor(kind, alter), vec![tau], words)
+        .needing(Needs::EXACT_ATTITUDE)
         .like("clk.time_offset", "the other triads: one clock makes all of them late alike");
     match kind {
         SensorKind::Acc => effect.like("acc.lever_arm", "sinusoids at several frequencies"),

@@ -1,6 +1,6 @@
 //! Earth's rotation is not that of the model: `gyr.earth_rate`.
 
-use super::{Act, Effect, Parameter, Role, SensorKind, Truth, Words};
+use super::{Act, Effect, Needs, Parameter, Role, SensorKind, Truth, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -11,6 +11,7 @@ pub(super) fn effect() -> Effect {
     let share =
         Parameter { role: Role::Amplitude, range: (-2.0, 2.0), ..Parameter::amplitude("share", "-", 1.0) };
     Effect::new("gyr.earth_rate", Act::Field(alter), vec![share], words)
+        .needing(Needs::HEADING)
         .on(SensorKind::Gyr)
         .like(
             "gyr.g_sensitivity",

@@ -4,7 +4,7 @@
 //! α = a + c₁ cos a + s₁ sin a + c₂ cos 2a + s₂ sin 2a      a: as the encoder says
 //! ```
 
-use super::{Act, Effect, Machine, Parameter, Words};
+use super::{Act, Effect, Machine, Needs, Parameter, Words};
 
 const NAMES: [&str; 12] = [
     "outer_c1",
@@ -28,6 +28,7 @@ pub(super) fn effect() -> Effect {
         needs: "Rests at eight or more angles of each gimbal, around the full turn.",
     };
     Effect::new("rig.encoder_harmonic", Act::Rig(alter), Parameter::amplitudes(&NAMES, "rad", 3e-4), words)
+        .needing(Needs::GIMBALS)
         .like("rig.wobble", "rests at the same outer angles with the table about another axis")
         .like("rig.encoder_offset", "rests around the full turn of each gimbal")
 }

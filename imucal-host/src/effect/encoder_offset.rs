@@ -1,6 +1,6 @@
 //! The encoders' zeros are off: `rig.encoder_offset`.
 
-use super::{Act, Effect, Machine, Parameter, Words};
+use super::{Act, Effect, Machine, Needs, Parameter, Words};
 
 /// Names of the gimbals, outermost first.
 const GIMBALS: [&str; 3] = ["outer", "middle", "inner"];
@@ -12,6 +12,7 @@ pub(super) fn effect() -> Effect {
         needs: "Rests that turn each gimbal while the inner ones stand at several angles.",
     };
     Effect::new("rig.encoder_offset", Act::Rig(alter), Parameter::amplitudes(&GIMBALS, "rad", 1e-3), words)
+        .needing(Needs::GIMBALS)
         .like("P.misalignment", "inner gimbal: none, remounting the unit changes both")
         .like("rig.heading", "outer gimbal: none while the outer axis is vertical")
         .like(

@@ -3,7 +3,7 @@
 use imucal_core::rotation;
 use nalgebra::Vector3;
 
-use super::{Act, Effect, Parameter, SensorKind, Truth, Words};
+use super::{Act, Effect, Free, Parameter, Part, SensorKind, Truth, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -12,6 +12,7 @@ pub(super) fn effect() -> Effect {
         needs: "A magnetometer in three or more attitudes, and the vertical.",
     };
     Effect::new("mag.field_dip", Act::Field(alter), vec![Parameter::amplitude("dip", "rad", 0.03)], words)
+        .part(Part::Nuisance(Free::FieldUnknown))
         .on(SensorKind::Mag)
 }
 

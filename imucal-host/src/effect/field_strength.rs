@@ -1,7 +1,7 @@
 //! The field in the room is stronger than told: `mag.field_strength`, a term of recordings whose site does not tell the
 //! field, beside a calibration made elsewhere.
 
-use super::{Act, Effect, Parameter, SensorKind, Truth, Words};
+use super::{Act, Effect, Free, Parameter, Part, SensorKind, Truth, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -10,7 +10,9 @@ pub(super) fn effect() -> Effect {
         needs: "A calibrated magnetometer.",
     };
     let parameters = vec![Parameter::amplitude("strength", "-", 0.03)];
-    Effect::new("mag.field_strength", Act::Field(alter), parameters, words).on(SensorKind::Mag)
+    Effect::new("mag.field_strength", Act::Field(alter), parameters, words)
+        .part(Part::Nuisance(Free::FieldUnknownTriadGiven))
+        .on(SensorKind::Mag)
 }
 
 fn alter(values: &[f64], row: &mut Truth) {

@@ -6,7 +6,7 @@
 
 use nalgebra::Matrix3;
 
-use super::{Act, Effect, Parameter, SensorKind, Truth, Words, XYZ, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, Truth, Words, XYZ, vector};
 
 pub(super) fn outer() -> Effect {
     effect("outer", Act::Field(|values, row| alter(values, row, |row| row.c_t_o)))
@@ -33,7 +33,9 @@ fn effect(gimbal: &str, act: Act) -> Effect {
         needs: "Rests over the full range of that gimbal with those inside it at several angles.",
     };
     let id = format!("mag.gimbal_hard_iron_{gimbal}");
-    Effect::new(&id, act, Parameter::amplitudes(&XYZ, "uT", 0.5), words).on(SensorKind::Mag)
+    Effect::new(&id, act, Parameter::amplitudes(&XYZ, "uT", 0.5), words)
+        .needing(Needs::GIMBALS)
+        .on(SensorKind::Mag)
 }
 
 fn alter(values: &[f64], row: &mut Truth, frame: impl Fn(&Truth) -> Matrix3<f64>) {

@@ -9,6 +9,7 @@ pub(super) fn effect() -> Effect {
         needs: "Known specific force other than gravity, as of a centrifuge; rests alone cannot show it.",
     };
     Effect::new("acc.gravity_error", Act::Field(alter), vec![Parameter::amplitude("share", "-", 5e-4)], words)
+        .absorbed()
         .on(SensorKind::Acc)
         .like("acc.scale", "a known centripetal acceleration; not data with 1 g alone")
 }

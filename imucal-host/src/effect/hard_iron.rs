@@ -1,6 +1,6 @@
 //! A magnet fixed to the sensor: `mag.hard_iron`.
 
-use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, XYZ, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, XYZ, vector};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -14,6 +14,8 @@ pub(super) fn effect() -> Effect {
         Parameter::amplitudes(&XYZ, "uT", 2.0),
         words,
     )
+    .needing(Needs::OTHER_CALIBRATION)
+    .absorbed()
     .like("mag.bias", "none: the two are the same")
     .like("mag.gimbal_hard_iron_middle", "turns of the inner gimbal; along its axis the two are the same")
 }

@@ -1,6 +1,6 @@
 //! The base does not point north: `rig.heading`.
 
-use super::{Act, Effect, Machine, Parameter, Words};
+use super::{Act, Effect, Machine, Parameter, Part, SensorKind, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -9,6 +9,7 @@ pub(super) fn effect() -> Effect {
         needs: "A magnetometer in rests at several attitudes, and a known direction of the field.",
     };
     Effect::new("rig.heading", Act::Rig(alter), vec![Parameter::amplitude("heading", "rad", 9e-3)], words)
+        .part(Part::RigTerm(&[SensorKind::Mag]))
         .like(
             "rig.encoder_offset",
             "none with a vertical outer axis: the outer encoder's zero is the same angle",

@@ -4,7 +4,7 @@
 //! y(t) → y(t − lag)      straight between rows, held before the first and behind the last
 //! ```
 
-use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, member_id};
+use super::{Act, Effect, Free, Parameter, Part, SensorKind, SensorRun, Words, member_id};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -14,6 +14,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     };
     let lag = Parameter::amplitude("lag", "s", 5e-3);
     Effect::new(&member_id(kind, "lag"), Act::Sensor(kind, alter), vec![lag], words)
+        .part(Part::Nuisance(Free::NoGimbals))
 }
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {

@@ -1,6 +1,6 @@
 //! The base is not level: `rig.level_tilt`.
 
-use super::{Act, Effect, Machine, Parameter, Words};
+use super::{Act, Effect, Machine, Parameter, Part, SensorKind, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -9,6 +9,7 @@ pub(super) fn effect() -> Effect {
         needs: "Rests at four or more outer angles with gravity across the outer axis.",
     };
     Effect::new("rig.level_tilt", Act::Rig(alter), Parameter::amplitudes(&["x", "y"], "rad", 1.7e-3), words)
+        .part(Part::RigTerm(&[SensorKind::Acc, SensorKind::Mag]))
         .like(
             "acc.bias",
             "rests at opposite outer angles: a tilt stays with the room, a bias turns with the table",

@@ -3,7 +3,7 @@
 use imucal_core::triad::Triad;
 use nalgebra::Matrix3;
 
-use super::{Act, Effect, Parameter, SensorKind, Words, member_id};
+use super::{Act, Effect, Parameter, Part, SensorKind, Words, member_id};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -19,6 +19,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         Parameter::amplitudes(&names, "rad", 3e-3),
         words,
     )
+    .part(Part::TriadTerm)
     .like(&member_id(kind, "cross_axis_product"), "inputs of both signs on each pair of axes");
     match kind {
         SensorKind::Mag => effect.like("mag.soft_iron", "none: its symmetric part is the same"),

@@ -48,6 +48,7 @@ mod motor_current;
 mod mounting;
 mod noise_burst;
 mod parameter;
+mod part;
 mod rate_error;
 mod saturation;
 mod scale;
@@ -73,6 +74,7 @@ use SensorKind::{Acc, Gyr, Mag};
 pub use self::{
     machine::{Machine, Swing},
     parameter::{Parameter, Role},
+    part::{Free, Needs, Part, Spoils},
     sensor_run::{DataRun, SensorRun, SignalRun},
     truth::{Input, Truth},
 };
@@ -162,6 +164,19 @@ pub struct Effect {
     pub words: Words,
     /// What it is mistaken for.
     pub confusables: Vec<Confusable>,
+    /// Its part in a diagnosis.
+    pub part: Part,
+    /// What a recording must hold to show it.
+    pub needs: Needs,
+    /// A calibration made of the recording itself takes it up wholly.
+    pub absorbed: bool,
+}
+
+/// Effects are the same if they bear the same name.
+impl PartialEq for Effect {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other) || self.id == other.id
+    }
 }
 
 impl Effect {
@@ -172,7 +187,17 @@ impl Effect {
                 only(kind)
             }
         };
-        Self { id: id.to_owned(), act, sensors, parameters, words, confusables: Vec::new() }
+        Self {
+            id: id.to_owned(),
+            act,
+            sensors,
+            parameters,
+            words,
+            confusables: Vec::new(),
+            part: Part::Candidate,
+            needs: Needs::NOTHING,
+            absorbed: false,
+        }
     }
 
     /// One of a family with a member for each sensor.
@@ -185,9 +210,37 @@ impl Effect {
         self
     }
 
+    fn part(mut self, part: Part) -> Self {
+        self.part = part;
+        self
+    }
+
+    fn needing(mut self, needs: Needs) -> Self {
+        self.needs = needs;
+        self
+    }
+
+    fn absorbed(mut self) -> Self {
+        self.absorbed = true;
+        self
+    }
+
     fn like(mut self, id: &str, parted_by: &'static str) -> Self {
         self.confusables.push(Confusable { id: id.to_owned(), parted_by });
         self
+    }
+
+    /// It is a fault of the recording itself that spoils rows so.
+    pub fn spoils(&self) -> Option<Spoils> {
+        match self.part {
+            Part::Fault(spoils) => Some(spoils),
+            _ => None,
+        }
+    }
+
+    /// Its signature depends on parameters other than amplitudes.
+    pub fn is_shaped(&self) -> bool {
+        self.parameters.iter().any(|p| matches!(p.role, Role::Shape { .. } | Role::Instant { .. }))
     }
 
     /// Parameters that its signature is linear in.

@@ -4,7 +4,7 @@
 //! B += Σ_k C_k_t d_k α̇_k      k: the frame of the motor's stator, p for outer, o for middle, m for inner
 //! ```
 
-use super::{Act, Effect, Parameter, SensorKind, Truth, Words, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, Truth, Words, vector};
 
 const NAMES: [&str; 9] =
     ["outer_x", "outer_y", "outer_z", "middle_x", "middle_y", "middle_z", "inner_x", "inner_y", "inner_z"];
@@ -21,6 +21,7 @@ pub(super) fn effect() -> Effect {
         Parameter::amplitudes(&NAMES, "uT/(rad/s)", 0.2),
         words,
     )
+    .needing(Needs::GIMBALS)
     .on(SensorKind::Mag)
     .like(
         "mag.eddy_current",

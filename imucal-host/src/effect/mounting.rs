@@ -6,7 +6,7 @@
 
 use imucal_core::{rotation, triad::Triad};
 
-use super::{Act, Effect, Parameter, SensorKind, Words, XYZ, member_id, vector};
+use super::{Act, Effect, Free, Parameter, Part, SensorKind, Words, XYZ, member_id, vector};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -16,6 +16,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     };
     let parameters = Parameter::amplitudes(&XYZ, "rad", 0.03);
     Effect::new(&member_id(kind, "mounting"), Act::Triad(kind, alter), parameters, words)
+        .part(Part::Nuisance(Free::NoGimbalsTriadGiven))
 }
 
 fn alter(values: &[f64], triad: &mut Triad<f64>) {

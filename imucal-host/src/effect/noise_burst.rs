@@ -1,6 +1,6 @@
 //! A noisy stretch: `P.noise_burst`.
 
-use super::{Act, Effect, Parameter, SensorKind, SignalRun, Words, member_id};
+use super::{Act, Effect, Parameter, Part, SensorKind, SignalRun, Spoils, Words, member_id};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -14,6 +14,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         Parameter::instant("t_end", 0.6),
     ];
     Effect::member(kind, "noise_burst", Act::Signal(kind, alter), parameters, words)
+        .part(Part::Fault(Spoils::Passage))
         .like(&member_id(kind, "bias_step"), "the mean over the stretch: noise leaves it")
 }
 

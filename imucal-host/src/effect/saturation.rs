@@ -1,6 +1,6 @@
 //! Clipping below full scale: `P.saturation`.
 
-use super::{Act, Effect, Parameter, SensorKind, SignalRun, Words, member_id, of};
+use super::{Act, Effect, Parameter, Part, SensorKind, SignalRun, Spoils, Words, member_id, of};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -10,6 +10,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     };
     let shortfall = Parameter::magnitude("shortfall", "-", of(kind, 6.0, 20.0, 3.0), 1000.0);
     Effect::member(kind, "saturation", Act::Signal(kind, alter), vec![shortfall], words)
+        .part(Part::Fault(Spoils::BeyondLimit))
         .like(&member_id(kind, "scale_cubic"), "the largest values: clipped ones are all the same")
 }
 

@@ -1,6 +1,6 @@
 //! Soft iron fixed to the sensor: `mag.soft_iron`.
 
-use super::{Act, Effect, Parameter, SYMMETRIC, SensorKind, SensorRun, Words, symmetric};
+use super::{Act, Effect, Needs, Parameter, SYMMETRIC, SensorKind, SensorRun, Words, symmetric};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -10,6 +10,8 @@ pub(super) fn effect() -> Effect {
     };
     let act = Act::Sensor(SensorKind::Mag, alter);
     Effect::new("mag.soft_iron", act, Parameter::amplitudes(&SYMMETRIC, "-", 0.01), words)
+        .needing(Needs::OTHER_CALIBRATION)
+        .absorbed()
         .like("mag.scale", "none: it is part of this")
         .like("mag.misalignment", "none: its symmetric part is the same")
 }

@@ -1,6 +1,6 @@
 //! Repeated samples: `P.stuck_samples`.
 
-use super::{Act, DataRun, Effect, Parameter, SensorKind, Words, member_id};
+use super::{Act, DataRun, Effect, Parameter, Part, SensorKind, Spoils, Words, member_id};
 
 /// Rows that repeat the one before them, at a time.
 const LENGTH: usize = 5;
@@ -13,6 +13,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     };
     let share = Parameter::magnitude("share", "-", 0.02, 1.0);
     Effect::member(kind, "stuck_samples", Act::Data(kind, alter), vec![share], words)
+        .part(Part::Fault(Spoils::Repeats))
         .like(&member_id(kind, "bandwidth"), "the samples themselves: repeated ones are equal in all axes")
 }
 

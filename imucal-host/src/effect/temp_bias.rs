@@ -5,7 +5,7 @@
 use imucal_core::{temperature::TemperatureTerms, triad::Triad};
 use nalgebra::Vector3;
 
-use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, of, si, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, of, si, vector};
 
 /// Temperature at which temperature effects vanish, °C.
 pub(super) const REFERENCE: f64 = 25.0;
@@ -18,6 +18,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     };
     let parameters = Parameter::amplitudes(&XYZ, &format!("{}/K", si(kind)), of(kind, 2e-3, 3e-4, 0.02));
     Effect::member(kind, "temp_bias", Act::Sensor(kind, alter), parameters, words)
+        .needing(Needs::THERMOMETER)
         .like(&member_id(kind, "bias_drift"), "heating and then cooling")
         .like(&member_id(kind, "warmup"), "a cooling ramp, then the first attitude again")
         .like(&member_id(kind, "temp_bias_quadratic"), "three or more temperatures")

@@ -4,7 +4,7 @@
 //! y += c (T − 25 °C)²
 //! ```
 
-use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, of, si, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, of, si, vector};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -21,6 +21,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         Parameter::amplitudes(&XYZ, &unit, scale),
         words,
     )
+    .needing(Needs::THERMOMETER)
     .like(&member_id(kind, "temp_bias"), "three or more temperatures")
     .like(&member_id(kind, "bias_drift"), "heating and then cooling")
 }

@@ -5,7 +5,7 @@
 use imucal_core::{temperature::TemperatureTerms, triad::Triad};
 
 use super::{
-    Act, Effect, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, temp_bias::REFERENCE, vector,
+    Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, temp_bias::REFERENCE, vector,
 };
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
@@ -16,6 +16,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     };
     let parameters = Parameter::amplitudes(&XYZ, "1/K", 2e-4);
     Effect::member(kind, "temp_scale", Act::Sensor(kind, alter), parameters, words)
+        .needing(Needs::THERMOMETER)
         .like(&member_id(kind, "temp_bias"), "inputs of both signs at each temperature")
         .like(&member_id(kind, "scale_cubic"), "the same inputs at two temperatures")
 }

@@ -4,7 +4,7 @@
 //! the row of t shows the rig at t + offset
 //! ```
 
-use super::{Act, Effect, Parameter, Words};
+use super::{Act, Effect, Parameter, Part, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -13,6 +13,7 @@ pub(super) fn effect() -> Effect {
         needs: "Motion with changing rate, such as sinusoids or slews.",
     };
     Effect::new("clk.time_offset", Act::Clock(alter), vec![Parameter::amplitude("offset", "s", 5e-3)], words)
+        .part(Part::ClockTerm)
         .like("clk.rate_error", "brisk motion at the beginning and again at the end")
         .like("gyr.angular_acceleration", "the accelerometer: it is late only where the clock is")
         .like("mag.eddy_current", "the gyroscope: it is late only where the clock is")

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{Act, DataRun, Effect, Parameter, SensorKind, Words, member_id, of};
+use super::{Act, DataRun, Effect, Parameter, Part, SensorKind, Spoils, Words, member_id, of};
 use crate::recording::unit::STANDARD_GRAVITY;
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
@@ -22,6 +22,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         ),
     );
     Effect::member(kind, "unit_error", act, vec![power], words)
+        .part(Part::Fault(Spoils::Nothing))
         .like(&member_id(kind, "scale"), "its size: a wrong unit is off by a known factor")
 }
 

@@ -6,7 +6,7 @@
 //!
 //! Twice a turn: a wobble of once a turn is a constant skew, see `rig.axis_nonorthogonality`.
 
-use super::{Act, Effect, Machine, Parameter, Words};
+use super::{Act, Effect, Machine, Needs, Parameter, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -16,6 +16,7 @@ pub(super) fn effect() -> Effect {
     };
     let names = ["u_cos", "u_sin", "v_cos", "v_sin"];
     Effect::new("rig.wobble", Act::Rig(alter), Parameter::amplitudes(&names, "rad", 3e-4), words)
+        .needing(Needs::GIMBALS)
         .like("rig.axis_nonorthogonality", "full turns of the outer gimbal at several middle angles")
         .like("rig.encoder_offset", "full turns of the outer gimbal at several middle angles")
         .like("rig.encoder_harmonic", "rests at the same outer angles with the table about another axis")

@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 use nalgebra::Vector3;
 
 use crate::{
-    effect::{Act, Effect, Parameter, Role, Words},
+    effect::{Act, Effect, Needs, Parameter, Part, Role, Words},
     recording::SensorKind,
 };
 
@@ -58,7 +58,17 @@ fn mechanism(
         SensorKind::Mag => &[SensorKind::Mag],
     };
     let words = Words { cause, remedy: "", needs: "" };
-    Effect { id: format!("outside.{kind}.{name}"), act, sensors, parameters, words, confusables: Vec::new() }
+    Effect {
+        id: format!("outside.{kind}.{name}"),
+        act,
+        sensors,
+        parameters,
+        words,
+        confusables: Vec::new(),
+        part: Part::Candidate,
+        needs: Needs::NOTHING,
+        absorbed: false,
+    }
 }
 
 /// Amplitudes that a size of one makes this large; none is implausible.

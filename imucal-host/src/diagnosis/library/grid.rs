@@ -4,12 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{
-    candidates::{Candidates, is_shaped},
-    grid_posterior::Shaped,
-    nonlinear,
-    nonlinear::Backdrop,
-};
+use super::{candidates::Candidates, grid_posterior::Shaped, nonlinear, nonlinear::Backdrop};
 use crate::{
     diagnosis::{
         mixed_model::{
@@ -76,11 +71,11 @@ impl<'s> Scan<'s> {
             None => nonlinear::best(effect, &self.coarse, &backdrop),
         };
         let shape = |(at, effect): (usize, &&'static Effect)| {
-            let held = beside.doses.iter().find(|dose| std::ptr::eq(dose.effect, *effect));
+            let held = beside.doses.iter().find(|dose| dose.effect == *effect);
             let held = held.map(|dose| Shaped { values: dose.values.clone(), spread: spread(at) });
             match held.or_else(|| kept(at)) {
                 Some(shape) => Some(shape),
-                None if is_shaped(effect) => best(effect),
+                None if effect.is_shaped() => best(effect),
                 None => Some(Shaped::alone(effect.neutral(scene.duration()))),
             }
         };

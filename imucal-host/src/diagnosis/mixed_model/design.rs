@@ -35,7 +35,7 @@ pub struct Column {
 impl Column {
     /// It belongs to this effect.
     pub fn is_of(&self, effect: &Effect) -> bool {
-        std::ptr::eq(self.effect, effect)
+        self.effect == effect
     }
 }
 

@@ -73,7 +73,7 @@ impl<'s> Reference<'s> {
         shape: &[f64],
     ) -> Option<Arc<Means>> {
         // What the run holds is altered where it stands.
-        let is_held = self.doses.iter().any(|dose| std::ptr::eq(dose.effect, effect));
+        let is_held = self.doses.iter().any(|dose| dose.effect == effect);
         let bits = shape.iter().filter(|_| !is_held).map(|value| value.to_bits()).collect();
         let key = (effect.id.as_str(), parameter, bits);
         let locked = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
@@ -91,7 +91,7 @@ impl<'s> Reference<'s> {
         let scale = effect.parameters.get(parameter)?.prior_scale;
         let mut doses = self.doses.clone();
         let step = step(effect.parameters.get(parameter)?);
-        match doses.iter_mut().find(|dose| std::ptr::eq(dose.effect, effect)) {
+        match doses.iter_mut().find(|dose| dose.effect == effect) {
             Some(dose) => *dose.values.get_mut(parameter)? += step,
             None => {
                 let mut values = neutral.to_vec();
@@ -103,7 +103,7 @@ impl<'s> Reference<'s> {
             Act::Rig(_) | Act::Clock(_) => {
                 self.scene.outputs(&doses, effect.sensors, &self.scene.inputs(&doses, self.nodes))?
             }
-            Act::Field(alter) if !self.doses.iter().any(|dose| std::ptr::eq(dose.effect, effect)) => {
+            Act::Field(alter) if !self.doses.iter().any(|dose| dose.effect == effect) => {
                 // Field effects come after all that moves the rig; their order among themselves is of second order.
                 let values = &doses.last()?.values;
                 let altered = |row: &Truth| {

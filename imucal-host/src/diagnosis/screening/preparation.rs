@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     diagnosis::reference::{model::Model, movement, movement::Reference, rest_to_rest::Held, revisits},
-    effect::{Act, DataRun, Effect, axis_swap},
+    effect::{Act, DataRun, Effect, Spoils, axis_swap},
     recording::{
         Recording, SensorKind, Triple,
         check::{integrity, integrity::Integrity},
@@ -145,8 +145,7 @@ fn noise(triple: &Triple) -> f64 {
 /// What the samples of a data effect are of those before it, where that is linear: a column an axis.
 fn response(effect: &Effect, values: &[f64]) -> Option<Matrix3<f64>> {
     let Act::Data(_, alter) = effect.act else { return None };
-    let linear = effect.id.ends_with(".axis_swap") || effect.id.ends_with(".unit_error");
-    linear.then(|| {
+    (effect.spoils() == Some(Spoils::Nothing)).then(|| {
         let mut samples = [Vector3::x(), Vector3::y(), Vector3::z()];
         alter(values, &mut DataRun { samples: &mut samples });
         Matrix3::from_columns(&samples)
@@ -156,38 +155,41 @@ fn response(effect: &Effect, values: &[f64]) -> Option<Matrix3<f64>> {
 /// Rows that a fault has spoilt are not used.
 pub fn leave_out(finding: &Finding, recording: &Recording, kind: SensorKind, usable: &mut [bool]) {
     let Some(triple) = recording.sensor(kind) else { return };
-    if finding.effect.id.ends_with(".stuck_samples") {
-        for (usable, pair) in usable.iter_mut().skip(1).zip(triple.values.windows(2)) {
-            *usable &= pair[0] != pair[1];
-        }
-    }
-    if finding.effect.id.ends_with(".saturation")
-        && let (Some(shortfall), Some(full_scale)) =
-            (finding.parameters.first().and_then(|amount| amount.value), triple.full_scale_si())
-    {
-        // Just below the limit noise is clipped on one side; and to choose samples by their noise would be a bias as well.
-        let most = full_scale / (1.0 + shortfall) - CLIPPED * noise(triple);
-        let beyond: Vec<f64> = (triple.values.iter().zip(&recording.time))
-            .filter(|(value, _)| value.amax() >= most)
-            .map(|(_, time)| *time)
-            .collect();
-        for (usable, time) in usable.iter_mut().zip(&recording.time) {
-            let next = beyond.partition_point(|beyond| *beyond < time - BESIDE);
-            *usable &= beyond.get(next).is_none_or(|beyond| *beyond > time + BESIDE);
-        }
-    }
-    if finding.effect.id.ends_with(".noise_burst") {
-        let time = |name: &str| {
-            let amount = finding.parameters.iter().find(|amount| amount.name == name);
-            amount.and_then(|amount| amount.value)
-        };
-        if let Some(start) = time("t_start") {
-            // Without an end it goes on to that of the recording.
-            let end = time("t_end").unwrap_or(f64::INFINITY);
-            for (usable, time) in usable.iter_mut().zip(&recording.time) {
-                *usable &= !(start..end).contains(time);
+    match finding.effect.spoils() {
+        Some(Spoils::Repeats) => {
+            for (usable, pair) in usable.iter_mut().skip(1).zip(triple.values.windows(2)) {
+                *usable &= pair[0] != pair[1];
             }
         }
+        Some(Spoils::BeyondLimit) => leave_out_clipped(finding, &recording.time, triple, usable),
+        Some(Spoils::Passage) => leave_out_passage(finding, &recording.time, usable),
+        Some(Spoils::Nothing) | None => {}
+    }
+}
+
+fn leave_out_clipped(finding: &Finding, time: &[f64], triple: &Triple, usable: &mut [bool]) {
+    let shortfall = finding.parameters.first().and_then(|amount| amount.value);
+    let Some((shortfall, full_scale)) = shortfall.zip(triple.full_scale_si()) else { return };
+    // Just below the limit noise is clipped on one side; and to choose samples by their noise would be a bias as well.
+    let most = full_scale / (1.0 + shortfall) - CLIPPED * noise(triple);
+    let is_beyond = |(value, _): &(&Vector3<f64>, &f64)| value.amax() >= most;
+    let beyond: Vec<f64> = triple.values.iter().zip(time).filter(is_beyond).map(|(_, time)| *time).collect();
+    for (usable, time) in usable.iter_mut().zip(time) {
+        let next = beyond.partition_point(|beyond| *beyond < time - BESIDE);
+        *usable &= beyond.get(next).is_none_or(|beyond| *beyond > time + BESIDE);
+    }
+}
+
+fn leave_out_passage(finding: &Finding, time: &[f64], usable: &mut [bool]) {
+    let value = |name: &str| {
+        let amount = finding.parameters.iter().find(|amount| amount.name == name);
+        amount.and_then(|amount| amount.value)
+    };
+    let Some(start) = value("t_start") else { return };
+    // Without an end it goes on to that of the recording.
+    let passage = start..value("t_end").unwrap_or(f64::INFINITY);
+    for (usable, time) in usable.iter_mut().zip(time) {
+        *usable &= !passage.contains(time);
     }
 }
 

@@ -103,10 +103,11 @@ impl<'s> Linear<'s> {
         let spread = |at: usize| known(at).map_or(0.0, |shape| shape.spread);
         let kept = |at: usize| known(at).filter(|_| lasts(candidates.effects[at])).cloned();
         let shapes = scan.shapes(&beside, noise, &spread, &kept)?;
-        let (old, new): (Vec<&'static Effect>, Vec<&'static Effect>) =
-            candidates.effects.iter().copied().partition(|effect| {
-                lasts(effect) && fit.doses.iter().all(|dose| !std::ptr::eq(dose.effect, *effect))
-            });
+        let (old, new): (Vec<&'static Effect>, Vec<&'static Effect>) = candidates
+            .effects
+            .iter()
+            .copied()
+            .partition(|effect| lasts(effect) && fit.doses.iter().all(|dose| dose.effect != *effect));
         let fresh = columns(&candidates.baseline.iter().copied().chain(new).collect::<Vec<_>>());
         let means = signatures(&reference, &fresh, &|effect| candidates.shape(&shapes, effect))?;
         let mut design = match before {
@@ -166,7 +167,7 @@ impl<'s> Linear<'s> {
     /// The same problem, with shapes of candidates that are best under another noise, or without some of the fit's
     /// effects; `None` as well where those are the same.
     pub fn reshaped(&self, fit: &Fit, noise: &Noise, without: &[&'static Effect]) -> Option<Self> {
-        let is_taken = |effect: &Effect| without.iter().any(|taken| std::ptr::eq(*taken, effect));
+        let is_taken = |effect: &Effect| without.iter().any(|taken| *taken == effect);
         let doses: Vec<Dose> = fit.doses.iter().filter(|dose| !is_taken(dose.effect)).cloned().collect();
         let fitted: Vec<usize> = doses.iter().flat_map(|dose| self.design.of(dose.effect)).collect();
         let (design, weighing) = (&self.design, &self.weighing);
@@ -294,7 +295,7 @@ impl<'s> Linear<'s> {
         if self.candidates.was_taken_out(effect) {
             return 0.0;
         }
-        let at = self.candidates.effects.iter().position(|other| std::ptr::eq(*other, effect));
+        let at = self.candidates.effects.iter().position(|other| *other == effect);
         let spread = at.map_or(0.0, |at| self.shapes[at].spread);
         let shapes = (nonlinear::choices(effect, self.scene.duration()) as f64).ln();
         (self.candidates.effects.len() as f64).ln() + (shapes - spread).max(0.0)
@@ -377,7 +378,7 @@ fn white(noise: &Noise) -> White {
 /// The same effect with the same parameters beside its amplitudes.
 fn has_same_shape(one: &Dose, other: &Dose) -> bool {
     let mut values = one.effect.parameters.iter().zip(one.values.iter().zip(&other.values));
-    std::ptr::eq(one.effect, other.effect) && values.all(|(p, (a, b))| p.role == Role::Amplitude || a == b)
+    one.effect == other.effect && values.all(|(p, (a, b))| p.role == Role::Amplitude || a == b)
 }
 
 /// Puts effects back into a design's residual.

@@ -8,10 +8,7 @@ use super::{
     refit::Fit,
 };
 use crate::{
-    diagnosis::{
-        library::candidates::is_shaped,
-        mixed_model::noise::{NEAR, Noise},
-    },
+    diagnosis::mixed_model::noise::{NEAR, Noise},
     effect::{Effect, class::class},
     recording::SensorKind,
 };
@@ -96,7 +93,7 @@ impl Linear<'_> {
         let mut sets = Vec::new();
         for at in 0..from.set.len() {
             let (fewer, taken) = without(&from.set, at);
-            let other = |effect: &'static Effect| !std::ptr::eq(effect, taken);
+            let other = |effect: &'static Effect| effect != taken;
             // Alone, it was chosen among all others.
             if !fewer.is_empty() {
                 sets.extend(self.replaced(&fewer, taken.sensors, &other, &from.noise)?);
@@ -132,7 +129,7 @@ impl Linear<'_> {
         for kind in &self.scene.kinds {
             let (taken, others): (Set, Set) = from.set.iter().partition(|effect| self.reaches(effect, *kind));
             // A step that was placed in a drift which held the half of it is placed anew where little drifts.
-            if (taken.len() > 1 || taken.iter().any(|effect| is_shaped(effect)))
+            if (taken.len() > 1 || taken.iter().any(|effect| effect.is_shaped()))
                 && let Some(linear) = self.reshaped(fit, &from.noise.quieter(), &taken)
             {
                 let quiet = from.noise.quieter();
@@ -181,7 +178,7 @@ impl Linear<'_> {
 }
 
 fn is_among(set: &[&'static Effect], effect: &Effect) -> bool {
-    set.iter().any(|other| std::ptr::eq(*other, effect))
+    set.iter().any(|other| *other == effect)
 }
 
 /// A set without one of its effects, and that effect.

@@ -161,7 +161,7 @@ fn moved_by(doses: &[Dose], columns: &[Column], step: &DVector<f64>) -> Vec<Dose
     let mut doses = doses.to_vec();
     for (column, step) in columns.iter().zip(step.iter()) {
         let parameter = &column.effect.parameters[column.parameter];
-        if let Some(dose) = doses.iter_mut().find(|dose| std::ptr::eq(dose.effect, column.effect)) {
+        if let Some(dose) = doses.iter_mut().find(|dose| dose.effect == column.effect) {
             let value = &mut dose.values[column.parameter];
             *value += step * parameter.prior_scale;
             match parameter.role {

@@ -11,16 +11,13 @@ use crate::{
         mixed_model::noise::{Noise, Weighing},
         residual::{base_run::Reference, forward_model::Scene},
     },
-    effect::Effect,
+    effect::{Effect, Part},
     recording::SensorKind,
     simulator::Dose,
 };
 
-/// Sensors are heard one after the other, and each tells its own terms and of the shared ones these.
-const HEARD: [(&[SensorKind], &[&str]); 2] = [
-    (&[SensorKind::Gyr], &["clk.time_offset"]),
-    (&[SensorKind::Gyr, SensorKind::Acc], &["clk.time_offset", "rig.level_tilt"]),
-];
+/// Sensors are fitted in this order; each stage estimates their terms, the clock, and what of the rig they show.
+const STAGES: [&[SensorKind]; 2] = [&[SensorKind::Gyr], &[SensorKind::Gyr, SensorKind::Acc]];
 /// Fits of each, each with the noise that the last one left.
 const ROUNDS: usize = 2;
 /// White noise of one that is not yet heard is taken for so many times what it is.
@@ -28,11 +25,14 @@ const MUTED: f64 = 1e6;
 
 /// Fits the baseline to the sensors in turn. `None` where the simulator fails.
 pub fn start(scene: &Scene<'_>, mut doses: Vec<Dose>) -> Option<Fit> {
-    for (heard, shared) in HEARD {
-        let told = |effect: &Effect| {
-            shared.contains(&effect.id.as_str()) || effect.sensors.iter().all(|kind| heard.contains(kind))
+    for heard in STAGES {
+        let is_shown = |effect: &Effect| match effect.part {
+            Part::ClockTerm => true,
+            Part::RigTerm(shown_by) => shown_by.iter().any(|kind| heard.contains(kind)),
+            _ => effect.sensors.iter().all(|kind| heard.contains(kind)),
         };
-        let (mut asked, rest): (Vec<Dose>, Vec<Dose>) = doses.into_iter().partition(|dose| told(dose.effect));
+        let (mut asked, rest): (Vec<Dose>, Vec<Dose>) =
+            doses.into_iter().partition(|dose| is_shown(dose.effect));
         for _ in 0..ROUNDS {
             let reference = Reference::new(scene, asked.clone(), &scene.fine)?;
             let weighing = Weighing::new(scene, SensorKind::ALL.map(|kind| reference.output(kind)));

@@ -12,11 +12,7 @@ use super::{
 };
 use crate::{
     diagnosis::{
-        library::{
-            candidates::{Candidates, is_shaped},
-            nonlinear,
-            nonlinear::Backdrop,
-        },
+        library::{candidates::Candidates, nonlinear, nonlinear::Backdrop},
         mixed_model::noise::{FAR, Noise},
         residual::{base_run::Reference, forward_model::Scene},
     },
@@ -132,13 +128,13 @@ impl<'s> Explained<'s> {
         let kept = |effect: &'static Effect| {
             let is_same =
                 |dose: &&Dose| candidates.has_term(effect) || found_in.shape_of(effect) == dose.values;
-            self.fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, effect)).filter(is_same)
+            self.fit.doses.iter().find(|dose| dose.effect == effect).filter(is_same)
         };
         let all = candidates.baseline.iter().chain(&next.set);
         let mut doses: Vec<Dose> = all.filter_map(|effect| kept(effect).cloned()).collect();
         for effect in next.set.iter().copied().filter(|effect| kept(effect).is_none()) {
             let rest: Vec<&'static Effect> =
-                next.set.iter().copied().filter(|other| !std::ptr::eq(*other, effect)).collect();
+                next.set.iter().copied().filter(|other| *other != effect).collect();
             let values = refined(effect, found_in, &doses, &rest, &next.noise)?;
             doses.push(Dose { effect, values });
         }
@@ -158,7 +154,7 @@ fn refined(
     noise: &Noise,
 ) -> Option<Vec<f64>> {
     let (scene, values) = (linear.scene, linear.shape_of(effect));
-    if !is_shaped(effect) {
+    if !effect.is_shaped() {
         return Some(values);
     }
     let fitted = linear.fitted(rest);

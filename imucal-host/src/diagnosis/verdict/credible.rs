@@ -41,15 +41,14 @@ pub fn suspects(linear: &Linear<'_>, none: &Judged) -> Option<Vec<&'static Effec
 
 /// The standing of one cause of a set.
 pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> Option<Standing> {
-    let rest: Vec<&'static Effect> =
-        best.set.iter().copied().filter(|effect| !std::ptr::eq(*effect, cause)).collect();
+    let rest: Vec<&'static Effect> = best.set.iter().copied().filter(|effect| *effect != cause).collect();
     let (_, ranked) = linear.ranked(&rest, &best.noise)?;
-    let own = ranked.iter().find(|(_, effect)| std::ptr::eq(*effect, cause))?.0;
+    let own = ranked.iter().find(|(_, effect)| *effect == cause)?.0;
     let standard = linear.sift(&best.set, &best.noise, &[], &NEAR)?;
     let none = linear.judge(&rest, &best.noise, linear.scene.reach(cause), &NEAR)?;
     let mut judged: Vec<(f64, Option<&'static Effect>)> =
         vec![(best.log_evidence, Some(cause)), (none.log_evidence, None)];
-    let others = ranked.iter().filter(|(value, effect)| !std::ptr::eq(*effect, cause) && *value > own - FAR);
+    let others = ranked.iter().filter(|(value, effect)| *effect != cause && *value > own - FAR);
     let others: Vec<&'static Effect> = others.take(JUDGED).map(|(_, effect)| *effect).collect();
     let offsets = linear.offsets(&best.noise);
     let instead = |effect: &&'static Effect| {
@@ -75,12 +74,12 @@ pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> O
         }
         held += probability(*value);
     }
-    if !set.iter().any(|effect| std::ptr::eq(*effect, cause)) {
+    if !set.iter().any(|effect| *effect == cause) {
         set.push(cause);
     }
     Some(Standing {
         probability: probability(best.log_evidence),
-        equivalents: set.iter().copied().filter(|effect| !std::ptr::eq(*effect, cause)).collect(),
+        equivalents: set.iter().copied().filter(|effect| *effect != cause).collect(),
         set,
     })
 }

@@ -27,7 +27,7 @@ pub fn amounts(explained: &Explained<'_>) -> Option<Vec<Vec<Amount>>> {
 pub fn amounts_of(explained: &Explained<'_>, asked: &[&'static Effect]) -> Option<Vec<Vec<Amount>>> {
     let (linear, set) = (&explained.linear, &explained.best.set);
     let reference = Reference::new(linear.scene, explained.fit.doses.clone(), &linear.scene.fine)?;
-    let dose = |effect: &Effect| explained.fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, effect));
+    let dose = |effect: &Effect| explained.fit.doses.iter().find(|dose| dose.effect == effect);
     let shaped = |dose: &Dose| -> Vec<Column> {
         let effect = dose.effect;
         effect.shapes_at(&dose.values).map(|parameter| Column { effect, parameter }).collect()

@@ -140,11 +140,11 @@ fn information<'m>(
 fn distance(explained: &Explained<'_>, normal: &Normal, cause: &Effect, other: &Effect) -> Option<f64> {
     let linear = &explained.linear;
     let rest: Vec<&'static Effect> =
-        explained.best.set.iter().copied().filter(|effect| !std::ptr::eq(*effect, cause)).collect();
+        explained.best.set.iter().copied().filter(|effect| *effect != cause).collect();
     let mut fitted = linear.fitted(&rest);
     fitted.extend(linear.design.of(other));
     let own = linear.design.of(cause);
-    let dose = explained.fit.doses.iter().find(|dose| std::ptr::eq(dose.effect, cause))?;
+    let dose = explained.fit.doses.iter().find(|dose| dose.effect == cause)?;
     let size = nalgebra::DVector::from_iterator(
         own.len(),
         own.iter().map(|id| {

@@ -26,7 +26,7 @@ use crate::{
         screening::{conventions::Finding, preparation::leave_out},
         search::stepwise::Explained,
     },
-    effect::{Act, Effect, SignalRun},
+    effect::{Act, Effect, SignalRun, Spoils},
     recording::{Recording, SensorKind, Triple},
     simulator::Dose,
 };
@@ -76,7 +76,7 @@ pub fn faults(recording: &Recording, findings: &[Finding], explained: &Explained
 }
 
 fn is_modelled(effect: &Effect) -> bool {
-    effect.id.ends_with(".saturation") || effect.id.ends_with(".stuck_samples")
+    matches!(effect.spoils(), Some(Spoils::BeyondLimit | Spoils::Repeats))
 }
 
 impl Fault {

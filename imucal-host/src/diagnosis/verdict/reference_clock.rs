@@ -11,12 +11,9 @@ use crate::{
         library::candidates::Candidates,
         search::{linearisation::Linear, stepwise::Explained},
     },
-    effect,
-    effect::Effect,
+    effect::{Effect, Part},
 };
 
-/// The effect.
-const ID: &str = "clk.time_offset";
 /// An offset that is named is so many standard errors from zero at least.
 const ERRORS: f64 = 5.0;
 
@@ -34,9 +31,9 @@ pub struct Clock<'s> {
 
 /// The baseline's candidates with the offset among the effects, where it stands in the baseline.
 pub fn candidates(candidates: &Candidates) -> Option<(&'static Effect, Candidates)> {
-    let offset = effect::find(ID).filter(|offset| candidates.has_term(offset))?;
+    let offset = *candidates.baseline.iter().find(|term| term.part == Part::ClockTerm)?;
     let mut with = candidates.clone();
-    with.baseline.retain(|term| !std::ptr::eq(*term, offset));
+    with.baseline.retain(|term| *term != offset);
     with.effects.push(offset);
     with.taken_out.push(offset);
     Some((offset, with))
@@ -96,6 +93,8 @@ mod tests {
         },
         simulator::{Motion, Place, SimulatedUnit, recent::Recent, record, truth::in_the_open},
     };
+
+    const ID: &str = "clk.time_offset";
 
     /// A hand that swings a sensor without a rest, up to 4 rad/s, and moves it to and fro.
     struct Swung {
