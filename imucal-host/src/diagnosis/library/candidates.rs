@@ -138,12 +138,12 @@ impl Candidates {
 
     /// Whether an effect is fitted always.
     pub fn has_term(&self, effect: &Effect) -> bool {
-        self.baseline.iter().any(|term| *term == effect)
+        self.baseline.contains(&effect)
     }
 
     /// Whether an effect was taken out of the baseline.
     pub fn was_taken_out(&self, effect: &Effect) -> bool {
-        self.taken_out.iter().any(|taken| *taken == effect)
+        self.taken_out.contains(&effect)
     }
 
     /// Terms of triads that a calibration made elsewhere gives, of the sensors that an effect reaches.

@@ -167,7 +167,7 @@ impl<'s> Linear<'s> {
     /// The same problem, with shapes of candidates that are best under another noise, or without some of the fit's
     /// effects; `None` as well where those are the same.
     pub fn reshaped(&self, fit: &Fit, noise: &Noise, without: &[&'static Effect]) -> Option<Self> {
-        let is_taken = |effect: &Effect| without.iter().any(|taken| *taken == effect);
+        let is_taken = |effect: &Effect| without.contains(&effect);
         let doses: Vec<Dose> = fit.doses.iter().filter(|dose| !is_taken(dose.effect)).cloned().collect();
         let fitted: Vec<usize> = doses.iter().flat_map(|dose| self.design.of(dose.effect)).collect();
         let (design, weighing) = (&self.design, &self.weighing);

@@ -178,7 +178,7 @@ impl Linear<'_> {
 }
 
 fn is_among(set: &[&'static Effect], effect: &Effect) -> bool {
-    set.iter().any(|other| *other == effect)
+    set.contains(&effect)
 }
 
 /// A set without one of its effects, and that effect.

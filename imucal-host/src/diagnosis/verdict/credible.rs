@@ -74,7 +74,7 @@ pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> O
         }
         held += probability(*value);
     }
-    if !set.iter().any(|effect| *effect == cause) {
+    if !set.contains(&cause) {
         set.push(cause);
     }
     Some(Standing {

@@ -65,7 +65,7 @@ fn is_borne_beside_terms(
     linear: &Linear<'_>,
     noise: &Noise,
 ) -> Option<bool> {
-    let is_other = |term: &&'static Effect| !set.iter().any(|own| *own == *term);
+    let is_other = |term: &&'static Effect| !set.contains(term);
     let terms: Vec<&'static Effect> =
         linear.candidates.given_beside(set[at]).into_iter().filter(is_other).collect();
     if terms.is_empty() {

@@ -27,7 +27,7 @@ pub fn testable(
     };
     let mut untold: Vec<NotTestable> = linear.candidates.untestable.iter().map(told).collect();
     for effect in &linear.candidates.effects {
-        if set.iter().any(|own| *own == *effect) {
+        if set.contains(effect) {
             continue;
         }
         let places: Vec<usize> =

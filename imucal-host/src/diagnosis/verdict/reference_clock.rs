@@ -83,7 +83,6 @@ fn chance(parameters: &[Amount]) -> f64 {
 mod tests {
     use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-    use super::*;
     use crate::{
         diagnosis::{Options, Verdict, diagnose},
         effect::{Machine, Truth},
