@@ -13,8 +13,8 @@ pub mod verdict;
 pub use self::finding::{Diagnosis, Verdict};
 use self::{
     library::candidates::{Candidates, Setting},
-    residual::forward_model::Scene,
-    screening::preparation::Footing,
+    residual::forward_model::ForwardModel,
+    screening::preparation::Preparation,
     search::stepwise,
     verdict::answer::{answer, untestable},
 };
@@ -31,26 +31,26 @@ pub struct Options {
 
 /// Diagnoses a recording; `progress` hears of each stage.
 pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str)) -> Diagnosis {
-    let footing = match Footing::new(recording, options.model.as_ref()) {
-        Ok(footing) => footing,
+    let preparation = match Preparation::new(recording, options.model.as_ref()) {
+        Ok(preparation) => preparation,
         Err(why) => return untestable(recording, why),
     };
-    let mut scene = Scene::new(recording, footing.usable.clone(), &*footing.movement, footing.triads);
-    if let Some(held) = &footing.held {
+    let mut scene = ForwardModel::new(recording, preparation.usable.clone(), &*preparation.movement, preparation.triads);
+    if let Some(held) = &preparation.held {
         scene = scene.through(held);
     }
     scene = scene.without_passages();
     let setting = Setting {
         kinds: &scene.kinds,
         thermometer: recording.temperature.is_some(),
-        calibrated: &footing.model.calibrated,
+        calibrated: &preparation.model.calibrated,
         gimbals: scene.swings.is_some(),
-        hand: footing.held.is_some(),
+        hand: preparation.held.is_some(),
         field_known: recording.manifest.site.field_ned_ut.is_some(),
     };
     let candidates = Candidates::new(&setting, &options.without);
     let explained = stepwise::search(&scene, &candidates, progress);
-    let answered = explained.and_then(|explained| answer(recording, &footing, &explained, progress));
+    let answered = explained.and_then(|explained| answer(recording, &preparation, &explained, progress));
     answered.unwrap_or_else(|| {
         untestable(recording, "the baseline cannot be fitted to this recording".to_owned())
     })

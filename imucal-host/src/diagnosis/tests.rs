@@ -13,10 +13,10 @@ use crate::{
             design::{Channel, Normal},
             noise::FAR,
         },
-        residual::{block::Means, forward_model::Scene},
-        screening::preparation::Footing,
+        residual::{block::Means, forward_model::ForwardModel},
+        screening::preparation::Preparation,
         search::{
-            linearisation::Linear,
+            linearisation::Linearisation,
             refit::{Fit, refit},
         },
     },
@@ -34,14 +34,14 @@ fn simulation(seed: u64) -> Simulation {
 static HEALTHY: LazyLock<Recording> = LazyLock::new(|| simulation(11).record("healthy").unwrap());
 
 /// The problem about a healthy recording's baseline.
-fn with_linear<T>(check: impl FnOnce(Linear<'_>) -> T) -> T {
+fn with_linear<T>(check: impl FnOnce(Linearisation<'_>) -> T) -> T {
     with_fit(&HEALTHY, |linear, _| check(linear))
 }
 
 /// Likewise, and the fit.
-fn with_fit<T>(recording: &Recording, check: impl FnOnce(Linear<'_>, &Fit) -> T) -> T {
-    let footing = Footing::new(recording, None).unwrap();
-    let scene = Scene::new(recording, footing.usable.clone(), &*footing.movement, footing.triads);
+fn with_fit<T>(recording: &Recording, check: impl FnOnce(Linearisation<'_>, &Fit) -> T) -> T {
+    let preparation = Preparation::new(recording, None).unwrap();
+    let scene = ForwardModel::new(recording, preparation.usable.clone(), &*preparation.movement, preparation.triads);
     let setting = Setting {
         kinds: &scene.kinds,
         thermometer: true,
@@ -57,8 +57,8 @@ fn with_fit<T>(recording: &Recording, check: impl FnOnce(Linear<'_>, &Fit) -> T)
         .map(|effect| Dose { effect, values: vec![0.0; effect.parameters.len()] })
         .collect();
     let fit = refit(&scene, doses, None).unwrap();
-    let noise = Linear::fitted_alone(&scene, &candidates, &fit).unwrap().weighing.white(&fit.residual);
-    check(Linear::new(&scene, &candidates, &fit, &noise, None).unwrap(), &fit)
+    let noise = Linearisation::fitted_alone(&scene, &candidates, &fit).unwrap().weighing.white(&fit.residual);
+    check(Linearisation::new(&scene, &candidates, &fit, &noise, None).unwrap(), &fit)
 }
 
 #[test]
@@ -121,13 +121,13 @@ fn gimbals_that_turn_all_sensors_at_once_are_one_chance_and_no_harmonic_of_the_e
     let recording = simulation.record("scattered").unwrap();
     with_fit(&recording, |linear, fit| {
         let white = linear.weighing.white(&fit.residual);
-        let none = linear.sift(&[], &white, &SensorKind::ALL, &FAR).unwrap();
+        let none = linear.screen(&[], &white, &SensorKind::ALL, &FAR).unwrap();
         let harmonic = find("rig.encoder_harmonic").unwrap();
-        let with = linear.sift(&[harmonic], &none.noise, &SensorKind::ALL, &FAR).unwrap();
+        let with = linear.screen(&[harmonic], &none.noise, &SensorKind::ALL, &FAR).unwrap();
         let axis_by_axis = with.value - none.value;
         let offsets = linear.offsets(&white);
-        let none = linear.together(none, &offsets).unwrap();
-        let together = linear.together(with, &offsets).unwrap().log_evidence - none.log_evidence;
+        let none = linear.scored_jointly(none, &offsets).unwrap();
+        let together = linear.scored_jointly(with, &offsets).unwrap().log_evidence - none.log_evidence;
         assert!(axis_by_axis > 0.0 && together < 0.0, "{axis_by_axis} {together}");
     });
 }
@@ -139,9 +139,9 @@ fn samples_beside_clipped_ones_are_left_out_whatever_their_own_noise() {
     let effect = find("acc.saturation").unwrap();
     simulation.doses.push(Dose { effect, values: vec![full_scale / 9.5 - 1.0] });
     let recording = simulation.record("clipped").unwrap();
-    let footing = Footing::new(&recording, None).unwrap();
+    let preparation = Preparation::new(&recording, None).unwrap();
     let (values, usable) =
-        (&recording.acc.as_ref().unwrap().values, &footing.usable[SensorKind::Acc as usize]);
+        (&recording.acc.as_ref().unwrap().values, &preparation.usable[SensorKind::Acc as usize]);
     let clipped: Vec<f64> =
         values.iter().zip(&recording.time).filter(|(v, _)| v.amax() > 9.49).map(|(_, t)| *t).collect();
     assert!(!clipped.is_empty() && usable.iter().any(|usable| *usable));
@@ -159,10 +159,11 @@ fn a_signature_that_lasts_from_one_fit_to_the_next_is_the_one_taken_anew() {
         let residual = linear.scene.residual(&doses).unwrap();
         let fit = Fit { doses, residual };
         let noise = linear.weighing.white(&fit.residual);
-        let about = |before| Linear::new(linear.scene, linear.candidates, &fit, &noise, before).unwrap();
+        let about =
+            |before| Linearisation::new(linear.scene, linear.candidates, &fit, &noise, before).unwrap();
         let (lasting, anew) = (about(Some(&linear)), about(None));
         for other in linear.candidates.effects.iter().filter(|other| !other.is_shaped()) {
-            let columns = |linear: &Linear<'_>| -> Vec<f64> {
+            let columns = |linear: &Linearisation<'_>| -> Vec<f64> {
                 let of = |(id, channel): (usize, &Channel)| -> Vec<f64> {
                     let at = channel.ids.iter().position(|own| *own == id);
                     at.map_or(vec![0.0; channel.y.len()], |at| channel.x.column(at).iter().copied().collect())
@@ -180,7 +181,7 @@ fn a_signature_that_lasts_from_one_fit_to_the_next_is_the_one_taken_anew() {
 }
 
 /// The change that usual sizes of all of an effect's parameters make, turned round when half of its square is over.
-fn twin(linear: &Linear<'_>, own: &[usize]) -> Means {
+fn twin(linear: &Linearisation<'_>, own: &[usize]) -> Means {
     let blocks = &linear.scene.blocks;
     let squares: Vec<f64> = (0..blocks.len())
         .map(|block| {

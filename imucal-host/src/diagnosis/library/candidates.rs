@@ -1,6 +1,6 @@
 //! Terms of the baseline and effects that may explain what it leaves.
 
-use super::grid_posterior::Shaped;
+use super::grid_posterior::GridPosterior;
 use crate::{
     effect::{Act, CATALOGUE, Effect, Free, NUISANCES, Needs, Part},
     recording::SensorKind,
@@ -158,7 +158,7 @@ impl Candidates {
     }
 
     /// An effect's parameters among those of all candidates, in their order; none for a term of the baseline.
-    pub fn shape(&self, shapes: &[Shaped], effect: &Effect) -> Vec<f64> {
+    pub fn shape(&self, shapes: &[GridPosterior], effect: &Effect) -> Vec<f64> {
         let at = self.effects.iter().position(|other| *other == effect);
         at.and_then(|at| shapes.get(at)).map(|shape| shape.values.clone()).unwrap_or_default()
     }

@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis::mixed_model::{
     design::{LOOSE, Normal, loosened},
-    likelihood::restricted,
+    likelihood::reml_criterion,
     noise::Noise,
 };
 
@@ -227,7 +227,7 @@ pub fn log_evidence(normal: &Normal, noise: &Noise, baseline: usize, groups: &[V
         score: normal.score.rows(0, baseline).into_owned(),
         ..normal.clone()
     };
-    Some(projected.log_bayes_factor(&parts) - 0.5 * restricted(&alone) - noise.surprise())
+    Some(projected.log_bayes_factor(&parts) - 0.5 * reml_criterion(&alone) - noise.neg_log_prior())
 }
 
 #[cfg(test)]

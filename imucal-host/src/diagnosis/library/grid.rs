@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{candidates::Candidates, grid_posterior::Shaped, nonlinear, nonlinear::Backdrop};
+use super::{candidates::Candidates, grid_posterior::GridPosterior, nonlinear, nonlinear::Backdrop};
 use crate::{
     diagnosis::{
         mixed_model::{
             design::Design,
             noise::{Noise, Weighing},
         },
-        residual::{base_run::Reference, forward_model::Scene},
+        residual::{base_run::Reference, forward_model::ForwardModel},
     },
     effect::Effect,
     simulator::Dose,
@@ -20,14 +20,14 @@ use crate::{
 /// Scans the shapes of candidates. Signatures are those about the fit it was made with: what is fitted later changes where
 /// they lie in the second order only, and they are taken anew where their size counts.
 #[derive(Clone)]
-pub struct Scan<'s> {
-    scene: &'s Scene<'s>,
+pub struct Grid<'s> {
+    scene: &'s ForwardModel<'s>,
     candidates: &'s Candidates,
     coarse: Arc<Reference<'s>>,
 }
 
 /// What candidates are shaped beside.
-pub struct Beside<'a> {
+pub struct NuisanceColumns<'a> {
     /// Effects that have their shapes.
     pub doses: &'a [Dose],
     /// Weighs the blocks.
@@ -38,9 +38,9 @@ pub struct Beside<'a> {
     pub fitted: &'a [usize],
 }
 
-impl<'s> Scan<'s> {
+impl<'s> Grid<'s> {
     /// About a fit. `None` where the simulator fails.
-    pub fn new(scene: &'s Scene<'s>, candidates: &'s Candidates, doses: Vec<Dose>) -> Option<Self> {
+    pub fn new(scene: &'s ForwardModel<'s>, candidates: &'s Candidates, doses: Vec<Dose>) -> Option<Self> {
         Some(Self { scene, candidates, coarse: Arc::new(Reference::new(scene, doses, &scene.coarse)?) })
     }
 
@@ -48,11 +48,11 @@ impl<'s> Scan<'s> {
     /// as it was when it was found, and what `kept` tells of others.
     pub fn shapes(
         &self,
-        beside: &Beside<'_>,
+        beside: &NuisanceColumns<'_>,
         noise: &Noise,
         spread: &(dyn Fn(usize) -> f64 + Sync),
-        kept: &(dyn Fn(usize) -> Option<Shaped> + Sync),
-    ) -> Option<Vec<Shaped>> {
+        kept: &(dyn Fn(usize) -> Option<GridPosterior> + Sync),
+    ) -> Option<Vec<GridPosterior>> {
         let (scene, design) = (self.scene, beside.design);
         let whitenings = beside.weighing.whitenings(design, noise);
         // Where no rig guides the sensor, what a hand adds hides when an episode began and ended.
@@ -66,17 +66,17 @@ impl<'s> Scan<'s> {
             Some(quiet) => {
                 let best = nonlinear::best(effect, &self.coarse, quiet)?;
                 let (values, _) = nonlinear::refine(effect, &best.values, &self.coarse, quiet)?;
-                Some(Shaped { values, ..best })
+                Some(GridPosterior { values, ..best })
             }
             None => nonlinear::best(effect, &self.coarse, &backdrop),
         };
         let shape = |(at, effect): (usize, &&'static Effect)| {
             let held = beside.doses.iter().find(|dose| dose.effect == *effect);
-            let held = held.map(|dose| Shaped { values: dose.values.clone(), spread: spread(at) });
+            let held = held.map(|dose| GridPosterior { values: dose.values.clone(), spread: spread(at) });
             match held.or_else(|| kept(at)) {
                 Some(shape) => Some(shape),
                 None if effect.is_shaped() => best(effect),
-                None => Some(Shaped::alone(effect.neutral(scene.duration()))),
+                None => Some(GridPosterior::alone(effect.neutral(scene.duration()))),
             }
         };
         self.candidates.effects.par_iter().enumerate().map(shape).collect()

@@ -11,7 +11,7 @@
 
 /// A shape of an effect.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shaped {
+pub struct GridPosterior {
     /// All its parameters, amplitudes zero.
     pub values: Vec<f64>,
     /// ln of how many shapes of the menu are as likely: the likelihood's sum over the menu, each weighed by its prior, as a
@@ -19,7 +19,7 @@ pub struct Shaped {
     pub spread: f64,
 }
 
-impl Shaped {
+impl GridPosterior {
     /// The only one.
     pub fn alone(values: Vec<f64>) -> Self {
         Self { values, spread: 0.0 }

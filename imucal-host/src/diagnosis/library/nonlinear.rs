@@ -8,12 +8,12 @@ use rayon::prelude::*;
 
 use super::{
     evidence::Projected,
-    grid_posterior::{Scanned, Shaped},
+    grid_posterior::{GridPosterior, Scanned},
 };
 use crate::{
     diagnosis::{
         mixed_model::{augmented_normal::Bordered, design::Design, whitening::Whitening},
-        residual::{base_run::Reference, block::Means, forward_model::Scene},
+        residual::{base_run::Reference, block::Means, forward_model::ForwardModel},
     },
     effect::{Effect, Role},
 };
@@ -35,7 +35,7 @@ const BATCH: usize = 12;
 /// What a shape is judged against: the columns fitted in any case, and the noise.
 pub struct Backdrop<'a> {
     /// The recording's scene.
-    pub scene: &'a Scene<'a>,
+    pub scene: &'a ForwardModel<'a>,
     /// Number of those columns.
     fitted: usize,
     bordered: Bordered<'a>,
@@ -44,7 +44,7 @@ pub struct Backdrop<'a> {
 impl<'a> Backdrop<'a> {
     /// Of columns of a design, and the whitening of its channels.
     pub fn new(
-        scene: &'a Scene<'a>,
+        scene: &'a ForwardModel<'a>,
         design: &'a Design,
         fitted: &[usize],
         whitenings: &'a [Whitening],
@@ -54,7 +54,11 @@ impl<'a> Backdrop<'a> {
 }
 
 /// The most evident shape of an effect. `None` where no shape can be judged.
-pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backdrop<'_>) -> Option<Shaped> {
+pub fn best(
+    effect: &'static Effect,
+    reference: &Reference<'_>,
+    backdrop: &Backdrop<'_>,
+) -> Option<GridPosterior> {
     let duration = backdrop.scene.duration();
     if is_episode(effect) {
         return episode(effect, reference, backdrop, duration);
@@ -70,7 +74,7 @@ pub fn best(effect: &'static Effect, reference: &Reference<'_>, backdrop: &Backd
     let whole = judged(menu(effect, duration))?;
     let (near, dense) = closer(effect, &whole.shapes[whole.best()?], duration);
     let (values, spread) = whole.refined(&judged(near)?, dense)?;
-    Some(Shaped { values, spread })
+    Some(GridPosterior { values, spread })
 }
 
 /// ln of a shape's prior, but for a constant: durations are lognormal, all else is as likely here as there.
@@ -223,7 +227,7 @@ fn episode(
     reference: &Reference<'_>,
     backdrop: &Backdrop<'_>,
     duration: f64,
-) -> Option<Shaped> {
+) -> Option<GridPosterior> {
     let step = grid(duration);
     let all: Vec<f64> = (1..(duration / step) as usize).map(|k| step * k as f64).collect();
     let whole = pairs(effect, reference, backdrop, &all, &all)?;
@@ -233,7 +237,7 @@ fn episode(
     let near = pairs(effect, reference, backdrop, &instants(start, duration), &ends)?;
     let dense = f64::from(CLOSER).powi(if lasts { 2 } else { 1 });
     let ((start, end), spread) = whole.refined(&near.lasting(lasts), dense)?;
-    Some(Shaped { values: placed(effect, duration, start, end), spread })
+    Some(GridPosterior { values: placed(effect, duration, start, end), spread })
 }
 
 impl Scanned<(f64, f64)> {

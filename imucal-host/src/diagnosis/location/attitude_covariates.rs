@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::covariate::{Driver, Function};
+use super::covariate::{Covariate, Function};
 use crate::{effect::Truth, recording::SensorKind};
 
 /// A function of a direction.
@@ -13,7 +13,7 @@ type OfRate = fn(f64) -> f64;
 
 /// The drivers, from the truth of each block: first and second harmonics of the directions in the sensor, rates and
 /// angular accelerations about its axes.
-pub fn drivers(truth: &[Truth], kinds: &[SensorKind]) -> Vec<Driver> {
+pub fn drivers(truth: &[Truth], kinds: &[SensorKind]) -> Vec<Covariate> {
     let mut drivers = vec![direction("gravity_direction", truth, &|row| row.f_t)];
     if kinds.contains(&SensorKind::Mag) {
         drivers.push(direction("field_direction", truth, &|row| row.b_t));
@@ -29,7 +29,7 @@ pub fn drivers(truth: &[Truth], kinds: &[SensorKind]) -> Vec<Driver> {
     drivers
 }
 
-fn direction(name: &str, truth: &[Truth], of: &dyn Fn(&Truth) -> Vector3<f64>) -> Driver {
+fn direction(name: &str, truth: &[Truth], of: &dyn Fn(&Truth) -> Vector3<f64>) -> Covariate {
     let directions: Vec<Vector3<f64>> =
         truth.iter().map(|row| of(row).try_normalize(0.0).unwrap_or_default()).collect();
     let functions: [(&str, OfDirection); 8] = [
@@ -46,7 +46,7 @@ fn direction(name: &str, truth: &[Truth], of: &dyn Fn(&Truth) -> Vector3<f64>) -
         .iter()
         .map(|(detail, value)| Function::new(*detail, directions.iter().map(value).collect()))
         .collect();
-    Driver { name: name.to_owned(), functions }
+    Covariate { name: name.to_owned(), functions }
 }
 
 fn about_axes(
@@ -54,7 +54,7 @@ fn about_axes(
     truth: &[Truth],
     of: &dyn Fn(&Truth) -> Vector3<f64>,
     functions: &[(&str, OfRate)],
-) -> Driver {
+) -> Covariate {
     let mut all = Vec::new();
     for (axis, which) in ["x", "y", "z"].iter().enumerate() {
         for (detail, value) in functions {
@@ -62,5 +62,5 @@ fn about_axes(
             all.push(Function::new(format!("about {which}, {detail}"), values));
         }
     }
-    Driver { name: name.to_owned(), functions: all }
+    Covariate { name: name.to_owned(), functions: all }
 }

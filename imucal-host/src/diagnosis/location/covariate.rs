@@ -4,7 +4,7 @@ use crate::recording::SensorKind;
 
 /// A driver and its functions, by block.
 #[derive(Clone, Debug)]
-pub struct Driver {
+pub struct Covariate {
     /// Its name in the report.
     pub name: String,
     /// Its functions.
@@ -29,7 +29,7 @@ impl Function {
     }
 }
 
-impl Driver {
+impl Covariate {
     /// Places of its columns for a sensor: function and axis.
     pub fn columns(&self, kind: SensorKind) -> Vec<(usize, usize)> {
         let axes = (0..self.functions.len()).flat_map(|function| (0..3).map(move |axis| (function, axis)));

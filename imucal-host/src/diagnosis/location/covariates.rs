@@ -10,10 +10,10 @@ use nalgebra::Vector3;
 
 use super::{
     attitude_covariates,
-    covariate::{Driver, Function},
+    covariate::{Covariate, Function},
 };
 use crate::{
-    diagnosis::residual::{block::Block, forward_model::Scene},
+    diagnosis::residual::{block::Block, forward_model::ForwardModel},
     effect::Swing,
     recording::SensorKind,
 };
@@ -29,7 +29,7 @@ const WARMING: f64 = 30.0;
 /// Times over which what a motion leaves behind fades, s.
 const FADING: [f64; 3] = [5.0, 20.0, 60.0];
 /// The drivers of a scene: those that vary in it. `given` is what each sensor puts out, block by block.
-pub fn drivers(scene: &Scene<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Driver> {
+pub fn drivers(scene: &ForwardModel<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Covariate> {
     let mut drivers = match scene.swings {
         Some(swings) => {
             let middle = |b: &Block| swings.get((b.rows.start + b.rows.end) / 2).copied().unwrap_or_default();
@@ -45,15 +45,17 @@ pub fn drivers(scene: &Scene<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Driver>
         let values = scene.blocks.iter().map(|b| libm::cos(PI * order as f64 * b.time / duration)).collect();
         Function::new(format!("{order} half-waves"), values)
     };
-    drivers.push(Driver { name: TIME.into(), functions: (1..=WAVES).map(wave).collect() });
+    drivers.push(Covariate { name: TIME.into(), functions: (1..=WAVES).map(wave).collect() });
     if let Some(temperature) = temperature(scene) {
         let square = temperature.iter().map(|t| t * t).collect();
         let rate = rates(scene, &temperature);
         let functions = vec![Function::new("linear", temperature), Function::new("quadratic", square)];
         drivers.push(leaning(given, &functions[0].values));
-        drivers.push(Driver { name: "temperature".into(), functions });
-        drivers
-            .push(Driver { name: "temperature_rate".into(), functions: vec![Function::new("linear", rate)] });
+        drivers.push(Covariate { name: "temperature".into(), functions });
+        drivers.push(Covariate {
+            name: "temperature_rate".into(),
+            functions: vec![Function::new("linear", rate)],
+        });
     }
     drivers.push(input(given));
     drivers.push(other_input(given));
@@ -68,7 +70,7 @@ pub fn drivers(scene: &Scene<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Driver>
 }
 
 /// Angles, rates, accelerations and directions of approach of a rig's gimbals, block by block.
-fn of_gimbals(swings: &[[Swing; 3]]) -> Vec<Driver> {
+fn of_gimbals(swings: &[[Swing; 3]]) -> Vec<Covariate> {
     let mut drivers = Vec::new();
     for (gimbal, name) in ["outer", "middle", "inner"].iter().enumerate() {
         let mut functions = Vec::new();
@@ -79,7 +81,7 @@ fn of_gimbals(swings: &[[Swing; 3]]) -> Vec<Driver> {
                 .push(Function::new(detail.clone(), swings.iter().map(|s| libm::cos(angle(s))).collect()));
             functions.push(Function::new(detail, swings.iter().map(|s| libm::sin(angle(s))).collect()));
         }
-        drivers.push(Driver { name: format!("gimbal_{name}"), functions });
+        drivers.push(Covariate { name: format!("gimbal_{name}"), functions });
     }
     drivers.push(per_gimbal(
         "rate",
@@ -98,7 +100,7 @@ fn of_gimbals(swings: &[[Swing; 3]]) -> Vec<Driver> {
 /// A function of a gimbal's swing.
 type OfSwing = fn(&Swing) -> f64;
 
-fn per_gimbal(name: &str, swings: &[[Swing; 3]], of: &[(&str, OfSwing)]) -> Driver {
+fn per_gimbal(name: &str, swings: &[[Swing; 3]], of: &[(&str, OfSwing)]) -> Covariate {
     let mut functions = Vec::new();
     for (gimbal, which) in ["outer", "middle", "inner"].iter().enumerate() {
         for (detail, value) in of {
@@ -106,11 +108,11 @@ fn per_gimbal(name: &str, swings: &[[Swing; 3]], of: &[(&str, OfSwing)]) -> Driv
             functions.push(Function::new(format!("{which} gimbal, {detail}"), values));
         }
     }
-    Driver { name: name.into(), functions }
+    Covariate { name: name.into(), functions }
 }
 
 /// The direction from which each gimbal came to where it stands.
-fn approach(swings: &[[Swing; 3]]) -> Driver {
+fn approach(swings: &[[Swing; 3]]) -> Covariate {
     let functions = ["outer", "middle", "inner"].iter().enumerate().map(|(gimbal, which)| {
         let mut last = 0.0;
         let values = swings
@@ -124,11 +126,11 @@ fn approach(swings: &[[Swing; 3]]) -> Driver {
             .collect();
         Function::new(format!("{which} gimbal"), values)
     });
-    Driver { name: "direction_of_approach".into(), functions: functions.collect() }
+    Covariate { name: "direction_of_approach".into(), functions: functions.collect() }
 }
 
 /// What motion has left behind, fading: heat of the drives, a body that swings out.
-fn recent_motion(swings: &[[Swing; 3]], blocks: &[Block]) -> Driver {
+fn recent_motion(swings: &[[Swing; 3]], blocks: &[Block]) -> Covariate {
     let fading = |time: f64| {
         let mut left = 0.0;
         let mut last = blocks.first().map_or(0.0, |block| block.time);
@@ -144,11 +146,11 @@ fn recent_motion(swings: &[[Swing; 3]], blocks: &[Block]) -> Driver {
             .collect();
         Function::new(format!("fading over {time} s"), values)
     };
-    Driver { name: "recent_motion".into(), functions: FADING.map(fading).into() }
+    Covariate { name: "recent_motion".into(), functions: FADING.map(fading).into() }
 }
 
 /// What each axis itself senses, by the Legendre polynomials of degree two to six: none of the affine part.
-fn input(given: &[Vec<Vector3<f64>>; 3]) -> Driver {
+fn input(given: &[Vec<Vector3<f64>>; 3]) -> Covariate {
     let of = |kind: SensorKind, axis: usize| {
         let degrees = legendre(&sensed(given, kind, axis), 6).into_iter().enumerate().skip(2);
         degrees.map(move |(degree, values)| {
@@ -157,11 +159,11 @@ fn input(given: &[Vec<Vector3<f64>>; 3]) -> Driver {
         })
     };
     let axes = SensorKind::ALL.into_iter().flat_map(|kind| (0..3).map(move |axis| (kind, axis)));
-    Driver { name: "input".into(), functions: axes.flat_map(|(kind, axis)| of(kind, axis)).collect() }
+    Covariate { name: "input".into(), functions: axes.flat_map(|(kind, axis)| of(kind, axis)).collect() }
 }
 
 /// What the other axes of a triad sense, likewise, to the third degree, and their product.
-fn other_input(given: &[Vec<Vector3<f64>>; 3]) -> Driver {
+fn other_input(given: &[Vec<Vector3<f64>>; 3]) -> Covariate {
     let mut functions = Vec::new();
     for (kind, axis) in SensorKind::ALL.into_iter().flat_map(|kind| (0..3).map(move |axis| (kind, axis))) {
         let others = [(axis + 1) % 3, (axis + 2) % 3];
@@ -176,11 +178,11 @@ fn other_input(given: &[Vec<Vector3<f64>>; 3]) -> Driver {
         let values = own[0].iter().zip(&own[1]).map(|(a, b)| a * b).collect();
         functions.push(Function { detail: "product of two".into(), values, of: Some((kind, axis)) });
     }
-    Driver { name: "other_input".into(), functions }
+    Covariate { name: "other_input".into(), functions }
 }
 
 /// What the axes of a triad sense, by the temperature.
-fn leaning(given: &[Vec<Vector3<f64>>; 3], temperature: &[f64]) -> Driver {
+fn leaning(given: &[Vec<Vector3<f64>>; 3], temperature: &[f64]) -> Covariate {
     let mean = temperature.iter().sum::<f64>() / temperature.len().max(1) as f64;
     let mut functions = Vec::new();
     for (kind, axis) in SensorKind::ALL.into_iter().flat_map(|kind| (0..3).map(move |axis| (kind, axis))) {
@@ -191,7 +193,7 @@ fn leaning(given: &[Vec<Vector3<f64>>; 3], temperature: &[f64]) -> Driver {
             functions.push(Function { detail, values, of: Some((kind, axis)) });
         }
     }
-    Driver { name: "temperature_and_input".into(), functions }
+    Covariate { name: "temperature_and_input".into(), functions }
 }
 
 /// What an axis senses, as a share of the most that it does.
@@ -213,7 +215,7 @@ fn legendre(x: &[f64], most: usize) -> Vec<Vec<f64>> {
     degrees
 }
 
-fn temperature(scene: &Scene<'_>) -> Option<Vec<f64>> {
+fn temperature(scene: &ForwardModel<'_>) -> Option<Vec<f64>> {
     let rows = scene.recording.temperature.as_ref()?;
     let mut last = rows.iter().copied().find(|t| t.is_finite())?;
     let mean = |rows: &[f64]| {
@@ -227,7 +229,7 @@ fn temperature(scene: &Scene<'_>) -> Option<Vec<f64>> {
     Some(scene.blocks.iter().map(|b| &rows[b.rows.clone()]).map(mean).collect())
 }
 
-fn rates(scene: &Scene<'_>, temperature: &[f64]) -> Vec<f64> {
+fn rates(scene: &ForwardModel<'_>, temperature: &[f64]) -> Vec<f64> {
     let times: Vec<f64> = scene.blocks.iter().map(|b| b.time).collect();
     times
         .iter()

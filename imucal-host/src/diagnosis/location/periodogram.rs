@@ -12,9 +12,9 @@ use std::f64::consts::TAU;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::covariate::{Driver, Function};
+use super::covariate::{Covariate, Function};
 use crate::{
-    diagnosis::{mixed_model::whitening::Whitening, search::linearisation::Linear},
+    diagnosis::{mixed_model::whitening::Whitening, search::linearisation::Linearisation},
     effect::Effect,
     recording::{SensorKind, median},
 };
@@ -30,11 +30,11 @@ const PEAK: f64 = 12.0;
 
 /// The beat of a sensor that stands out most, if any does, and among how many it was looked for.
 pub fn beat(
-    linear: &Linear<'_>,
+    linear: &Linearisation<'_>,
     set: &[&'static Effect],
     whitenings: &[Whitening],
     kind: SensorKind,
-) -> Option<(Driver, usize)> {
+) -> Option<(Covariate, usize)> {
     let weighed = weighed_residual(linear, set, whitenings, kind)?;
     let times: Vec<f64> = linear.scene.blocks.iter().map(|block| block.time).collect();
     let duration = linear.scene.duration();
@@ -64,12 +64,12 @@ pub fn beat(
         Function::new(format!("period {period:.1} s"), values)
     };
     let functions = vec![wave(libm::cos), wave(libm::sin)];
-    Some((Driver { name: "frequency".into(), functions }, powers.len()))
+    Some((Covariate { name: "frequency".into(), functions }, powers.len()))
 }
 
 /// Σ⁻¹ r of each axis of a sensor, r what baseline and set leave.
 fn weighed_residual(
-    linear: &Linear<'_>,
+    linear: &Linearisation<'_>,
     set: &[&'static Effect],
     whitenings: &[Whitening],
     kind: SensorKind,

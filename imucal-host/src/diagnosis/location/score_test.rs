@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::{covariate::Driver, covariates::TIME, periodogram};
+use super::{covariate::Covariate, covariates::TIME, periodogram};
 use crate::{
     diagnosis::{
         library::evidence::{Projected, log_evidence},
@@ -13,8 +13,8 @@ use crate::{
             design::Design,
             noise::{NEAR, Noise},
         },
-        residual::{block::Means, forward_model::Scene},
-        search::linearisation::Linear,
+        residual::{block::Means, forward_model::ForwardModel},
+        search::linearisation::Linearisation,
     },
     effect::Effect,
     recording::SensorKind,
@@ -48,20 +48,20 @@ pub struct Following {
 
 /// How each sensor follows each driver once the baseline and `set` are fitted, the surest first.
 pub fn following(
-    linear: &Linear<'_>,
+    linear: &Linearisation<'_>,
     set: &[&'static Effect],
     noise: &Noise,
-    drivers: &[Driver],
+    drivers: &[Covariate],
 ) -> Option<Vec<Following>> {
     let fitted = linear.fitted(set);
     let whitenings = linear.whitenings(noise);
     let bordered = Bordered::new(&linear.design, &whitenings, &fitted);
     let kinds = linear.scene.kinds.iter();
-    let pairs: Vec<(SensorKind, &Driver)> = kinds
+    let pairs: Vec<(SensorKind, &Covariate)> = kinds
         .flat_map(|kind| drivers.iter().map(move |driver| (*kind, driver)))
         .filter(|(kind, driver)| !driver.columns(*kind).is_empty())
         .collect();
-    let follow = |(kind, driver): &(SensorKind, &Driver)| {
+    let follow = |(kind, driver): &(SensorKind, &Covariate)| {
         let normal = bordered.with(&means(*kind, driver, noise));
         let every: Vec<usize> = (0..normal.score.len()).collect();
         let (first, others) = every.split_at(fitted.len());
@@ -75,11 +75,11 @@ pub fn following(
 /// As [`following`], but what would show in a quieter noise is judged again by its evidence, with a noise estimated
 /// beside it: a gap that nothing explains has been taken for drift or scatter. The odds of noise alone are a bound of the
 /// probability that noise would do as much.
-pub fn following_anew(
-    linear: &Linear<'_>,
+pub fn score_tests_refitted(
+    linear: &Linearisation<'_>,
     set: &[&'static Effect],
     noise: &Noise,
-    drivers: &[Driver],
+    drivers: &[Covariate],
 ) -> Option<Vec<Following>> {
     let mut found = following(linear, set, noise, drivers)?;
     let suspects = following(linear, set, &noise.quieter(), drivers)?;
@@ -111,11 +111,11 @@ pub fn following_anew(
 
 /// A driver, chosen among so many, beside a set, by the evidence that it adds with a noise of its own.
 fn judged(
-    linear: &Linear<'_>,
+    linear: &Linearisation<'_>,
     set: &[&'static Effect],
     noise: &Noise,
     kind: SensorKind,
-    driver: &Driver,
+    driver: &Covariate,
     choices: usize,
 ) -> Option<Following> {
     let (mut design, fitted) = with_driver(linear, set, kind, driver, noise);
@@ -151,10 +151,10 @@ impl Following {
 
 /// The columns of the baseline and a set, and of a driver of one sensor behind them; with the number of the former.
 fn with_driver(
-    linear: &Linear<'_>,
+    linear: &Linearisation<'_>,
     set: &[&'static Effect],
     kind: SensorKind,
-    driver: &Driver,
+    driver: &Covariate,
     noise: &Noise,
 ) -> (Design, usize) {
     let fitted = linear.fitted(set);
@@ -163,7 +163,7 @@ fn with_driver(
 }
 
 /// Signatures of a driver on a sensor, of the size of white noise in a sample.
-fn means(kind: SensorKind, driver: &Driver, noise: &Noise) -> Vec<Means> {
+fn means(kind: SensorKind, driver: &Covariate, noise: &Noise) -> Vec<Means> {
     let usual = noise.sensors[kind as usize].white.iter().sum::<f64>() / 3.0;
     let columns = driver.columns(kind).into_iter();
     columns.map(|(function, axis)| on(kind, axis, &driver.functions[function].values, usual)).collect()
@@ -177,7 +177,12 @@ fn on(kind: SensorKind, axis: usize, values: &[f64], usual: f64) -> Means {
     means
 }
 
-fn follow(scene: &Scene<'_>, kind: SensorKind, driver: &Driver, projected: &Projected) -> Option<Following> {
+fn follow(
+    scene: &ForwardModel<'_>,
+    kind: SensorKind,
+    driver: &Covariate,
+    projected: &Projected,
+) -> Option<Following> {
     let places: Vec<usize> = (0..projected.score.len()).collect();
     let (statistic, dimensions) = score_test(projected, &places);
     let p_value = match ChiSquared::new(dimensions.max(1) as f64) {

@@ -107,7 +107,7 @@ mod tests {
 
     use super::{
         super::{
-            random_effects::{Latents, Shared},
+            random_effects::{RandomEffects, Shared},
             whitening::Process,
         },
         *,
@@ -133,7 +133,7 @@ mod tests {
         let whitening = |axis: usize| {
             let weights = (0..BLOCKS).map(|k| 1.0 + ((k + axis) % 3) as f64).collect();
             let latents =
-                Latents::new(&times, weights, &[Shared { blocks: 5..14, courses: courses.clone() }]);
+                RandomEffects::new(&times, weights, &[Shared { blocks: 5..14, courses: courses.clone() }]);
             Whitening::new(Arc::new(latents), 0.7, &[Process { time: 8.0, sigma: 0.5 }])
         };
         let whitenings: Vec<Whitening> = (0..3).map(whitening).collect();

@@ -8,11 +8,11 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use rayon::prelude::*;
 
 use super::{
-    random_effects::{Condensed, Latents, Sparse},
+    random_effects::{CrossProducts, RandomEffects, Sparse},
     whitening::Whitening,
 };
 use crate::{
-    diagnosis::residual::{block::Means, forward_model::Scene},
+    diagnosis::residual::{block::Means, forward_model::ForwardModel},
     effect::Effect,
     recording::SensorKind,
 };
@@ -67,19 +67,19 @@ pub struct Design {
 
 /// All channels, as white noise weighs them: what is the same whatever the drift and the scatter.
 #[derive(Clone, Debug)]
-pub struct CondensedDesign {
+pub struct DesignProducts {
     /// The channels, sensor by sensor.
-    pub channels: Vec<CondensedChannel>,
+    pub channels: Vec<ChannelProducts>,
 }
 
 /// One axis of one sensor.
 #[derive(Clone, Debug)]
-pub struct CondensedChannel {
+pub struct ChannelProducts {
     /// Sensor.
     pub kind: SensorKind,
     ids: Vec<usize>,
     /// Its columns and, last, its residual.
-    pub columns: Condensed,
+    pub columns: CrossProducts,
 }
 
 /// Normal equations: Jᵀ Σ⁻¹ J, Jᵀ Σ⁻¹ r, rᵀ Σ⁻¹ r and ln |Σ|, summed over channels.
@@ -112,7 +112,7 @@ impl Normal {
     }
 
     /// Of condensed columns, the last being the residual.
-    fn of(columns: &Condensed, whitening: &Whitening) -> Self {
+    fn of(columns: &CrossProducts, whitening: &Whitening) -> Self {
         Self::within(&whitening.products(columns), whitening)
     }
 
@@ -180,7 +180,7 @@ impl Channel {
 impl Design {
     /// Channels of the sensors that are there, with columns and a residual.
     pub fn new(
-        scene: &Scene<'_>,
+        scene: &ForwardModel<'_>,
         columns: Vec<Column>,
         signatures: &[impl Borrow<Means> + Sync],
         residual: &Means,
@@ -195,7 +195,7 @@ impl Design {
     }
 
     /// A residual without columns.
-    pub fn of_residual(scene: &Scene<'_>, residual: &Means) -> Self {
+    pub fn of_residual(scene: &ForwardModel<'_>, residual: &Means) -> Self {
         Self::new(scene, Vec::new(), &[] as &[Means], residual)
     }
 
@@ -268,52 +268,52 @@ impl Design {
     /// All columns and before them `count` sparse ones, which a channel may have, given what its blocks have in common.
     pub fn condensed_beside(
         &self,
-        latents: &(dyn Fn(&Channel) -> Latents + Sync),
+        latents: &(dyn Fn(&Channel) -> RandomEffects + Sync),
         sparse: &(dyn Fn(&Channel) -> Sparse + Sync),
         count: usize,
-    ) -> CondensedDesign {
+    ) -> DesignProducts {
         let channels = self.channels.par_iter().map(|channel| {
             let sparse = sparse(channel);
             let columns = Arc::new(latents(channel)).condensed_beside(&sparse, &channel.all());
             let ids = (0..sparse.count).chain(channel.ids.iter().map(|id| count + id)).collect();
-            CondensedChannel { kind: channel.kind, ids, columns }
+            ChannelProducts { kind: channel.kind, ids, columns }
         });
-        CondensedDesign { channels: channels.collect() }
+        DesignProducts { channels: channels.collect() }
     }
 
     /// All columns, given what the blocks of a channel have in common.
-    pub fn condensed(&self, latents: &(dyn Fn(&Channel) -> Latents + Sync)) -> CondensedDesign {
+    pub fn condensed(&self, latents: &(dyn Fn(&Channel) -> RandomEffects + Sync)) -> DesignProducts {
         let channels = self.channels.par_iter().map(|channel| {
             let columns = Arc::new(latents(channel)).condensed(&channel.all());
-            CondensedChannel { kind: channel.kind, ids: channel.ids.clone(), columns }
+            ChannelProducts { kind: channel.kind, ids: channel.ids.clone(), columns }
         });
-        CondensedDesign { channels: channels.collect() }
+        DesignProducts { channels: channels.collect() }
     }
 }
 
-impl CondensedDesign {
+impl DesignProducts {
     /// Some columns, and the residual; those that are not named are out of reach. Of one sensor, or all of them.
     pub fn picked(&self, kind: Option<SensorKind>, wanted: &[usize]) -> Self {
         let channels = self.channels.iter().filter(|channel| kind.is_none_or(|kind| channel.kind == kind));
         let picked = channels.map(|channel| {
             let (mut from, ids) = places(&channel.ids, wanted);
             from.push(channel.ids.len());
-            CondensedChannel { kind: channel.kind, ids, columns: channel.columns.picked(&from) }
+            ChannelProducts { kind: channel.kind, ids, columns: channel.columns.picked(&from) }
         });
         Self { channels: picked.collect() }
     }
 
     /// With the channels of another that are of sensors it has none of.
     pub fn beside(mut self, other: Self) -> Self {
-        let has = |channel: &CondensedChannel| self.channels.iter().any(|own| own.kind == channel.kind);
-        let others: Vec<CondensedChannel> =
+        let has = |channel: &ChannelProducts| self.channels.iter().any(|own| own.kind == channel.kind);
+        let others: Vec<ChannelProducts> =
             other.channels.into_iter().filter(|channel| !has(channel)).collect();
         self.channels.extend(others);
         self
     }
 
     /// Normal equations of its columns, of which there are `size`.
-    pub fn normal(&self, size: usize, whitening: &(dyn Fn(&CondensedChannel) -> Whitening + Sync)) -> Normal {
+    pub fn normal(&self, size: usize, whitening: &(dyn Fn(&ChannelProducts) -> Whitening + Sync)) -> Normal {
         let parts: Vec<Normal> = self
             .channels
             .par_iter()

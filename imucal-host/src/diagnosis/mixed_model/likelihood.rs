@@ -19,7 +19,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::{
-    design::{CondensedDesign, Normal},
+    design::{DesignProducts, Normal},
     whitening::{Process, Still, Stilled, Whitening},
 };
 use crate::recording::SensorKind;
@@ -32,7 +32,7 @@ type Asked = (f64, [Process; 2]);
 
 /// The likelihood of one sensor's residual.
 pub struct Likelihood {
-    design: CondensedDesign,
+    design: DesignProducts,
     size: usize,
     /// The columns of each channel under a scatter.
     stilled: RefCell<Vec<(f64, Arc<Vec<Stilled>>)>>,
@@ -41,7 +41,7 @@ pub struct Likelihood {
 
 impl Likelihood {
     /// Of a sensor's residual, less some columns of a design.
-    pub fn new(design: &CondensedDesign, kind: SensorKind, columns: &[usize]) -> Self {
+    pub fn new(design: &DesignProducts, kind: SensorKind, columns: &[usize]) -> Self {
         let design = design.picked(Some(kind), columns);
         Self { design, size: columns.len(), stilled: RefCell::default(), known: RefCell::default() }
     }
@@ -57,7 +57,7 @@ impl Likelihood {
             Normal::within(&whitening.stilled_products(stilled), &whitening)
         };
         let parts: Vec<Normal> = self.stilled(scatter).par_iter().map(part).collect();
-        let value = restricted(&self.design.sum(self.size, &parts));
+        let value = reml_criterion(&self.design.sum(self.size, &parts));
         self.known.borrow_mut().push(((scatter, drifts), value));
         value
     }
@@ -77,7 +77,7 @@ impl Likelihood {
 }
 
 /// −2 ln of the restricted likelihood, but for a constant.
-pub fn restricted(normal: &Normal) -> f64 {
+pub fn reml_criterion(normal: &Normal) -> f64 {
     let n = normal.score.len();
     let prior = 1.0 / (LOOSE * LOOSE);
     let loosened = &normal.information + DMatrix::identity(n, n) * prior;
@@ -93,7 +93,7 @@ mod tests {
     use super::{
         super::{
             design::{Channel, Design},
-            random_effects::{Latents, Shared},
+            random_effects::{RandomEffects, Shared},
         },
         *,
     };
@@ -136,14 +136,14 @@ mod tests {
             };
             normal.add(&part, &channel.ids);
         }
-        restricted(&normal)
+        reml_criterion(&normal)
     }
 
     #[test]
     fn it_is_that_of_its_definition_in_whatever_order_noises_are_asked_for() {
         let times: Vec<f64> = (0..BLOCKS).map(time).collect();
         let shared = [Shared { blocks: 0..9, courses: vec![vec![COURSE; 9]] }];
-        let condensed = design().condensed(&|_| Latents::new(&times, vec![2.0; BLOCKS], &shared));
+        let condensed = design().condensed(&|_| RandomEffects::new(&times, vec![2.0; BLOCKS], &shared));
         let likelihood = Likelihood::new(&condensed, SensorKind::Mag, &[0, 1, 2]);
         let asked = [(0.3, 1.0), (2.0, 1.0), (0.3, 4.0), (0.3, 1.0), (2.0, 0.1), (2.0, 1.0)];
         for (scatter, sigma) in asked {

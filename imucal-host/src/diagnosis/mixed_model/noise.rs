@@ -12,14 +12,14 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{
-    design::{Channel, CondensedDesign, Design, Normal},
+    design::{Channel, Design, DesignProducts, Normal},
     likelihood::Likelihood,
-    random_effects::Latents,
-    repeatability::Scattered,
+    random_effects::RandomEffects,
+    repeatability::PointingErrors,
     whitening::{Process, Whitening},
 };
 use crate::{
-    diagnosis::residual::{block::Block, forward_model::Scene},
+    diagnosis::residual::{block::Block, forward_model::ForwardModel},
     recording::SensorKind,
 };
 
@@ -71,14 +71,14 @@ pub struct Noise {
 
 impl Noise {
     /// Normal equations of all columns of a condensed design, of which there are `size`.
-    pub fn normal(&self, design: &CondensedDesign, size: usize) -> Normal {
+    pub fn normal(&self, design: &DesignProducts, size: usize) -> Normal {
         let sensor = |kind: SensorKind| &self.sensors[kind as usize];
         design.normal(size, &|channel| sensor(channel.kind).whitening(&channel.columns.latents))
     }
 
     /// −ln of the prior of all that are as likely, but for a constant.
-    pub fn surprise(&self) -> f64 {
-        self.sensors.iter().map(SensorNoise::surprise).sum()
+    pub fn neg_log_prior(&self) -> f64 {
+        self.sensors.iter().map(SensorNoise::neg_log_prior).sum()
     }
 
     /// With smaller drifts and scatter: what an unmodelled effect has put into them comes to light.
@@ -119,7 +119,7 @@ impl Noise {
 /// What weighs the blocks: the scene, and what each sensor is given there.
 pub struct Weighing<'s> {
     /// The scene.
-    pub scene: &'s Scene<'s>,
+    pub scene: &'s ForwardModel<'s>,
     times: Vec<f64>,
     /// Mean output of each block, by sensor: scatter turns it.
     pub given: [Vec<Vector3<f64>>; 3],
@@ -127,7 +127,7 @@ pub struct Weighing<'s> {
 
 impl<'s> Weighing<'s> {
     /// With the outputs of the simulator, block by block.
-    pub fn new(scene: &'s Scene<'s>, given: [Vec<Vector3<f64>>; 3]) -> Self {
+    pub fn new(scene: &'s ForwardModel<'s>, given: [Vec<Vector3<f64>>; 3]) -> Self {
         Self { scene, times: scene.blocks.iter().map(|block| block.time).collect(), given }
     }
 
@@ -157,12 +157,12 @@ impl<'s> Weighing<'s> {
     }
 
     /// What the blocks of a channel have in common, but for the scatter.
-    pub fn drifting(&self, channel: &Channel, noise: &Noise) -> Latents {
-        Latents::new(&self.times, self.weights(channel, noise, &|_| true), &[])
+    pub fn drifting(&self, channel: &Channel, noise: &Noise) -> RandomEffects {
+        RandomEffects::new(&self.times, self.weights(channel, noise, &|_| true), &[])
     }
 
     /// A design's columns, as white noise weighs them.
-    pub fn condensed(&self, design: &Design, noise: &Noise) -> CondensedDesign {
+    pub fn condensed(&self, design: &Design, noise: &Noise) -> DesignProducts {
         design.condensed(&|channel| self.latents(channel, noise, &|_| true))
     }
 
@@ -176,16 +176,21 @@ impl<'s> Weighing<'s> {
         white * white / count + sensor.drift.iter().map(|sigma| sigma * sigma).sum::<f64>() + scatter
     }
 
-    fn scattered(&self, channel: &Channel) -> Scattered<'_> {
+    fn scattered(&self, channel: &Channel) -> PointingErrors<'_> {
         let given = &self.given[channel.kind as usize];
-        Scattered { scene: self.scene, kind: channel.kind, axis: channel.axis, given }
+        PointingErrors { scene: self.scene, kind: channel.kind, axis: channel.axis, given }
     }
 
     /// What the blocks of a channel have in common, by its white noise; of some of them, as if the others had not been
     /// measured.
-    fn latents(&self, channel: &Channel, noise: &Noise, inside: &(dyn Fn(usize) -> bool + Sync)) -> Latents {
+    fn latents(
+        &self,
+        channel: &Channel,
+        noise: &Noise,
+        inside: &(dyn Fn(usize) -> bool + Sync),
+    ) -> RandomEffects {
         let weights = self.weights(channel, noise, inside);
-        Latents::new(&self.times, weights, &self.scattered(channel).shared())
+        RandomEffects::new(&self.times, weights, &self.scattered(channel).shared())
     }
 
     fn weights(&self, channel: &Channel, noise: &Noise, inside: &(dyn Fn(usize) -> bool + Sync)) -> Vec<f64> {
@@ -203,7 +208,7 @@ impl<'s> Weighing<'s> {
     /// whose white noise the design was condensed, and goes by these factors.
     pub fn fit(
         &self,
-        design: &CondensedDesign,
+        design: &DesignProducts,
         kind: SensorKind,
         columns: &[usize],
         start: &Noise,
@@ -211,7 +216,7 @@ impl<'s> Weighing<'s> {
     ) -> SensorNoise {
         let asked = Likelihood::new(design, kind, columns);
         let likelihood =
-            |sensor: &SensorNoise| asked.of(sensor.scatter, sensor.drifts()) + 2.0 * sensor.surprise();
+            |sensor: &SensorNoise| asked.of(sensor.scatter, sensor.drifts()) + 2.0 * sensor.neg_log_prior();
         let start = SensorNoise { breadth: 0.0, ..start.sensors[kind as usize] };
         // Between two correlation times lies a hill: each is searched by itself.
         let mut starts = SLOW.map(|slow| start.with_slow(slow)).map(|start| (start, likelihood(&start)));
@@ -239,13 +244,13 @@ impl<'s> Weighing<'s> {
         0..if kind == SensorKind::Gyr { 2 } else { 3 }
     }
 
-    /// Standard deviations changed one by one while `surprise` falls, and its end.
+    /// Standard deviations changed one by one while `objective` falls, and its end.
     fn descended(
         &self,
         kind: SensorKind,
         (mut best, mut least): (SensorNoise, f64),
         steps: &[f64],
-        surprise: &dyn Fn(&SensorNoise) -> f64,
+        objective: &dyn Fn(&SensorNoise) -> f64,
     ) -> (SensorNoise, f64) {
         for factor in steps {
             for _ in 0..ROUNDS {
@@ -253,7 +258,7 @@ impl<'s> Weighing<'s> {
                 for coordinate in self.coordinates(kind) {
                     for step in [*factor, 1.0 / factor] {
                         while let Some(tried) = self.scaled(best, coordinate, step) {
-                            let found = surprise(&tried);
+                            let found = objective(&tried);
                             if found >= least - WORTH {
                                 break;
                             }
@@ -283,7 +288,7 @@ impl<'s> Weighing<'s> {
 
 impl SensorNoise {
     /// Σ⁻¹ of one of the sensor's axes.
-    fn whitening(&self, latents: &Arc<Latents>) -> Whitening {
+    fn whitening(&self, latents: &Arc<RandomEffects>) -> Whitening {
         Whitening::new(Arc::clone(latents), self.scatter, &self.drifts())
     }
 
@@ -293,7 +298,7 @@ impl SensorNoise {
     }
 
     /// −ln of the prior of all that are as likely, but for a constant.
-    fn surprise(&self) -> f64 {
+    fn neg_log_prior(&self) -> f64 {
         if self.slow < WALK { -self.breadth } else { WALKS - self.breadth }
     }
 

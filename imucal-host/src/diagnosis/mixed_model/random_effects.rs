@@ -73,7 +73,7 @@ pub struct Stretch {
 
 /// The blocks of one channel, as white noise weighs them.
 #[derive(Clone, Debug)]
-pub struct Latents {
+pub struct RandomEffects {
     /// Inverse white variance of each block, zero where it holds nothing.
     pub weights: Vec<f64>,
     /// The knot before each block and how far it lies on the way to the next, 0 to 1.
@@ -92,9 +92,9 @@ pub struct Latents {
 
 /// Columns of a channel, as white noise weighs them.
 #[derive(Clone, Debug)]
-pub struct Condensed {
+pub struct CrossProducts {
     /// The blocks.
-    pub latents: Arc<Latents>,
+    pub latents: Arc<RandomEffects>,
     /// Xᵀ D⁻¹ X.
     pub plain: DMatrix<f64>,
     /// Xᵀ D⁻¹ U, a column for each course of each stretch.
@@ -103,7 +103,7 @@ pub struct Condensed {
     pub beside: DMatrix<f64>,
 }
 
-impl Latents {
+impl RandomEffects {
     /// From the blocks' times, s, increasing; their inverse white variances; and what stretches share.
     pub fn new(times: &[f64], weights: Vec<f64>, shared: &[Shared]) -> Self {
         let start = times.first().copied().unwrap_or(0.0);
@@ -145,7 +145,7 @@ impl Latents {
     }
 
     /// Some columns over the blocks.
-    pub fn condensed(self: &Arc<Self>, x: &DMatrix<f64>) -> Condensed {
+    pub fn condensed(self: &Arc<Self>, x: &DMatrix<f64>) -> CrossProducts {
         let columns = x.ncols();
         let weighted = self.weighted(x);
         let mut beside = DMatrix::zeros(columns, self.knots);
@@ -162,11 +162,11 @@ impl Latents {
             }
         }
         let plain = symmetric_product::with_product(DMatrix::zeros(columns, columns), 1.0, &weighted, x);
-        Condensed { latents: Arc::clone(self), plain, along, beside }
+        CrossProducts { latents: Arc::clone(self), plain, along, beside }
     }
 
     /// Sparse columns, and behind them some others.
-    pub fn condensed_beside(self: &Arc<Self>, sparse: &Sparse, x: &DMatrix<f64>) -> Condensed {
+    pub fn condensed_beside(self: &Arc<Self>, sparse: &Sparse, x: &DMatrix<f64>) -> CrossProducts {
         let dense = self.condensed(x);
         let (n, own) = (sparse.count, x.ncols());
         if n == 0 {
@@ -200,7 +200,7 @@ impl Latents {
         }
         plain.view_mut((n, 0), (own, n)).copy_from(&across);
         plain.view_mut((0, n), (n, own)).copy_from(&across.transpose());
-        Condensed { latents: Arc::clone(self), plain, along, beside }
+        CrossProducts { latents: Arc::clone(self), plain, along, beside }
     }
 }
 
@@ -227,7 +227,7 @@ impl Stretch {
     }
 }
 
-impl Condensed {
+impl CrossProducts {
     /// Some of the columns, by their place.
     pub fn picked(&self, places: &[usize]) -> Self {
         let rows = |matrix: &DMatrix<f64>| matrix.select_rows(places);
@@ -250,7 +250,7 @@ mod tests {
         let times: Vec<f64> = (0..blocks).map(|k| 0.7 * k as f64).collect();
         let weights = (0..blocks).map(|k| 1.0 + (k % 3) as f64).collect();
         let courses = vec![(0..9).map(|k| f64::from(k) - 3.5).collect(), vec![0.4; 9]];
-        let latents = Arc::new(Latents::new(&times, weights, &[Shared { blocks: 5..14, courses }]));
+        let latents = Arc::new(RandomEffects::new(&times, weights, &[Shared { blocks: 5..14, courses }]));
         let value = |block: usize, column: usize| (block as f64 + 2.0 * column as f64).sin();
         let held = |block: usize, column: usize| column == block / 10 || column == 3 - block / 10;
         let rows = (0..blocks).map(|block| {

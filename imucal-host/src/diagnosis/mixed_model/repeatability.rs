@@ -20,7 +20,9 @@ use nalgebra::Vector3;
 
 use super::random_effects::Shared;
 use crate::{
-    diagnosis::residual::{block::Block, forward_model::Scene, gimbal_derivatives::gimbal_derivatives},
+    diagnosis::residual::{
+        block::Block, forward_model::ForwardModel, gimbal_derivatives::gimbal_derivatives,
+    },
     recording::SensorKind,
 };
 
@@ -28,9 +30,9 @@ use crate::{
 const LONGEST: f64 = 20.0;
 
 /// One axis of a sensor and what it is given.
-pub struct Scattered<'a> {
+pub struct PointingErrors<'a> {
     /// The scene.
-    pub scene: &'a Scene<'a>,
+    pub scene: &'a ForwardModel<'a>,
     /// The sensor.
     pub kind: SensorKind,
     /// Its axis.
@@ -39,7 +41,7 @@ pub struct Scattered<'a> {
     pub given: &'a [Vector3<f64>],
 }
 
-impl Scattered<'_> {
+impl PointingErrors<'_> {
     /// What each rest shares, and each stretch of a movement, for a scatter of 1 rad.
     pub fn shared(&self) -> Vec<Shared> {
         if self.kind == SensorKind::Gyr {

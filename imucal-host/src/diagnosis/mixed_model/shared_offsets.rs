@@ -18,14 +18,16 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::{
-    design::{Channel, CondensedDesign, Design, Normal},
+    design::{Channel, Design, DesignProducts, Normal},
     noise::{Noise, Weighing},
     random_effects::Sparse,
     repeatability::stretches,
     schur_complement::eliminated,
 };
 use crate::{
-    diagnosis::residual::{block::Block, forward_model::Scene, gimbal_derivatives::gimbal_derivatives},
+    diagnosis::residual::{
+        block::Block, forward_model::ForwardModel, gimbal_derivatives::gimbal_derivatives,
+    },
     recording::SensorKind,
 };
 
@@ -34,15 +36,20 @@ const RATIO: f64 = 1.5;
 const STEPS: i32 = 8;
 
 /// All columns, as white noise weighs them, and before them the gimbals' offsets at so many nodes.
-pub struct Offsets {
-    condensed: CondensedDesign,
+pub struct SharedOffsets {
+    condensed: DesignProducts,
     count: usize,
 }
 
-impl Offsets {
+impl SharedOffsets {
     /// The gimbals' offsets at nodes beside all columns, by a noise's white one; `None` where no rig guides the sensor, or
     /// nothing but a gyroscope was recorded.
-    pub fn of(scene: &Scene<'_>, design: &Design, weighing: &Weighing<'_>, noise: &Noise) -> Option<Self> {
+    pub fn of(
+        scene: &ForwardModel<'_>,
+        design: &Design,
+        weighing: &Weighing<'_>,
+        noise: &Noise,
+    ) -> Option<Self> {
         let turned = gimbal_derivatives(scene);
         if turned.is_empty() || scene.kinds == [SensorKind::Gyr] {
             return None;
@@ -70,7 +77,7 @@ impl Offsets {
     /// The greatest value of the normal equations of the fitted columns over the scatter of the offsets.
     pub fn likeliest(
         &self,
-        scene: &Scene<'_>,
+        scene: &ForwardModel<'_>,
         noise: &Noise,
         fitted: &[usize],
         value_of: &(dyn Fn(&Normal) -> Option<f64> + Sync),
@@ -83,7 +90,7 @@ impl Offsets {
 }
 
 /// Scatter of the sensors that show it, rad.
-fn usual_scatter(scene: &Scene<'_>, noise: &Noise) -> f64 {
+fn usual_scatter(scene: &ForwardModel<'_>, noise: &Noise) -> f64 {
     let shown = scene.kinds.iter().filter(|kind| **kind != SensorKind::Gyr);
     let logs: Vec<f64> = shown.map(|kind| noise.sensors[*kind as usize].scatter.ln()).collect();
     (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp()

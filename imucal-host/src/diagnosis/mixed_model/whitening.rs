@@ -20,7 +20,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{
-    random_effects::{COURSES, Condensed, Latents, SPACING, Stretch},
+    random_effects::{COURSES, CrossProducts, RandomEffects, SPACING, Stretch},
     skyline::{Factor, Skyline},
     symmetric_product,
 };
@@ -46,7 +46,7 @@ struct Common {
 /// (D + σ² U Uᵀ)⁻¹ of one channel: what is the same whatever the drift.
 #[derive(Clone, Debug)]
 pub struct Still {
-    latents: Arc<Latents>,
+    latents: Arc<RandomEffects>,
     commons: Vec<Common>,
     log_determinant: f64,
 }
@@ -74,7 +74,7 @@ pub struct Whitening {
 
 impl Still {
     /// From what blocks have in common, and the scatter of that.
-    pub fn new(latents: Arc<Latents>, scatter: f64) -> Self {
+    pub fn new(latents: Arc<RandomEffects>, scatter: f64) -> Self {
         let mut log_determinant = latents.log_determinant;
         let mut common = |stretch| {
             let (common, share) = Common::new(stretch, scatter);
@@ -86,7 +86,7 @@ impl Still {
     }
 
     /// Columns that were condensed from the same blocks.
-    pub fn weighed(self: &Arc<Self>, x: &Condensed) -> Stilled {
+    pub fn weighed(self: &Arc<Self>, x: &CrossProducts) -> Stilled {
         let (along, knots) = self.shared(x);
         let plain = symmetric_product::with_product(x.plain.clone(), -1.0, &along, &along.transpose());
         Stilled { still: Arc::clone(self), plain, knots }
@@ -97,7 +97,7 @@ impl Still {
     }
 
     /// Bᵀ, and Xᵀ (D + σ² U Uᵀ)⁻¹ Z; a row a column.
-    fn shared(&self, x: &Condensed) -> (DMatrix<f64>, DMatrix<f64>) {
+    fn shared(&self, x: &CrossProducts) -> (DMatrix<f64>, DMatrix<f64>) {
         let mut along = DMatrix::zeros(x.along.nrows(), self.latents.courses);
         let mut knots = x.beside.clone();
         for (stretch, common) in self.common() {
@@ -118,7 +118,7 @@ impl Still {
 impl Whitening {
     /// From what blocks have in common, the scatter of that, and drifts. Drifts that make the matrix indefinite by
     /// rounding are left out.
-    pub fn new(latents: Arc<Latents>, scatter: f64, drifts: &[Process]) -> Self {
+    pub fn new(latents: Arc<RandomEffects>, scatter: f64, drifts: &[Process]) -> Self {
         Self::drifting(Arc::new(Still::new(latents, scatter)), drifts)
     }
 
@@ -138,7 +138,7 @@ impl Whitening {
     }
 
     /// What the blocks have in common.
-    pub fn latents(&self) -> &Arc<Latents> {
+    pub fn latents(&self) -> &Arc<RandomEffects> {
         &self.still.latents
     }
 
@@ -192,7 +192,7 @@ impl Whitening {
     }
 
     /// Xᵀ Σ⁻¹ X of columns that were condensed from the same blocks.
-    pub fn products(&self, x: &Condensed) -> DMatrix<f64> {
+    pub fn products(&self, x: &CrossProducts) -> DMatrix<f64> {
         self.stilled_products(&self.still.weighed(x))
     }
 
@@ -203,12 +203,12 @@ impl Whitening {
     }
 
     /// Xᵀ Σ⁻¹ X of condensed columns, given what they show of all but white noise.
-    pub fn less(&self, x: &Condensed, latent: &DMatrix<f64>) -> DMatrix<f64> {
+    pub fn less(&self, x: &CrossProducts, latent: &DMatrix<f64>) -> DMatrix<f64> {
         symmetric_product::with_product(x.plain.clone(), -1.0, latent, &latent.transpose())
     }
 
     /// What condensed columns show of all but white noise, Bᵀ and Yᵀ: a row a column.
-    pub fn latent(&self, x: &Condensed) -> DMatrix<f64> {
+    pub fn latent(&self, x: &CrossProducts) -> DMatrix<f64> {
         let (along, knots) = self.still.shared(x);
         let drifts = self.drifts(&knots);
         let mut latent = DMatrix::zeros(x.plain.ncols(), along.ncols() + drifts.ncols());
@@ -231,7 +231,7 @@ impl Whitening {
 
     /// Σ⁻¹ x of one column over the blocks: what white noise alone leaves of it, less what it shows of all else.
     pub fn apply(&self, x: &[f64], out: &mut [f64]) {
-        let Latents { weights, places, knots, .. } = &**self.latents();
+        let RandomEffects { weights, places, knots, .. } = &**self.latents();
         let (along, beside) =
             self.still.shared(&self.latents().condensed(&DMatrix::from_column_slice(x.len(), 1, x)));
         let mut drift = vec![0.0; *knots];
@@ -338,7 +338,7 @@ mod tests {
         let drifts = [Process { time: 8.0, sigma: 0.9 }, Process { time: 150.0, sigma: 2.0 }];
         for drifts in [&drifts[..], &drifts[..1], &[]] {
             let sigma = dense(&times, &weights, &shared, drifts);
-            let latents = Arc::new(Latents::new(&times, weights.clone(), &shared));
+            let latents = Arc::new(RandomEffects::new(&times, weights.clone(), &shared));
             let whitening = Whitening::new(Arc::clone(&latents), SCATTER, drifts);
             let log_determinant = sigma.clone().cholesky().unwrap().ln_determinant();
             assert!((whitening.log_determinant - log_determinant).abs() < 1e-8);

@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::{model::Model, rest_to_rest::Held};
+use super::{model::Model, rest_to_rest::RestToRest};
 use crate::{
     observe::{motion, motion::Attitudes},
     recording::{
@@ -32,7 +32,7 @@ pub struct Reference {
     /// The movement.
     pub movement: Box<dyn Recorded>,
     /// The rests that it is reconstructed from, where neither encoders nor a reference attitude were recorded.
-    pub held: Option<Held>,
+    pub held: Option<RestToRest>,
 }
 
 /// The movement of a recording; a reference attitude is moved by `offset`, s: the row of t then shows the movement of
@@ -84,7 +84,7 @@ pub fn reference(
             })
         }
         (None, None) => {
-            let told = Held::new(recording, integrity, model, temperature, place)?;
+            let told = RestToRest::new(recording, integrity, model, temperature, place)?;
             held = Some(told.clone());
             Box::new(told)
         }

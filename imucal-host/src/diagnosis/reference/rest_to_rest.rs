@@ -39,7 +39,7 @@ const MARGIN: f64 = 0.25;
 
 /// Rests of a sensor in a hand and the turns between them.
 #[derive(Clone, Debug)]
-pub struct Held {
+pub struct RestToRest {
     tracked: Tracked,
     moving: Vec<bool>,
     known: Vec<bool>,
@@ -55,7 +55,7 @@ pub struct Held {
     pub with_gyroscope: bool,
 }
 
-impl Held {
+impl RestToRest {
     /// From the rests of a recording; its sensors are corrected by the model where it holds them, else by a calibration of
     /// the recording itself.
     ///
@@ -267,7 +267,7 @@ fn carrying(from: &Vector3<f64>, to: &Vector3<f64>) -> Matrix3<f64> {
     Rotation3::rotation_between(from, to).unwrap_or_else(about_x).into_inner()
 }
 
-impl Motion for Held {
+impl Motion for RestToRest {
     fn duration(&self) -> f64 {
         self.tracked.duration()
     }
@@ -292,7 +292,7 @@ impl Motion for Held {
     }
 }
 
-impl Recorded for Held {
+impl Recorded for RestToRest {
     /// Outside of rests.
     fn moving(&self) -> &[bool] {
         &self.moving

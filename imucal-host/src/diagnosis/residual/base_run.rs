@@ -16,7 +16,7 @@ use std::{
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::{block::Means, forward_model::Scene, sample_points::Nodes};
+use super::{block::Means, forward_model::ForwardModel, sample_points::SamplePoints};
 use crate::{
     effect::{Act, Effect, Input, Parameter, Role, Truth},
     recording::SensorKind,
@@ -30,8 +30,8 @@ const STEP: (f64, f64, f64) = (0.1, 0.02, 0.25);
 /// A simulated run at the nodes, to be differentiated.
 pub struct Reference<'s> {
     /// What is simulated beside.
-    pub scene: &'s Scene<'s>,
-    nodes: &'s Nodes,
+    pub scene: &'s ForwardModel<'s>,
+    nodes: &'s SamplePoints,
     /// Effects of the run, the baseline among them.
     pub doses: Vec<Dose>,
     truth: Vec<Truth>,
@@ -45,7 +45,7 @@ type Known = Mutex<HashMap<(&'static str, usize, Vec<u64>), Arc<Means>>>;
 
 impl<'s> Reference<'s> {
     /// The run with these effects. `None` where a triad is singular.
-    pub fn new(scene: &'s Scene<'s>, doses: Vec<Dose>, nodes: &'s Nodes) -> Option<Self> {
+    pub fn new(scene: &'s ForwardModel<'s>, doses: Vec<Dose>, nodes: &'s SamplePoints) -> Option<Self> {
         let truth = scene.truth(&doses, nodes);
         let input: Vec<Input> = truth.iter().map(Input::of).collect();
         let outputs = scene.outputs(&doses, &SensorKind::ALL, &input)?;

@@ -11,12 +11,12 @@ use rayon::prelude::*;
 
 use super::{
     block::{Block, Means, cut},
-    gravity_observables::View,
-    sample_points::Nodes,
+    gravity_observables::GravityObservables,
+    sample_points::SamplePoints,
     transient,
 };
 use crate::{
-    diagnosis::reference::rest_to_rest::Held,
+    diagnosis::reference::rest_to_rest::RestToRest,
     effect::{Effect, Input, Swing, Truth},
     recording::{Recording, SensorKind},
     simulator::{Dose, Recorded, chain::Chain},
@@ -29,13 +29,13 @@ const NODES: (f64, f64) = (0.045, 0.0175);
 const RESTING: f64 = 0.25;
 
 /// What is simulated beside a recording.
-pub struct Scene<'a> {
+pub struct ForwardModel<'a> {
     /// The recording.
     pub recording: &'a Recording,
     /// Its blocks; where a view looks at it, those of the view.
     pub blocks: Vec<Block>,
     pub(super) cuts: Vec<Block>,
-    pub(super) view: Option<View>,
+    pub(super) view: Option<GravityObservables>,
     /// Sensors that are there.
     pub kinds: Vec<SensorKind>,
     /// Swings of the gimbals at each row; `None` without gimbals.
@@ -48,14 +48,14 @@ pub struct Scene<'a> {
     /// The triads that the simulator starts from, by [`SensorKind::ALL`].
     pub triads: [Triad<f64>; 3],
     /// Nodes for signatures.
-    pub fine: Nodes,
+    pub fine: SamplePoints,
     /// One node a block: to look where in time an effect without memory lies.
-    pub coarse: Nodes,
+    pub coarse: SamplePoints,
     /// Computed by `gimbal_derivatives` when it is first asked for.
     pub(super) gimbal_derivatives: OnceLock<Vec<Means>>,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> ForwardModel<'a> {
     /// Beside `recording`, the rows of each sensor that are to be used, a movement, and the triads that the simulator starts from, by [`SensorKind::ALL`].
     pub fn new(
         recording: &'a Recording,
@@ -84,8 +84,8 @@ impl<'a> Scene<'a> {
         };
         // Across a gap of a reference it is bridged as if it turned evenly: no derivative is to be taken there.
         let told = |row: usize| motion.swings().is_some() || motion.known()[row];
-        let fine = Nodes::choose(&recording.time, &blocks, fine, told);
-        let coarse = Nodes::choose(&recording.time, &blocks, |_| 1, |_| true);
+        let fine = SamplePoints::choose(&recording.time, &blocks, fine, told);
+        let coarse = SamplePoints::choose(&recording.time, &blocks, |_| 1, |_| true);
         Self {
             recording,
             cuts: blocks.clone(),
@@ -105,10 +105,11 @@ impl<'a> Scene<'a> {
 
     /// Looked at by way of the rests of a hand; what the magnetometer is given there is not known.
     #[must_use]
-    pub fn through(mut self, held: &Held) -> Self {
+    pub fn through(mut self, held: &RestToRest) -> Self {
         let gravity = self.motion.place().gravity;
         let of = |time: f64| self.motion.truth(time, &|_| ()).c_t_p;
-        let view = View::new(held, &self.recording.time, &self.cuts, &self.counts, &of, gravity);
+        let view =
+            GravityObservables::new(held, &self.recording.time, &self.cuts, &self.counts, &of, gravity);
         self.kinds.retain(|kind| match kind {
             SensorKind::Acc => true,
             SensorKind::Gyr => held.with_gyroscope,
@@ -172,11 +173,11 @@ impl<'a> Scene<'a> {
         self.motion.duration()
     }
 
-    pub(super) fn truth(&self, doses: &[Dose], nodes: &Nodes) -> Vec<Truth> {
+    pub(super) fn truth(&self, doses: &[Dose], nodes: &SamplePoints) -> Vec<Truth> {
         Chain::new(doses).truth(self.motion.steady(), &nodes.times)
     }
 
-    pub(super) fn inputs(&self, doses: &[Dose], nodes: &Nodes) -> Vec<Input> {
+    pub(super) fn inputs(&self, doses: &[Dose], nodes: &SamplePoints) -> Vec<Input> {
         Chain::new(doses).inputs(self.motion.steady(), &nodes.times)
     }
 

@@ -2,15 +2,15 @@
 //!
 //! Taken with the triads that the simulator starts from: what is fitted later changes it in the second order only.
 
-use super::{base_run::Reference, block::Means, forward_model::Scene};
+use super::{base_run::Reference, block::Means, forward_model::ForwardModel};
 use crate::effect::find;
 
 /// The change for each gimbal, outermost first, block by block; empty where no gimbals turn the sensor.
-pub fn gimbal_derivatives<'s>(scene: &'s Scene<'_>) -> &'s [Means] {
+pub fn gimbal_derivatives<'s>(scene: &'s ForwardModel<'_>) -> &'s [Means] {
     scene.gimbal_derivatives.get_or_init(|| computed(scene).unwrap_or_default())
 }
 
-fn computed(scene: &Scene<'_>) -> Option<Vec<Means>> {
+fn computed(scene: &ForwardModel<'_>) -> Option<Vec<Means>> {
     let offset = find("rig.encoder_offset").filter(|_| scene.swings.is_some())?;
     let reference = Reference::new(scene, Vec::new(), &scene.coarse)?;
     let neutral = offset.neutral(scene.duration());

@@ -14,11 +14,11 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::block::{Block, Means};
-use crate::{diagnosis::reference::rest_to_rest::Held, recording::SensorKind};
+use crate::{diagnosis::reference::rest_to_rest::RestToRest, recording::SensorKind};
 
 /// How block means become rows.
 #[derive(Clone, Debug)]
-pub struct View {
+pub struct GravityObservables {
     /// A block for each rest, and an empty one that holds the common rotation.
     pub blocks: Vec<Block>,
     /// Usable rows of each, by sensor.
@@ -44,10 +44,10 @@ struct Rest {
     turn: Vec<(usize, Matrix3<f64>, f64, f64)>,
 }
 
-impl View {
+impl GravityObservables {
     /// Of a movement whose means are over `cuts`, with usable rows `counts`; attitudes in the middle of the cuts are `of`.
     pub fn new(
-        held: &Held,
+        held: &RestToRest,
         time: &[f64],
         cuts: &[Block],
         counts: &[Vec<usize>; 3],

@@ -7,13 +7,13 @@ use super::block::Block;
 
 /// Rows at which a run is simulated.
 #[derive(Clone, Debug, Default)]
-pub struct Nodes {
+pub struct SamplePoints {
     /// Their times, s.
     pub times: Vec<f64>,
     blocks: Vec<usize>,
 }
 
-impl Nodes {
+impl SamplePoints {
     /// So many rows of each block, evenly over it, of those where the movement is told.
     pub fn choose(
         time: &[f64],

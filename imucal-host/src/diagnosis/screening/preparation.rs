@@ -11,7 +11,7 @@ use super::{
     reference_offset,
 };
 use crate::{
-    diagnosis::reference::{model::Model, movement, movement::Reference, rest_to_rest::Held, revisits},
+    diagnosis::reference::{model::Model, movement, movement::Reference, rest_to_rest::RestToRest, revisits},
     effect::{Act, DataRun, Effect, Spoils, axis_swap},
     recording::{
         Recording, SensorKind, Triple,
@@ -28,11 +28,11 @@ const CLIPPED: f64 = 5.0;
 const BESIDE: f64 = 0.5;
 
 /// What a diagnosis stands on.
-pub struct Footing {
+pub struct Preparation {
     /// The recorded movement.
     pub movement: Box<dyn Recorded>,
     /// The rests that it was told from, where neither a rig nor a reference tells it.
-    pub held: Option<Held>,
+    pub held: Option<RestToRest>,
     /// What a reference was moved by in time to follow the samples, s: see [`reference_offset::coarse`].
     pub moved: f64,
     /// Rows of each sensor that can be used, by [`SensorKind::ALL`].
@@ -47,7 +47,7 @@ pub struct Footing {
     pub remarks: Vec<String>,
 }
 
-impl Footing {
+impl Preparation {
     /// Of a recording, with the model of its unit where there is one.
     ///
     /// # Errors

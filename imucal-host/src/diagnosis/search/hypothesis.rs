@@ -4,7 +4,7 @@ use crate::{diagnosis::mixed_model::noise::Noise, effect::Effect};
 
 /// A set of effects and how it does axis by axis: its noise, and its evidence so far.
 #[derive(Clone, Debug)]
-pub struct Sifted {
+pub struct Screened {
     /// The effects.
     pub set: Vec<&'static Effect>,
     /// The noise that suits it.
@@ -15,7 +15,7 @@ pub struct Sifted {
 
 /// A set of effects and how it was judged.
 #[derive(Clone, Debug)]
-pub struct Judged {
+pub struct Scored {
     /// The effects.
     pub set: Vec<&'static Effect>,
     /// The noise that suits it.

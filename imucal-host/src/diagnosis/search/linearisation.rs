@@ -5,8 +5,8 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::{
-    hypothesis::{Judged, Sifted},
-    memo::Latest,
+    hypothesis::{Scored, Screened},
+    memo::Memo,
     refit::{Fit, columns, signatures},
 };
 use crate::{
@@ -14,17 +14,17 @@ use crate::{
         library::{
             candidates::Candidates,
             evidence::{Projected, log_evidence},
-            grid::{Beside, Scan},
-            grid_posterior::Shaped,
+            grid::{Grid, NuisanceColumns},
+            grid_posterior::GridPosterior,
             nonlinear,
         },
         mixed_model::{
-            design::{CondensedDesign, Design, Normal},
+            design::{Design, DesignProducts, Normal},
             noise::{Noise, SensorNoise, Weighing},
-            shared_offsets::Offsets,
+            shared_offsets::SharedOffsets,
             whitening::Whitening,
         },
-        residual::{base_run::Reference, forward_model::Scene},
+        residual::{base_run::Reference, forward_model::ForwardModel},
     },
     effect::{Act, Effect, Role, class::class},
     recording::SensorKind,
@@ -32,9 +32,9 @@ use crate::{
 };
 
 /// The problem about a fit, with all its effects put back into the residual.
-pub struct Linear<'s> {
+pub struct Linearisation<'s> {
     /// The scene.
-    pub scene: &'s Scene<'s>,
+    pub scene: &'s ForwardModel<'s>,
     /// What there is to choose from.
     pub candidates: &'s Candidates,
     /// All columns and the residual of the baseline alone.
@@ -44,34 +44,34 @@ pub struct Linear<'s> {
     /// Columns of the baseline.
     pub baseline: Vec<usize>,
     /// Where each candidate's signature was taken.
-    pub shapes: Vec<Shaped>,
-    scan: Scan<'s>,
+    pub shapes: Vec<GridPosterior>,
+    scan: Grid<'s>,
     /// Effects of the fit beside the baseline.
     held: Vec<Dose>,
-    normals: Latest<Noise, Normal>,
-    condensed: Latest<White, CondensedDesign>,
-    offsets: Latest<White, Option<Offsets>>,
-    projected: Latest<Noise, Option<(Projected, Vec<usize>)>>,
+    normals: Memo<Noise, Normal>,
+    condensed: Memo<White, DesignProducts>,
+    offsets: Memo<White, Option<SharedOffsets>>,
+    projected: Memo<Noise, Option<(Projected, Vec<usize>)>>,
 }
 
 /// White noise of each sensor at rest and in motion, by axis.
 type White = [[[f64; 3]; 2]; 3];
 
-impl<'s> Linear<'s> {
+impl<'s> Linearisation<'s> {
     /// About a fit, with its columns alone: nothing can be added.
-    pub fn fitted_alone(scene: &'s Scene<'s>, candidates: &'s Candidates, fit: &Fit) -> Option<Self> {
-        let scan = Scan::new(scene, candidates, fit.doses.clone())?;
+    pub fn fitted_alone(scene: &'s ForwardModel<'s>, candidates: &'s Candidates, fit: &Fit) -> Option<Self> {
+        let scan = Grid::new(scene, candidates, fit.doses.clone())?;
         Self::alone(&Reference::new(scene, fit.doses.clone(), &scene.fine)?, scan, scene, candidates, fit)
     }
 
     fn alone(
         reference: &Reference<'_>,
-        scan: Scan<'s>,
-        scene: &'s Scene<'s>,
+        scan: Grid<'s>,
+        scene: &'s ForwardModel<'s>,
         candidates: &'s Candidates,
         fit: &Fit,
     ) -> Option<Self> {
-        let neutral = |effect: &&'static Effect| Shaped::alone(effect.neutral(scene.duration()));
+        let neutral = |effect: &&'static Effect| GridPosterior::alone(effect.neutral(scene.duration()));
         let shapes = candidates.effects.iter().map(neutral).collect();
         let columns = columns(&fit.doses.iter().map(|dose| dose.effect).collect::<Vec<_>>());
         let means = signatures(reference, &columns, &|_| Vec::new())?;
@@ -83,7 +83,7 @@ impl<'s> Linear<'s> {
     /// About a fit; shapes of candidates that it does not hold are those best under `noise`. What reaches no sensor on
     /// which this fit and another differ is taken from the problem about that.
     pub fn new(
-        scene: &'s Scene<'s>,
+        scene: &'s ForwardModel<'s>,
         candidates: &'s Candidates,
         fit: &Fit,
         noise: &Noise,
@@ -92,12 +92,16 @@ impl<'s> Linear<'s> {
         let reference = Reference::new(scene, fit.doses.clone(), &scene.fine)?;
         let scan = match before {
             Some(before) => before.scan.clone(),
-            None => Scan::new(scene, candidates, fit.doses.clone())?,
+            None => Grid::new(scene, candidates, fit.doses.clone())?,
         };
         let alone = Self::alone(&reference, scan.clone(), scene, candidates, fit)?;
         let every: Vec<usize> = (0..alone.design.columns.len()).collect();
-        let beside =
-            Beside { doses: &fit.doses, weighing: &alone.weighing, design: &alone.design, fitted: &every };
+        let beside = NuisanceColumns {
+            doses: &fit.doses,
+            weighing: &alone.weighing,
+            design: &alone.design,
+            fitted: &every,
+        };
         let lasts = |effect: &Effect| before.is_some_and(|before| before.lasts(effect, fit));
         let known = |at: usize| before.and_then(|before| before.shapes.get(at));
         let spread = |at: usize| known(at).map_or(0.0, |shape| shape.spread);
@@ -123,13 +127,13 @@ impl<'s> Linear<'s> {
     }
 
     fn of(
-        scene: &'s Scene<'s>,
+        scene: &'s ForwardModel<'s>,
         candidates: &'s Candidates,
-        scan: Scan<'s>,
+        scan: Grid<'s>,
         fit: &Fit,
         design: Design,
         weighing: Weighing<'s>,
-        shapes: Vec<Shaped>,
+        shapes: Vec<GridPosterior>,
     ) -> Self {
         let baseline = candidates.baseline.iter().flat_map(|term| design.of(term)).collect();
         let held = fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect)).cloned().collect();
@@ -142,10 +146,10 @@ impl<'s> Linear<'s> {
             shapes,
             scan,
             held,
-            normals: Latest::default(),
-            condensed: Latest::default(),
-            offsets: Latest::default(),
-            projected: Latest::default(),
+            normals: Memo::default(),
+            condensed: Memo::default(),
+            offsets: Memo::default(),
+            projected: Memo::default(),
         }
     }
 
@@ -171,7 +175,7 @@ impl<'s> Linear<'s> {
         let doses: Vec<Dose> = fit.doses.iter().filter(|dose| !is_taken(dose.effect)).cloned().collect();
         let fitted: Vec<usize> = doses.iter().flat_map(|dose| self.design.of(dose.effect)).collect();
         let (design, weighing) = (&self.design, &self.weighing);
-        let beside = Beside { doses: &doses, weighing, design, fitted: &fitted };
+        let beside = NuisanceColumns { doses: &doses, weighing, design, fitted: &fitted };
         let meets = |effect: &Effect| {
             let reached = |kind| without.iter().any(|taken| self.scene.reach(taken).contains(kind));
             without.is_empty() || self.scene.reach(effect).iter().any(reached)
@@ -209,13 +213,13 @@ impl<'s> Linear<'s> {
         fit: &Fit,
         effect: &'static Effect,
         values: Vec<f64>,
-    ) -> Linear<'c> {
+    ) -> Linearisation<'c> {
         let mut design = self.design.clone();
         restore(&mut design, [&Dose { effect, values }].into_iter());
-        let neutral = Shaped::alone(effect.neutral(self.scene.duration()));
+        let neutral = GridPosterior::alone(effect.neutral(self.scene.duration()));
         let shapes = self.shapes.iter().cloned().chain([neutral]).collect();
         let weighing = Weighing::new(self.scene, self.weighing.given.clone());
-        Linear::of(self.scene, candidates, self.scan.clone(), fit, design, weighing, shapes)
+        Linearisation::of(self.scene, candidates, self.scan.clone(), fit, design, weighing, shapes)
     }
 
     /// Parameters at which a candidate's signature was taken.
@@ -236,33 +240,33 @@ impl<'s> Linear<'s> {
         start: &Noise,
         anew: &[SensorKind],
         steps: &[f64],
-    ) -> Option<Judged> {
-        let sifted = self.sift(set, start, anew, steps)?;
-        self.together(sifted, &self.offsets(start))
+    ) -> Option<Scored> {
+        let sifted = self.screen(set, start, anew, steps)?;
+        self.scored_jointly(sifted, &self.offsets(start))
     }
 
     /// Evidence of a sifted set; as it was sifted where no rig guides the sensor, or none that would show its offsets.
-    pub fn together(&self, sifted: Sifted, offsets: &Option<Offsets>) -> Option<Judged> {
-        let Sifted { set, noise, value: sifted } = sifted;
+    pub fn scored_jointly(&self, sifted: Screened, offsets: &Option<SharedOffsets>) -> Option<Scored> {
+        let Screened { set, noise, value: sifted } = sifted;
         let Some(offsets) = offsets else {
-            return Some(Judged { set, noise, log_evidence: sifted, sifted });
+            return Some(Scored { set, noise, log_evidence: sifted, sifted });
         };
         let fitted = self.fitted(&set);
         let (baseline, groups) = (self.baseline.len(), self.groups(&set, &fitted));
         let value = |normal: &Normal| log_evidence(normal, &noise, baseline, &groups);
         let likeliest = offsets.likeliest(self.scene, &noise, &fitted, &value)?;
-        let surprise: f64 = set.iter().map(|effect| self.surprise(effect)).sum();
-        Some(Judged { log_evidence: likeliest - surprise, set, noise, sifted })
+        let neg_log_prior: f64 = set.iter().map(|effect| self.neg_log_prior(effect)).sum();
+        Some(Scored { log_evidence: likeliest - neg_log_prior, set, noise, sifted })
     }
 
     /// The same axis by axis.
-    pub fn sift(
+    pub fn screen(
         &self,
         set: &[&'static Effect],
         start: &Noise,
         anew: &[SensorKind],
         steps: &[f64],
-    ) -> Option<Sifted> {
+    ) -> Option<Screened> {
         let fitted = self.fitted(set);
         let mut noise = start.clone();
         let is_new = |column: &usize| !fitted.contains(column);
@@ -277,8 +281,8 @@ impl<'s> Linear<'s> {
         asked.into_iter().zip(found).for_each(|(kind, found)| noise.sensors[kind as usize] = found);
         let normal = noise.normal(&condensed.picked(None, &every[..fitted.len()]), fitted.len());
         let value = log_evidence(&normal, &noise, self.baseline.len(), &self.groups(set, &fitted))?
-            - set.iter().map(|effect| self.surprise(effect)).sum::<f64>();
-        Some(Sifted { set: set.to_vec(), noise, value })
+            - set.iter().map(|effect| self.neg_log_prior(effect)).sum::<f64>();
+        Some(Screened { set: set.to_vec(), noise, value })
     }
 
     /// Places of each effect's columns among the fitted.
@@ -291,7 +295,7 @@ impl<'s> Linear<'s> {
 
     /// −ln of an effect's prior: one of the candidates, in one of its shapes or such as are as likely. What was taken out of
     /// the baseline is no surprise.
-    pub fn surprise(&self, effect: &Effect) -> f64 {
+    pub fn neg_log_prior(&self, effect: &Effect) -> f64 {
         if self.candidates.was_taken_out(effect) {
             return 0.0;
         }
@@ -312,13 +316,13 @@ impl<'s> Linear<'s> {
     }
 
     /// All columns, as white noise weighs them.
-    pub fn condensed(&self, noise: &Noise) -> Arc<CondensedDesign> {
+    pub fn condensed(&self, noise: &Noise) -> Arc<DesignProducts> {
         self.condensed.get(white(noise), || self.weighing.condensed(&self.design, noise))
     }
 
     /// All columns and the gimbals' offsets, as white noise weighs them.
-    pub fn offsets(&self, noise: &Noise) -> Arc<Option<Offsets>> {
-        self.offsets.get(white(noise), || Offsets::of(self.scene, &self.design, &self.weighing, noise))
+    pub fn offsets(&self, noise: &Noise) -> Arc<Option<SharedOffsets>> {
+        self.offsets.get(white(noise), || SharedOffsets::of(self.scene, &self.design, &self.weighing, noise))
     }
 
     /// Scores of all columns but the baseline's, with the baseline projected out, and those columns.
@@ -365,9 +369,9 @@ impl<'s> Linear<'s> {
             let parts: Vec<&[usize]> = own.iter().chain(&more).map(Vec::as_slice).collect();
             projected.log_bayes_factor(&parts)
         };
-        let surprise =
-            |more: &[&'static Effect]| more.iter().map(|effect| self.surprise(effect)).sum::<f64>();
-        Some((value(&[]), additions.par_iter().map(|more| value(more) - surprise(more)).collect()))
+        let neg_log_prior =
+            |more: &[&'static Effect]| more.iter().map(|effect| self.neg_log_prior(effect)).sum::<f64>();
+        Some((value(&[]), additions.par_iter().map(|more| value(more) - neg_log_prior(more)).collect()))
     }
 }
 

@@ -6,15 +6,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 const KEPT: usize = 2;
 
 /// Answers by what was asked.
-pub struct Latest<K, V>(Mutex<Vec<(K, Arc<V>)>>);
+pub struct Memo<K, V>(Mutex<Vec<(K, Arc<V>)>>);
 
-impl<K, V> Default for Latest<K, V> {
+impl<K, V> Default for Memo<K, V> {
     fn default() -> Self {
         Self(Mutex::default())
     }
 }
 
-impl<K: PartialEq, V> Latest<K, V> {
+impl<K: PartialEq, V> Memo<K, V> {
     /// The answer that is kept, or a new one. Of two that ask at once, each may work it out.
     pub fn get(&self, key: K, answer: impl FnOnce() -> V) -> Arc<V> {
         let locked = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -38,7 +38,7 @@ mod tests {
 
     #[test]
     fn the_last_two_answers_are_kept_and_an_older_one_is_worked_out_again() {
-        let (latest, mut worked_out) = (Latest::default(), Vec::new());
+        let (latest, mut worked_out) = (Memo::default(), Vec::new());
         for key in [1, 2, 1, 3, 2, 3, 1] {
             let answer = latest.get(key, || {
                 worked_out.push(key);

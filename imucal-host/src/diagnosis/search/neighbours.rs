@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::{
-    hypothesis::{Judged, Sifted},
-    linearisation::Linear,
+    hypothesis::{Scored, Screened},
+    linearisation::Linearisation,
     refit::Fit,
 };
 use crate::{
@@ -29,9 +29,9 @@ type Set = Vec<&'static Effect>;
 /// A set, and the sensors whose noise it may change.
 type Reaching = (Set, Vec<SensorKind>);
 
-impl Linear<'_> {
+impl Linearisation<'_> {
     /// The best set with one effect more, judged with its own noise; of `among`.
-    pub fn added(&self, from: &Judged, among: &dyn Fn(&'static Effect) -> bool) -> Option<Option<Judged>> {
+    pub fn added(&self, from: &Scored, among: &dyn Fn(&'static Effect) -> bool) -> Option<Option<Scored>> {
         let (own, ranked) = self.ranked(&from.set, &from.noise)?;
         let likely = |own: f64, ranked: Vec<(f64, &'static Effect)>| -> Set {
             ranked
@@ -60,7 +60,7 @@ impl Linear<'_> {
     }
 
     /// The best set with two effects of one sensor more. Each alone may leave the other in the drift, and so gain nothing.
-    pub fn paired(&self, from: &Judged) -> Option<Option<Judged>> {
+    pub fn paired(&self, from: &Scored) -> Option<Option<Scored>> {
         let mut sets = Vec::new();
         for kind in &self.scene.kinds {
             sets.extend(self.pairs(&from.set, *kind, &from.noise.quieter())?);
@@ -89,7 +89,7 @@ impl Linear<'_> {
     }
 
     /// The best set with one effect replaced or taken out.
-    pub fn changed(&self, from: &Judged) -> Option<Option<Judged>> {
+    pub fn changed(&self, from: &Scored) -> Option<Option<Scored>> {
         let mut sets = Vec::new();
         for at in 0..from.set.len() {
             let (fewer, taken) = without(&from.set, at);
@@ -105,8 +105,8 @@ impl Linear<'_> {
 
     /// The best set with one effect replaced by another, or all those of a sensor by one or two, in the shapes that are
     /// best where the first ones are not: together they may be what two others do. With the problem of these shapes.
-    pub fn changed_anew(&self, fit: &Fit, from: &Judged) -> Option<Option<(Self, Judged)>> {
-        let mut best: Option<(Self, Judged)> = None;
+    pub fn changed_anew(&self, fit: &Fit, from: &Scored) -> Option<Option<(Self, Scored)>> {
+        let mut best: Option<(Self, Scored)> = None;
         let mut better = |linear: Self, sets: Vec<Reaching>| {
             let found = linear.best_of(sets, from);
             if let Some(found) = found
@@ -159,16 +159,16 @@ impl Linear<'_> {
     }
 
     /// The best of some sets that may do better than another, the noise of the sensors beside each estimated anew.
-    fn best_of(&self, sets: Vec<Reaching>, from: &Judged) -> Option<Judged> {
-        let sift = |(set, anew): &Reaching| self.sift(set, &from.noise, anew, &NEAR);
-        let sifted: Vec<Option<Sifted>> = sets.par_iter().map(sift).collect();
-        let is_near = |sifted: &Sifted| sifted.value > from.sifted - FAR;
-        let mut sifted: Vec<Sifted> = sifted.into_iter().flatten().filter(is_near).collect();
+    fn best_of(&self, sets: Vec<Reaching>, from: &Scored) -> Option<Scored> {
+        let sift = |(set, anew): &Reaching| self.screen(set, &from.noise, anew, &NEAR);
+        let sifted: Vec<Option<Screened>> = sets.par_iter().map(sift).collect();
+        let is_near = |sifted: &Screened| sifted.value > from.sifted - FAR;
+        let mut sifted: Vec<Screened> = sifted.into_iter().flatten().filter(is_near).collect();
         sifted.sort_by(|a, b| b.value.total_cmp(&a.value));
         sifted.truncate(TOGETHER);
         let offsets = self.offsets(&from.noise);
-        let together = |sifted| self.together(sifted, &offsets);
-        let judged: Vec<Option<Judged>> = sifted.into_par_iter().map(together).collect();
+        let together = |sifted| self.scored_jointly(sifted, &offsets);
+        let judged: Vec<Option<Scored>> = sifted.into_par_iter().map(together).collect();
         judged.into_iter().flatten().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
     }
 

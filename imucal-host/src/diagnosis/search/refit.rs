@@ -14,7 +14,7 @@ use crate::{
             design::{Column, Design},
             noise::{Noise, Weighing},
         },
-        residual::{base_run::Reference, block::Means, forward_model::Scene},
+        residual::{base_run::Reference, block::Means, forward_model::ForwardModel},
     },
     effect::{Effect, Role},
     simulator::Dose,
@@ -73,7 +73,7 @@ pub fn signatures(
 }
 
 /// Fits the amplitudes of all doses. `None` where the simulator fails.
-pub fn refit(scene: &Scene<'_>, doses: Vec<Dose>, noise: Option<&Noise>) -> Option<Fit> {
+pub fn refit(scene: &ForwardModel<'_>, doses: Vec<Dose>, noise: Option<&Noise>) -> Option<Fit> {
     let columns = free(&doses);
     let residual = scene.residual(&doses)?;
     let mut fit = Fit { doses, residual };

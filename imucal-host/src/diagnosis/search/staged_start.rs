@@ -9,7 +9,7 @@ use super::refit::{Fit, refit};
 use crate::{
     diagnosis::{
         mixed_model::noise::{Noise, Weighing},
-        residual::{base_run::Reference, forward_model::Scene},
+        residual::{base_run::Reference, forward_model::ForwardModel},
     },
     effect::{Effect, Part},
     recording::SensorKind,
@@ -24,7 +24,7 @@ const ROUNDS: usize = 2;
 const MUTED: f64 = 1e6;
 
 /// Fits the baseline to the sensors in turn. `None` where the simulator fails.
-pub fn start(scene: &Scene<'_>, mut doses: Vec<Dose>) -> Option<Fit> {
+pub fn start(scene: &ForwardModel<'_>, mut doses: Vec<Dose>) -> Option<Fit> {
     for heard in STAGES {
         let is_shown = |effect: &Effect| match effect.part {
             Part::ClockTerm => true,

@@ -5,8 +5,8 @@
 //! that was estimated without them. After each change baseline and effects are fitted anew through the simulator.
 
 use super::{
-    hypothesis::Judged,
-    linearisation::Linear,
+    hypothesis::Scored,
+    linearisation::Linearisation,
     refit::{Fit, refit},
     staged_start,
 };
@@ -14,7 +14,7 @@ use crate::{
     diagnosis::{
         library::{candidates::Candidates, nonlinear, nonlinear::Backdrop},
         mixed_model::noise::{FAR, Noise},
-        residual::{base_run::Reference, forward_model::Scene},
+        residual::{base_run::Reference, forward_model::ForwardModel},
     },
     effect::Effect,
     recording::SensorKind,
@@ -33,23 +33,23 @@ const CHANGE: f64 = 0.5;
 const SETTLING: usize = 2;
 
 /// A search that has come to its end.
-pub struct Explained<'s> {
+pub struct Solution<'s> {
     /// The best set, with its noise.
-    pub best: Judged,
+    pub best: Scored,
     /// No effect at all, with its noise.
-    pub none: Judged,
+    pub none: Scored,
     /// The fit of the best set.
     pub fit: Fit,
     /// The problem about that fit.
-    pub linear: Linear<'s>,
+    pub linear: Linearisation<'s>,
 }
 
 /// Searches. `None` where the simulator fails.
 pub fn search<'s>(
-    scene: &'s Scene<'s>,
+    scene: &'s ForwardModel<'s>,
     candidates: &'s Candidates,
     trace: &dyn Fn(&str),
-) -> Option<Explained<'s>> {
+) -> Option<Solution<'s>> {
     let doses: Vec<Dose> = candidates
         .baseline
         .iter()
@@ -60,23 +60,23 @@ pub fn search<'s>(
         None => staged_start::start(scene, doses)?,
     };
     trace("baseline fitted");
-    let mut linear = Linear::fitted_alone(scene, candidates, &fit)?;
+    let mut linear = Linearisation::fitted_alone(scene, candidates, &fit)?;
     let white = linear.weighing.white(&fit.residual);
     let mut none = linear.judge(&[], &white, &SensorKind::ALL, &FAR)?;
     trace(&format!("none: {:.1} {:?}", none.log_evidence, none.noise));
     // Where no rig guides the sensor, the first noise holds much of the misfit that the first fit began with.
     for _ in 0..if scene.swings.is_none() { SETTLING } else { 0 } {
         fit = refit(scene, fit.doses, Some(&none.noise))?;
-        linear = Linear::fitted_alone(scene, candidates, &fit)?;
+        linear = Linearisation::fitted_alone(scene, candidates, &fit)?;
         let start = with_white(&none.noise, &linear.weighing.white(&fit.residual));
         none = linear.judge(&[], &start, &SensorKind::ALL, &FAR)?;
         trace(&format!("none again: {:.1} {:?}", none.log_evidence, none.noise));
     }
     let most = if scene.swings.is_some() { MOST.0 } else { MOST.1 };
-    linear = Linear::new(scene, candidates, &fit, &none.noise, None)?;
+    linear = Linearisation::new(scene, candidates, &fit, &none.noise, None)?;
     trace("shapes");
-    let mut at = Explained { best: none.clone(), none, fit, linear };
-    let mut likeliest: Option<Explained<'s>> = None;
+    let mut at = Solution { best: none.clone(), none, fit, linear };
+    let mut likeliest: Option<Solution<'s>> = None;
     let mut seen = vec![Vec::new()];
     loop {
         at = at.settled()?;
@@ -106,7 +106,7 @@ pub fn search<'s>(
     Some(likeliest.filter(|most| most.is_likelier(&at)).unwrap_or(at))
 }
 
-impl<'s> Explained<'s> {
+impl<'s> Solution<'s> {
     /// With the noise that suits its set.
     fn settled(mut self) -> Option<Self> {
         self.best = self.linear.judge(&self.best.set, &self.best.noise, &SensorKind::ALL, &FAR)?;
@@ -122,8 +122,8 @@ impl<'s> Explained<'s> {
 
     /// Fits a set, found in a problem that may have other shapes than the own, through the simulator, and looks at all
     /// candidates from there.
-    fn advanced(&self, found_in: &Linear<'s>, mut next: Judged) -> Option<Self> {
-        let Linear { scene, candidates, .. } = *found_in;
+    fn advanced(&self, found_in: &Linearisation<'s>, mut next: Scored) -> Option<Self> {
+        let Linearisation { scene, candidates, .. } = *found_in;
         // An effect whose shape that problem has changed begins anew.
         let kept = |effect: &'static Effect| {
             let is_same =
@@ -140,7 +140,7 @@ impl<'s> Explained<'s> {
         }
         let fit = refit(scene, doses, Some(&next.noise))?;
         next.noise = with_white(&next.noise, &found_in.weighing.white(&fit.residual));
-        let linear = Linear::new(scene, candidates, &fit, &next.noise, Some(&self.linear))?;
+        let linear = Linearisation::new(scene, candidates, &fit, &next.noise, Some(&self.linear))?;
         Some(Self { best: next, none: self.none.clone(), fit, linear })
     }
 }
@@ -148,7 +148,7 @@ impl<'s> Explained<'s> {
 /// An effect's parameters at which its signature was taken; a shape is refined against what is fitted without it.
 fn refined(
     effect: &'static Effect,
-    linear: &Linear<'_>,
+    linear: &Linearisation<'_>,
     doses: &[Dose],
     rest: &[&'static Effect],
     noise: &Noise,
@@ -166,22 +166,22 @@ fn refined(
 
 /// A likelier set, and the problem in which it was found where that is not the one it was sought from.
 struct Step<'s> {
-    to: Judged,
-    found_in: Option<Linear<'s>>,
+    to: Scored,
+    found_in: Option<Linearisation<'s>>,
 }
 
 impl Step<'_> {
-    fn to(to: Judged) -> Self {
+    fn to(to: Scored) -> Self {
         Self { to, found_in: None }
     }
 }
 
 /// The cheapest step that gains.
-fn improved<'s>(at: &Explained<'s>, most: usize) -> Option<Option<Step<'s>>> {
-    let Explained { linear, fit, best, .. } = at;
-    let gains = |judged: &Judged, least: f64| judged.log_evidence > best.log_evidence + least;
+fn improved<'s>(at: &Solution<'s>, most: usize) -> Option<Option<Step<'s>>> {
+    let Solution { linear, fit, best, .. } = at;
+    let gains = |judged: &Scored, least: f64| judged.log_evidence > best.log_evidence + least;
     let gain = if best.set.is_empty() { GAIN.0 } else { GAIN.1 };
-    let change = |judged: &Judged| if judged.set.len() < best.set.len() { 0.0 } else { CHANGE };
+    let change = |judged: &Scored| if judged.set.len() < best.set.len() { 0.0 } else { CHANGE };
     let room = most.saturating_sub(best.set.len());
     if room > 0
         && let Some(next) = linear.added(best, &|_| true)?.filter(|next| gains(next, gain))

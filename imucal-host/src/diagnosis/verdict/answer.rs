@@ -12,10 +12,10 @@ use super::{
 use crate::{
     diagnosis::{
         finding::{self, Cause, Diagnosis, Place, Verdict},
-        location::{covariate::Driver, covariates, score_test, score_test::Following},
+        location::{covariate::Covariate, covariates, score_test, score_test::Following},
         reference::movement,
-        screening::preparation::Footing,
-        search::stepwise::Explained,
+        screening::preparation::Preparation,
+        search::stepwise::Solution,
     },
     effect::Effect,
     recording::Recording,
@@ -47,7 +47,7 @@ pub fn untestable(recording: &Recording, why: String) -> Diagnosis {
 
 /// What was asked of the best set of effects.
 struct Tested {
-    drivers: Vec<Driver>,
+    drivers: Vec<Covariate>,
     /// Covariates that the residual of the best set may depend on.
     after: Vec<Following>,
     closed: Closed,
@@ -55,9 +55,9 @@ struct Tested {
 }
 
 impl Tested {
-    fn of(Explained { linear, best, .. }: &Explained<'_>, progress: &dyn Fn(&str)) -> Option<Self> {
+    fn of(Solution { linear, best, .. }: &Solution<'_>, progress: &dyn Fn(&str)) -> Option<Self> {
         let drivers = covariates::drivers(linear.scene, &linear.weighing.given);
-        let after = score_test::following_anew(linear, &best.set, &best.noise, &drivers)?;
+        let after = score_test::score_tests_refitted(linear, &best.set, &best.noise, &drivers)?;
         progress("drivers tested");
         let remainder = most_followed(&after).map_or(0.0, |following| following.size);
         let closed = shares::closed(linear, &best.set, &best.noise, remainder)?;
@@ -76,8 +76,8 @@ impl Tested {
 /// The diagnosis of a recording; `None` where a matrix of the fit is singular.
 pub fn answer(
     recording: &Recording,
-    footing: &Footing,
-    explained: &Explained<'_>,
+    preparation: &Preparation,
+    explained: &Solution<'_>,
     progress: &dyn Fn(&str),
 ) -> Option<Diagnosis> {
     let tested = Tested::of(explained, progress)?;
@@ -87,7 +87,7 @@ pub fn answer(
     let apart = reference_clock::candidates(explained.linear.candidates);
     let remainder = tested.left().map_or(0.0, |left| left.size);
     let clock = match &apart {
-        Some(apart) => reference_clock::clock(explained, apart, footing.moved, remainder)?,
+        Some(apart) => reference_clock::clock(explained, apart, preparation.moved, remainder)?,
         None => None,
     };
     let closed = clock.as_ref().map_or(&tested.closed, |clock| &clock.closed);
@@ -99,7 +99,7 @@ pub fn answer(
             .retain(|id| causes.iter().any(|cause| cause.effect == *id || cause.equivalents.contains(id)));
     }
     let found = causes.clone();
-    remarks.extend(within_model(&mut causes, &mut credible_set, footing));
+    remarks.extend(within_model(&mut causes, &mut credible_set, preparation));
     let evidence = Evidence {
         causes: &found,
         clock: clock.as_ref().map(|clock| &clock.cause),
@@ -107,20 +107,20 @@ pub fn answer(
         left: tested.left(),
         refuted: is_refuted,
         within_model: causes.len() < found.len() && causes.is_empty() && clock.is_none(),
-        faulty: !footing.findings.is_empty(),
+        faulty: !preparation.findings.is_empty(),
     };
     let is_closed = (!found.is_empty() || clock.is_some()) && !evidence.within_model;
     let mut total = is_closed.then_some(closed.total);
     if let Some(clock) = &clock {
         put_first(clock, &mut causes, &mut credible_set);
     }
-    for finding in footing.findings.iter().rev() {
+    for finding in preparation.findings.iter().rev() {
         causes.insert(0, fault::cause(finding));
         credible_set.insert(0, finding.effect.id.clone());
     }
-    let faults = fault::faults(recording, &footing.findings, explained);
+    let faults = fault::faults(recording, &preparation.findings, explained);
     fault::add(&faults, closed.explainable, &mut causes, &mut gap, &mut total);
-    remarks.extend(footing.remarks.iter().cloned());
+    remarks.extend(preparation.remarks.iter().cloned());
     // Neither is worth the diagnosis where it cannot be computed.
     let next_experiment = next_experiment(recording, explained, &tested).unwrap_or_default();
     let (absent, not_testable) =
@@ -144,7 +144,7 @@ pub fn answer(
 }
 
 /// The effects of the best set with their estimates and what each closes of the gap.
-fn causes(explained: &Explained<'_>, tested: &Tested) -> Option<Vec<Cause>> {
+fn causes(explained: &Solution<'_>, tested: &Tested) -> Option<Vec<Cause>> {
     let set = explained.best.set.iter().zip(estimates::amounts(explained)?);
     let mut causes = Vec::new();
     for (((effect, amounts), standing), share) in set.zip(&tested.standings).zip(&tested.closed.each) {
@@ -162,7 +162,7 @@ fn causes(explained: &Explained<'_>, tested: &Tested) -> Option<Vec<Cause>> {
 }
 
 /// Takes out the causes that held-out data do not confirm, where no rig guides the sensor; remarks on them.
-fn refuted(causes: &mut Vec<Cause>, Explained { linear, best, .. }: &Explained<'_>) -> Option<Vec<String>> {
+fn refuted(causes: &mut Vec<Cause>, Solution { linear, best, .. }: &Solution<'_>) -> Option<Vec<String>> {
     if linear.scene.swings.is_some() {
         return Some(Vec::new());
     }
@@ -172,8 +172,12 @@ fn refuted(causes: &mut Vec<Cause>, Explained { linear, best, .. }: &Explained<'
 }
 
 /// Takes out the causes that are no more than errors of the given model; remarks on them.
-fn within_model(causes: &mut Vec<Cause>, credible_set: &mut Vec<String>, footing: &Footing) -> Vec<String> {
-    let is_within = |cause: &mut Cause| model_error::errs_as_much(&footing.model, cause);
+fn within_model(
+    causes: &mut Vec<Cause>,
+    credible_set: &mut Vec<String>,
+    preparation: &Preparation,
+) -> Vec<String> {
+    let is_within = |cause: &mut Cause| model_error::errs_as_much(&preparation.model, cause);
     let remark = |cause: Cause| {
         credible_set.retain(|id| *id != cause.effect && !cause.equivalents.contains(id));
         format!("not asserted: {} is within the model's own standard errors", cause.effect)
@@ -183,7 +187,7 @@ fn within_model(causes: &mut Vec<Cause>, credible_set: &mut Vec<String>, footing
 
 /// The table of the gap, and the covariates that it depends on: before the causes are added, or where there is none, still.
 fn located(
-    explained: &Explained<'_>,
+    explained: &Solution<'_>,
     tested: &Tested,
     clock: Option<&Clock<'_>>,
     none_found: bool,
@@ -202,7 +206,7 @@ fn located(
 }
 
 /// Ids of the effects that the data leave possible, each once.
-fn credible_set(Explained { linear, best, .. }: &Explained<'_>, tested: &Tested) -> Option<Vec<String>> {
+fn credible_set(Solution { linear, best, .. }: &Solution<'_>, tested: &Tested) -> Option<Vec<String>> {
     let suspects = if best.set.is_empty() { credible::suspects(linear, best)? } else { Vec::new() };
     let mut ids: Vec<String> = Vec::new();
     for effect in tested.standings.iter().flat_map(|standing| &standing.set).chain(&suspects) {
@@ -228,7 +232,7 @@ fn put_first(clock: &Clock<'_>, causes: &mut Vec<Cause>, credible_set: &mut Vec<
 /// What to record next to part a cause from those that could stand in its place, on a rig.
 fn next_experiment(
     recording: &Recording,
-    explained: &Explained<'_>,
+    explained: &Solution<'_>,
     tested: &Tested,
 ) -> Option<Vec<finding::Experiment>> {
     let axes = movement::axes(recording).ok()?;

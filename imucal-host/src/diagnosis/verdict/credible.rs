@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::{
     diagnosis::{
         mixed_model::noise::NEAR,
-        search::{hypothesis::Judged, linearisation::Linear},
+        search::{hypothesis::Scored, linearisation::Linearisation},
     },
     effect::Effect,
 };
@@ -32,7 +32,7 @@ pub struct Standing {
 
 /// Effects that were not asserted where nothing was, and cannot be excluded: beside none at all, each has more than what a
 /// credible set leaves out. Likeliest first.
-pub fn suspects(linear: &Linear<'_>, none: &Judged) -> Option<Vec<&'static Effect>> {
+pub fn suspects(linear: &Linearisation<'_>, none: &Scored) -> Option<Vec<&'static Effect>> {
     let (own, ranked) = linear.ranked(&none.set, &none.noise)?;
     let odds = |value: f64| (value - own).exp();
     let likely = ranked.into_iter().take_while(|(value, _)| odds(*value) > 1.0 - CREDIBLE);
@@ -40,11 +40,11 @@ pub fn suspects(linear: &Linear<'_>, none: &Judged) -> Option<Vec<&'static Effec
 }
 
 /// The standing of one cause of a set.
-pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> Option<Standing> {
+pub fn standing(linear: &Linearisation<'_>, best: &Scored, cause: &'static Effect) -> Option<Standing> {
     let rest: Vec<&'static Effect> = best.set.iter().copied().filter(|effect| *effect != cause).collect();
     let (_, ranked) = linear.ranked(&rest, &best.noise)?;
     let own = ranked.iter().find(|(_, effect)| *effect == cause)?.0;
-    let standard = linear.sift(&best.set, &best.noise, &[], &NEAR)?;
+    let standard = linear.screen(&best.set, &best.noise, &[], &NEAR)?;
     let none = linear.judge(&rest, &best.noise, linear.scene.reach(cause), &NEAR)?;
     let mut judged: Vec<(f64, Option<&'static Effect>)> =
         vec![(best.log_evidence, Some(cause)), (none.log_evidence, None)];
@@ -55,10 +55,10 @@ pub fn standing(linear: &Linear<'_>, best: &Judged, cause: &'static Effect) -> O
         let set: Vec<&'static Effect> = rest.iter().copied().chain([*effect]).collect();
         let anew: Vec<_> =
             linear.scene.reach(cause).iter().chain(linear.scene.reach(effect)).copied().collect();
-        let sifted = linear.sift(&set, &best.noise, &anew, &NEAR);
+        let sifted = linear.screen(&set, &best.noise, &anew, &NEAR);
         // What falls behind axis by axis is not judged any further.
         let sifted = sifted.filter(|sifted| sifted.value > standard.value - BEHIND)?;
-        Some((linear.together(sifted, &offsets)?.log_evidence, Some(*effect)))
+        Some((linear.scored_jointly(sifted, &offsets)?.log_evidence, Some(*effect)))
     };
     let instead: Vec<Option<_>> = others.par_iter().map(instead).collect();
     judged.extend(instead.into_iter().flatten());

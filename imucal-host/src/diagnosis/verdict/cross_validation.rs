@@ -8,7 +8,7 @@
 
 use super::{estimates, shares, shares::Share};
 use crate::{
-    diagnosis::{finding::Cause, mixed_model::noise::Noise, search::linearisation::Linear},
+    diagnosis::{finding::Cause, mixed_model::noise::Noise, search::linearisation::Linearisation},
     effect::Effect,
 };
 
@@ -21,7 +21,7 @@ const ERRORS: f64 = 2.0;
 /// says so; `causes` are those of `set`, in its order. `None` where nothing can be fitted.
 pub fn leave_out(
     causes: &mut Vec<Cause>,
-    linear: &Linear<'_>,
+    linear: &Linearisation<'_>,
     set: &[&'static Effect],
     noise: &Noise,
 ) -> Option<Vec<String>> {
@@ -62,7 +62,7 @@ fn is_borne(share: &Share) -> bool {
 fn is_borne_beside_terms(
     at: usize,
     set: &[&'static Effect],
-    linear: &Linear<'_>,
+    linear: &Linearisation<'_>,
     noise: &Noise,
 ) -> Option<bool> {
     let is_other = |term: &&'static Effect| !set.contains(term);

@@ -6,14 +6,14 @@ use crate::{
         library::evidence::{Projected, SEEN},
         location::score_test::{RETAINED, score_test},
         mixed_model::noise::Noise,
-        search::linearisation::Linear,
+        search::linearisation::Linearisation,
     },
     effect::Effect,
 };
 
 /// Effects that are absent at sizes that matter, and effects that cannot be told, once baseline and `set` are fitted.
 pub fn testable(
-    linear: &Linear<'_>,
+    linear: &Linearisation<'_>,
     set: &[&'static Effect],
     noise: &Noise,
 ) -> Option<(Vec<Absent>, Vec<NotTestable>)> {

@@ -7,7 +7,7 @@ use crate::{
         finding::Amount,
         mixed_model::design::Column,
         residual::{base_run::Reference, block::Means},
-        search::stepwise::Explained,
+        search::stepwise::Solution,
     },
     effect::{Effect, Role},
     simulator::Dose,
@@ -19,12 +19,12 @@ const LOOSE: f64 = 1e3;
 const SCANNED: f64 = 5.0;
 
 /// Parameters of each effect of the best set, shapes among them.
-pub fn amounts(explained: &Explained<'_>) -> Option<Vec<Vec<Amount>>> {
+pub fn amounts(explained: &Solution<'_>) -> Option<Vec<Vec<Amount>>> {
     amounts_of(explained, &explained.best.set)
 }
 
 /// Parameters of some effects of the fit, likewise.
-pub fn amounts_of(explained: &Explained<'_>, asked: &[&'static Effect]) -> Option<Vec<Vec<Amount>>> {
+pub fn amounts_of(explained: &Solution<'_>, asked: &[&'static Effect]) -> Option<Vec<Vec<Amount>>> {
     let (linear, set) = (&explained.linear, &explained.best.set);
     let reference = Reference::new(linear.scene, explained.fit.doses.clone(), &linear.scene.fine)?;
     let dose = |effect: &Effect| explained.fit.doses.iter().find(|dose| dose.effect == effect);

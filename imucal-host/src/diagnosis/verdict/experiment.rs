@@ -18,8 +18,8 @@ use crate::{
             design::{Design, Normal},
             noise::{Noise, Weighing},
         },
-        residual::{base_run::Reference, forward_model::Scene},
-        search::{refit::signatures, stepwise::Explained},
+        residual::{base_run::Reference, forward_model::ForwardModel},
+        search::{refit::signatures, stepwise::Solution},
     },
     effect::Effect,
     recording::{SensorKind, manifest::Axis},
@@ -53,7 +53,7 @@ const MENU: [Segment; 5] = [
 
 /// The segment that parts each pair best. An effect stands first in its pair, one of its equivalents second.
 pub fn next(
-    explained: &Explained<'_>,
+    explained: &Solution<'_>,
     axes: [Axis; 3],
     pairs: &[(&'static Effect, &'static Effect)],
 ) -> Option<Vec<Experiment>> {
@@ -104,7 +104,7 @@ fn parted_by(cause: &Effect, other: &Effect) -> Option<&'static str> {
 
 /// Information of the recording's columns in a segment that follows it, and the segment's length.
 fn information<'m>(
-    explained: &Explained<'_>,
+    explained: &Solution<'_>,
     axes: [Axis; 3],
     segment: &'m Segment,
     noise: &Noise,
@@ -125,7 +125,7 @@ fn information<'m>(
     let temperature = recording.temperature.clone()?;
     let replay = Replay::new(&recording.time, recording.gimbal.as_deref()?, temperature, axes, place)?;
     let usable = SensorKind::ALL.map(|_| vec![true; recording.rows()]);
-    let scene = Scene::new(&recording, usable, &replay, linear.scene.triads);
+    let scene = ForwardModel::new(&recording, usable, &replay, linear.scene.triads);
     let reference = Reference::new(&scene, explained.fit.doses.clone(), &scene.fine)?;
     let columns = linear.design.columns.clone();
     let means = signatures(&reference, &columns, &|effect| linear.shape_of(effect))?;
@@ -137,7 +137,7 @@ fn information<'m>(
 }
 
 /// D of a cause, at its fitted size, from another effect.
-fn distance(explained: &Explained<'_>, normal: &Normal, cause: &Effect, other: &Effect) -> Option<f64> {
+fn distance(explained: &Solution<'_>, normal: &Normal, cause: &Effect, other: &Effect) -> Option<f64> {
     let linear = &explained.linear;
     let rest: Vec<&'static Effect> =
         explained.best.set.iter().copied().filter(|effect| *effect != cause).collect();

@@ -24,7 +24,7 @@ use crate::{
         finding::{Cause, Gap},
         mixed_model::design::{loosened, places},
         screening::{conventions::Finding, preparation::leave_out},
-        search::stepwise::Explained,
+        search::stepwise::Solution,
     },
     effect::{Act, Effect, SignalRun, Spoils},
     recording::{Recording, SensorKind, Triple},
@@ -59,7 +59,7 @@ struct Piece {
 
 /// Those findings that add a gap, about the fit that explains the rest. None in a hand, whose own samples tell what was
 /// to be sensed.
-pub fn faults(recording: &Recording, findings: &[Finding], explained: &Explained<'_>) -> Vec<Fault> {
+pub fn faults(recording: &Recording, findings: &[Finding], explained: &Solution<'_>) -> Vec<Fault> {
     let scene = explained.linear.scene;
     let spoils = |finding: &&Finding| matches!(finding.dose(), Some(dose) if is_modelled(dose.effect));
     let findings: Vec<&Finding> = findings.iter().filter(spoils).collect();
@@ -85,7 +85,7 @@ impl Fault {
         finding: &Finding,
         kind: SensorKind,
         without: &[Vector3<f64>],
-        explained: &Explained<'_>,
+        explained: &Solution<'_>,
     ) -> Option<Self> {
         let (scene, triple) = (explained.linear.scene, recording.sensor(kind)?);
         let mut sound = vec![true; recording.rows()];
@@ -120,8 +120,8 @@ impl Fault {
     }
 
     /// What the errors of the fit cost on the spoilt rows.
-    fn errors(&self, explained: &Explained<'_>) -> Option<f64> {
-        let Explained { linear, best, .. } = explained;
+    fn errors(&self, explained: &Solution<'_>) -> Option<f64> {
+        let Solution { linear, best, .. } = explained;
         let fitted = linear.fitted(&best.set);
         let normal = linear.design.normal(&linear.whitenings(&best.noise), &fitted);
         let mut own = DMatrix::zeros(fitted.len(), fitted.len());

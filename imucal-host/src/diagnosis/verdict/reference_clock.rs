@@ -9,7 +9,7 @@ use crate::{
     diagnosis::{
         finding::{Amount, Cause},
         library::candidates::Candidates,
-        search::{linearisation::Linear, stepwise::Explained},
+        search::{linearisation::Linearisation, stepwise::Solution},
     },
     effect::{Effect, Part},
 };
@@ -26,7 +26,7 @@ pub struct Clock<'s> {
     /// The set and the offset.
     pub set: Vec<&'static Effect>,
     /// The problem with the offset among its effects.
-    pub linear: Linear<'s>,
+    pub linear: Linearisation<'s>,
 }
 
 /// The baseline's candidates with the offset among the effects, where it stands in the baseline.
@@ -42,12 +42,12 @@ pub fn candidates(candidates: &Candidates) -> Option<(&'static Effect, Candidate
 /// The offset, where it is known, matters and held-out blocks bear it out; `moved` is what the reference was moved by, s,
 /// and `remainder` the whitened size of what a driver still follows. `None` where nothing can be fitted.
 pub fn clock<'s>(
-    explained: &'s Explained<'s>,
+    explained: &'s Solution<'s>,
     (offset, candidates): &'s (&'static Effect, Candidates),
     moved: f64,
     remainder: f64,
 ) -> Option<Option<Clock<'s>>> {
-    let Explained { linear, best, fit, .. } = explained;
+    let Solution { linear, best, fit, .. } = explained;
     let Some(mut parameters) = estimates::amounts_of(explained, &[offset])?.pop() else { return Some(None) };
     parameters.iter_mut().for_each(|amount| amount.value = amount.value.map(|value| value + moved));
     if !estimates::is_material(offset, &parameters) || !estimates::is_sized(offset, &parameters, ERRORS) {

@@ -24,7 +24,7 @@ use crate::{
             design::{Design, LOOSE, Normal},
             noise::Noise,
         },
-        search::linearisation::Linear,
+        search::linearisation::Linearisation,
     },
     effect::Effect,
 };
@@ -77,12 +77,21 @@ pub struct Closed {
 }
 
 /// Shares that a set closes; `remainder` is the whitened size of what a driver still follows.
-pub fn closed(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise, remainder: f64) -> Option<Closed> {
+pub fn closed(
+    linear: &Linearisation<'_>,
+    set: &[&'static Effect],
+    noise: &Noise,
+    remainder: f64,
+) -> Option<Closed> {
     closed_in(linear, &linear.design, set, noise, remainder)
 }
 
 /// Share that each effect closes of what its own sensors show: beside a quiet sensor's gap that of another looks small.
-pub fn closed_of_own(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise) -> Option<Vec<Share>> {
+pub fn closed_of_own(
+    linear: &Linearisation<'_>,
+    set: &[&'static Effect],
+    noise: &Noise,
+) -> Option<Vec<Share>> {
     let of = |(k, effect): (usize, &&'static Effect)| {
         let mut design = linear.design.clone();
         design.channels.retain(|channel| linear.scene.reach(effect).contains(&channel.kind));
@@ -92,7 +101,7 @@ pub fn closed_of_own(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise
 }
 
 fn closed_in(
-    linear: &Linear<'_>,
+    linear: &Linearisation<'_>,
     design: &Design,
     set: &[&'static Effect],
     noise: &Noise,
@@ -152,7 +161,7 @@ fn closed_in(
 }
 
 /// Whitened squared size of what a set explains beyond the baseline, less what noise alone would give.
-pub fn size(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise) -> Option<f64> {
+pub fn size(linear: &Linearisation<'_>, set: &[&'static Effect], noise: &Noise) -> Option<f64> {
     let fitted = linear.fitted(set);
     let normal = linear.design.normal(&linear.whitenings(noise), &fitted);
     let every: Vec<usize> = (0..fitted.len()).collect();
@@ -203,7 +212,7 @@ fn held_out(folds: &[Normal], places: &[usize], baseline: usize) -> Option<Vec<F
 }
 
 /// Root mean squares of each channel's block means, before and after, and what noise alone would leave.
-pub fn table(linear: &Linear<'_>, set: &[&'static Effect], noise: &Noise) -> Option<Vec<Gap>> {
+pub fn table(linear: &Linearisation<'_>, set: &[&'static Effect], noise: &Noise) -> Option<Vec<Gap>> {
     let whitenings = linear.whitenings(noise);
     let solve = |fitted: &[usize]| linear.design.normal(&whitenings, fitted).amounts();
     let all = linear.fitted(set);
