@@ -35,7 +35,8 @@ pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str
         Ok(preparation) => preparation,
         Err(why) => return untestable(recording, why),
     };
-    let mut scene = ForwardModel::new(recording, preparation.usable.clone(), &*preparation.movement, preparation.triads);
+    let mut scene =
+        ForwardModel::new(recording, preparation.usable.clone(), &*preparation.movement, preparation.triads);
     if let Some(held) = &preparation.held {
         scene = scene.through(held);
     }

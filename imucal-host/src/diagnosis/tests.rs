@@ -41,7 +41,8 @@ fn with_linear<T>(check: impl FnOnce(Linearisation<'_>) -> T) -> T {
 /// Likewise, and the fit.
 fn with_fit<T>(recording: &Recording, check: impl FnOnce(Linearisation<'_>, &Fit) -> T) -> T {
     let preparation = Preparation::new(recording, None).unwrap();
-    let scene = ForwardModel::new(recording, preparation.usable.clone(), &*preparation.movement, preparation.triads);
+    let scene =
+        ForwardModel::new(recording, preparation.usable.clone(), &*preparation.movement, preparation.triads);
     let setting = Setting {
         kinds: &scene.kinds,
         thermometer: true,

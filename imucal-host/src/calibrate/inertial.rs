@@ -1,0 +1,298 @@
+//! Accelerometer and gyroscope, which share the rests: found once, fitted one after the other.
+
+use imucal_core::{accept::Refusal, triad::Triad};
+use rayon::prelude::*;
+
+use super::{
+    Options,
+    acc::{
+        self,
+        rests::{AccInput, AccResult},
+    },
+    fit::{
+        directions::Directions,
+        rest_noise::{AtRest, RestNoise},
+    },
+    gyr, known_attitudes,
+    outcome::{self, Calibration, FitSummary, SegmentationReport, SensorOutcome},
+    segmentation::{self, Cut},
+    usable,
+};
+use crate::{
+    noise::Noise,
+    observe::rest::{RestDetector, Samples},
+    recording::{Recording, SensorKind, Triple, check::integrity::Integrity, unit::STANDARD_GRAVITY},
+    simulator::place::EARTH_RATE,
+};
+
+/// Accelerometer and gyroscope; the directions at the rests, where the accelerometer passed.
+pub(crate) fn calibrate(
+    recording: &Recording,
+    integrity: &Integrity,
+    options: &Options,
+    progress: &(dyn Fn(&str) + Sync),
+    calibration: &mut Calibration,
+) -> Option<Directions> {
+    let wanted = recording.gyr.as_ref().filter(|_| !options.skip.contains(&SensorKind::Gyr));
+    let (gyr_on_rig, motions) = wanted
+        .and_then(|gyr| {
+            progress("fitting the gyroscope");
+            let usable = usable(integrity, SensorKind::Gyr, recording.rows());
+            gyr::rig::gyroscope(recording, gyr, &usable, options, calibration)
+        })
+        .unzip();
+    let motions = motions.flatten().filter(|_| options.compare);
+    let compare_gyr = |calibration: &mut Calibration, field: FieldForm<'_>| {
+        let comparison = motions.as_ref().and_then(|motions| gyr::ladder::comparison(motions, field));
+        calibration.comparisons.extend(comparison);
+    };
+    let Some(acc) = &recording.acc else {
+        compare_gyr(calibration, &|_| None);
+        let without = || wanted.map(|_| gyr::turns::without_accelerometer(Refusal::NoRest));
+        calibration.sensors.extend(gyr_on_rig.or_else(without));
+        return None;
+    };
+    let gravity = gravity(recording, calibration);
+    progress("finding rests");
+    let at_rest = Rests::new(recording, acc, integrity, gravity);
+    let detector = at_rest.detector();
+    let cuts = segmentation::cuts(&detector, &options.multipliers, gravity);
+    let Some(chosen) = segmentation::choose(&cuts) else {
+        compare_gyr(calibration, &|_| None);
+        calibration.sensors.extend(gyr_on_rig);
+        return None;
+    };
+    progress("fitting the accelerometer");
+    let shown = at_rest.noise(chosen);
+    let AccResult { outcome: acc_outcome, used, noise } =
+        at_rest.accelerometer(&cuts, chosen, &shown, options, calibration);
+    let mut trials: Vec<_> = cuts.iter().map(Cut::trial).collect();
+    let directions = acc_outcome.passed().map(|fit| directions(fit, chosen, shown, noise));
+    let usable = usable(integrity, SensorKind::Gyr, recording.rows());
+    let shared = GyrShared {
+        recording,
+        usable: &usable,
+        interval: at_rest.interval,
+        vertical_rate: vertical_rate(recording),
+        directions: directions.as_ref(),
+    };
+    compare_gyr(calibration, &|until| {
+        let (gyr, acc) = (wanted?, acc_outcome.passed()?);
+        shared.before(gyr, until.unwrap_or(usize::MAX), chosen, &acc.triad, &used)
+    });
+    let gyr_outcome = gyr_on_rig.or_else(|| {
+        let gyr = wanted?;
+        progress("fitting the gyroscope");
+        Some(match (&acc_outcome.verdict, acc_outcome.fit.as_ref()) {
+            (Ok(()), Some(fit)) => shared.outcome(gyr, chosen, &cuts, &fit.triad, &used, &mut trials),
+            (Err(refused), _) => gyr::turns::without_accelerometer(refused.refusal),
+            (Ok(()), None) => gyr::turns::without_accelerometer(Refusal::NoRest),
+        })
+    });
+    if !options.skip.contains(&SensorKind::Acc) {
+        calibration.sensors.push(acc_outcome);
+    }
+    calibration.sensors.extend(gyr_outcome);
+    let spreads = calibration.sensors.iter().filter_map(|s| s.fit.as_ref()?.gain_spread);
+    calibration.segmentation = Some(SegmentationReport {
+        rests: chosen.rows.clone(),
+        multiplier: chosen.multiplier,
+        threshold: chosen.threshold,
+        from_initial_rest: detector.noise().1,
+        gain_spread: spreads.fold(0.0, f64::max),
+        trials,
+    });
+    directions
+}
+
+/// The site's gravity, m/s².
+fn gravity(recording: &Recording, calibration: &mut Calibration) -> f64 {
+    recording.manifest.site.gravity().unwrap_or_else(|| {
+        calibration.warnings.push(format!(
+            "no [site] gravity and no latitude: taken as {STANDARD_GRAVITY} m/s², which may be 0.3 % off"
+        ));
+        STANDARD_GRAVITY
+    })
+}
+
+/// Earth's rate about the vertical, upwards, rad/s; zero where the latitude is not given.
+fn vertical_rate(recording: &Recording) -> f64 {
+    let latitude = recording.manifest.site.latitude_deg;
+    latitude.map_or(0.0, |degrees| EARTH_RATE * libm::sin(degrees.to_radians()))
+}
+
+/// An accelerometer in which rests are looked for.
+struct Rests<'a> {
+    recording: &'a Recording,
+    acc: &'a Triple,
+    /// Rows that both accelerometer and gyroscope can use.
+    usable: Vec<bool>,
+    interval: f64,
+    gravity: f64,
+}
+
+impl<'a> Rests<'a> {
+    fn new(recording: &'a Recording, acc: &'a Triple, integrity: &Integrity, gravity: f64) -> Self {
+        let of = |kind: SensorKind| usable(integrity, kind, recording.rows());
+        let both = of(SensorKind::Acc).into_iter().zip(of(SensorKind::Gyr));
+        let usable = both.map(|(acc, gyr)| acc && gyr).collect();
+        Self { recording, acc, usable, interval: recording.median_interval().unwrap_or(1.0), gravity }
+    }
+
+    fn detector(&self) -> RestDetector<'_> {
+        let samples = Samples {
+            time: &self.recording.time,
+            acc: &self.acc.values,
+            gyr: self.recording.gyr.as_ref().map(|gyr| gyr.values.as_slice()),
+            temperature: self.recording.temperature.as_deref(),
+            usable: &self.usable,
+        };
+        RestDetector::new(samples, self.interval)
+    }
+
+    fn noise(&self, chosen: &Cut) -> RestNoise {
+        let (time, values) = (&self.recording.time, &self.acc.values);
+        AtRest { time, values, usable: &self.usable, interval: self.interval, rows: &chosen.rows }.noise()
+    }
+
+    /// The accelerometer's outcome, on a rig or by its rests.
+    fn accelerometer(
+        &self,
+        cuts: &[Cut],
+        chosen: &Cut,
+        shown: &RestNoise,
+        options: &Options,
+        calibration: &mut Calibration,
+    ) -> AccResult {
+        let Self { recording, acc, usable, gravity, .. } = self;
+        let on_rig =
+            known_attitudes::rig::accelerometer(recording, acc, usable, *gravity, options, calibration);
+        let mut result = match on_rig {
+            Some(outcome) => AccResult { outcome, used: (0..chosen.rests.len()).collect(), noise: None },
+            None if never_moved(&chosen.rows, recording.rows()) => acc::rests::never_moved(options.acc),
+            None => {
+                let input = AccInput { rests: &chosen.rests, noise: shown, sensor: acc, gravity: *gravity };
+                acc::rests::calibrate(&input, options.acc)
+            }
+        };
+        if options.compare && recording.gimbal.is_none() {
+            calibration.comparisons.extend(acc::rests::compare(&chosen.rests, *gravity));
+        }
+        // A refused gain moves as it likes, and encoders say where a rig stood still whatever the threshold.
+        if result.outcome.evidence.is_some()
+            && let Some(fit) = &mut result.outcome.fit
+        {
+            let gains: Vec<_> =
+                segmentation::comparable(cuts).filter_map(|cut| Some(cut.fit?.0.gain.diagonal())).collect();
+            fit.gain_spread = Some(outcome::gain_spread(gains.iter().copied()));
+        }
+        result
+    }
+}
+
+/// How an accelerometer's directions err. Where its fit says nothing of the rests' noise, by what they show of it.
+fn directions(fit: &FitSummary, cut: &Cut, shown: RestNoise, noise: Option<Noise>) -> Directions {
+    Directions {
+        triad: fit.triad,
+        covariance: fit.covariance.clone(),
+        covariance_of: fit.covariance_of.clone(),
+        means: cut.rests.iter().map(|rest| rest.acc.mean()).collect(),
+        noise: noise.unwrap_or(Noise { density: shown.density, white: 1.0, drift: 0.0 }),
+        spans: shown.spans,
+    }
+}
+
+/// One rest that is all but the whole recording: the windows at its ends take a little.
+fn never_moved(rests: &[std::ops::Range<usize>], rows: usize) -> bool {
+    const ALL: f64 = 0.9;
+    matches!(rests, [only] if only.len() as f64 > ALL * rows as f64)
+}
+
+/// Gives a gyroscope's field form of the rests before a row, or of all.
+type FieldForm<'a> = &'a dyn Fn(Option<usize>) -> Option<Triad<f64>>;
+
+/// What all of a gyroscope's fits share.
+struct GyrShared<'a> {
+    recording: &'a Recording,
+    usable: &'a [bool],
+    interval: f64,
+    vertical_rate: f64,
+    directions: Option<&'a Directions>,
+}
+
+impl GyrShared<'_> {
+    fn input<'b>(
+        &'b self,
+        gyr: &'b Triple,
+        cut: &'b Cut,
+        acc: &'b Triad<f64>,
+        used: &'b [usize],
+    ) -> gyr::turns::GyrInput<'b> {
+        gyr::turns::GyrInput {
+            time: &self.recording.time,
+            sensor: gyr,
+            usable: self.usable,
+            interval: self.interval,
+            rows: &cut.rows,
+            rests: &cut.rests,
+            used,
+            acc,
+            directions: None,
+            vertical_rate: self.vertical_rate,
+        }
+    }
+
+    /// The field form of the rests that end before a row.
+    fn before(
+        &self,
+        gyr: &Triple,
+        row: usize,
+        cut: &Cut,
+        acc: &Triad<f64>,
+        used: &[usize],
+    ) -> Option<Triad<f64>> {
+        let count = cut.rows.partition_point(|rest| rest.end <= row);
+        let used: Vec<usize> = used.iter().copied().filter(|k| *k < count).collect();
+        let whole = self.input(gyr, cut, acc, &used);
+        let input = gyr::turns::GyrInput { rows: &cut.rows[..count], rests: &cut.rests[..count], ..whole };
+        gyr::turns::calibrate(&input).passed().map(|fit| fit.triad)
+    }
+
+    fn outcome(
+        &self,
+        gyr: &Triple,
+        chosen: &Cut,
+        cuts: &[Cut],
+        acc: &Triad<f64>,
+        used: &[usize],
+        trials: &mut [outcome::ThresholdTrial],
+    ) -> SensorOutcome {
+        let input =
+            gyr::turns::GyrInput { directions: self.directions, ..self.input(gyr, chosen, acc, used) };
+        let mut outcome = gyr::turns::calibrate(&input);
+        let Some(fit) = &mut outcome.fit else {
+            return outcome;
+        };
+        let start = fit.triad.gain;
+        // Directions come from each cut's own accelerometer fit, as they would had it been chosen.
+        let gains: Vec<_> = cuts
+            .par_iter()
+            .map(|cut| {
+                let all: Vec<usize> = (0..cut.rows.len()).collect();
+                let own = cut.fit.map_or(*acc, |(triad, _)| triad);
+                gyr::turns::trial(&self.input(gyr, cut, &own, &all), &start)
+            })
+            .collect();
+        for (trial, gain) in trials.iter_mut().zip(&gains) {
+            trial.gyr_gain = *gain;
+        }
+        let multipliers: Vec<f64> = segmentation::comparable(cuts).map(|cut| cut.multiplier).collect();
+        let compared: Vec<_> = trials
+            .iter()
+            .filter(|trial| multipliers.contains(&trial.multiplier))
+            .filter_map(|trial| trial.gyr_gain)
+            .collect();
+        fit.gain_spread = Some(outcome::gain_spread(compared.iter().copied()));
+        outcome
+    }
+}
