@@ -97,153 +97,240 @@ const BINS: [f64; 6] = [0.0, 0.5, 0.8, 0.95, 0.99, 1.0];
 
 use Goal::{AtLeast, AtMost, Within};
 
+/// A share of trials: among which, which of them hit, and what the contract asks of it.
+struct Figure {
+    name: &'static str,
+    of: fn(&Judgement) -> bool,
+    hit: fn(&Judgement) -> bool,
+    must: Option<Goal>,
+    aim: Option<Goal>,
+}
+
+impl Figure {
+    fn of(&self, judged: &[Judgement]) -> Share {
+        let trials: Vec<&Judgement> = judged.iter().filter(|j| (self.of)(j)).collect();
+        let hits = trials.iter().filter(|j| (self.hit)(j)).count();
+        Share { name: self.name, hits, trials: trials.len(), must: self.must, aim: self.aim }
+    }
+}
+
+fn is_healthy(j: &Judgement) -> bool {
+    j.truth == Truth::Healthy
+}
+
+fn is_of_one(j: &Judgement) -> bool {
+    j.truth == Truth::Catalogue(1)
+}
+
+fn is_of_catalogue(j: &Judgement) -> bool {
+    matches!(j.truth, Truth::Catalogue(_))
+}
+
+/// A fault of the recording itself is undone or left out before anything is fitted, and no share is said.
+fn share_of(j: &Judgement) -> Option<Closed> {
+    j.closed.filter(|closed| closed.interval.is_some())
+}
+
+/// The contract's figures.
+const CONTRACT: [Figure; 12] = [
+    Figure {
+        name: "false alarm on healthy recordings",
+        of: is_healthy,
+        hit: |j| j.alarmed,
+        must: Some(AtMost(0.05)),
+        aim: Some(AtMost(0.05)),
+    },
+    Figure {
+        name: "one effect, class-correct, λ ≥ 100",
+        of: |j| is_of_one(j) && j.lambda >= 100.0,
+        hit: |j| j.classes_right,
+        must: Some(AtLeast(0.95)),
+        aim: None,
+    },
+    Figure {
+        name: "one effect, class-correct, λ ≥ 60",
+        of: |j| is_of_one(j) && j.lambda >= 60.0,
+        hit: |j| j.classes_right,
+        must: None,
+        aim: Some(AtLeast(0.98)),
+    },
+    Figure {
+        name: "one effect, exact or declared equivalent",
+        of: is_of_one,
+        hit: |j| j.exact,
+        must: Some(AtLeast(0.9)),
+        aim: None,
+    },
+    Figure {
+        name: "one effect, exact or declared equivalent, λ ≥ 100",
+        of: |j| is_of_one(j) && j.lambda >= 100.0,
+        hit: |j| j.exact,
+        must: None,
+        aim: Some(AtLeast(0.97)),
+    },
+    Figure {
+        name: "95 % credible set holds the truth, one effect",
+        of: is_of_one,
+        hit: |j| j.credible,
+        must: Some(AtLeast(0.93)),
+        aim: Some(Within(0.94, 0.98)),
+    },
+    Figure {
+        name: "two effects, exact set of classes",
+        of: |j| j.truth == Truth::Catalogue(2),
+        hit: |j| j.classes_right,
+        must: Some(AtLeast(0.85)),
+        aim: Some(AtLeast(0.95)),
+    },
+    Figure {
+        name: "three effects, exact set of classes",
+        of: |j| j.truth == Truth::Catalogue(3),
+        hit: |j| j.classes_right,
+        must: Some(AtLeast(0.75)),
+        aim: Some(AtLeast(0.90)),
+    },
+    Figure {
+        name: "an effect asserted that is not there",
+        of: is_of_catalogue,
+        hit: |j| j.absent_asserted,
+        must: Some(AtMost(0.10)),
+        aim: Some(AtMost(0.05)),
+    },
+    Figure {
+        name: "outside the catalogue, flagged, λ ≥ 200",
+        of: |j| j.truth == Truth::Outside && j.lambda >= 200.0,
+        hit: |j| j.flagged,
+        must: Some(AtLeast(0.70)),
+        aim: Some(AtLeast(0.85)),
+    },
+    Figure {
+        name: "outside the catalogue, flagged, λ > 800",
+        of: |j| j.truth == Truth::Outside && j.lambda > 800.0,
+        hit: |j| j.flagged,
+        must: None,
+        aim: Some(AtLeast(0.95)),
+    },
+    Figure {
+        name: "within the catalogue, flagged",
+        of: is_of_catalogue,
+        hit: |j| j.flagged,
+        must: None,
+        aim: Some(AtMost(0.03)),
+    },
+];
+
+/// Figures next to the contract's.
+const FURTHER: [Figure; 13] = [
+    Figure {
+        name: "one effect, class-correct, λ < 60",
+        of: |j| is_of_one(j) && (0.0..60.0).contains(&j.lambda),
+        hit: |j| j.classes_right,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "one effect, class-correct, λ 60 to 100",
+        of: |j| is_of_one(j) && (60.0..100.0).contains(&j.lambda),
+        hit: |j| j.classes_right,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "one effect, class-correct, λ 100 to 300",
+        of: |j| is_of_one(j) && (100.0..300.0).contains(&j.lambda),
+        hit: |j| j.classes_right,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "one effect, class-correct, λ 300 and more",
+        of: |j| is_of_one(j) && (300.0..f64::INFINITY).contains(&j.lambda),
+        hit: |j| j.classes_right,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "one effect, its class or a declared equivalent's, λ ≥ 100",
+        of: |j| is_of_one(j) && j.lambda >= 100.0,
+        hit: |j| j.right_or_equivalent,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "credible set, λ < 100",
+        of: |j| is_of_one(j) && (0.0..100.0).contains(&j.lambda),
+        hit: |j| j.credible,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "credible set, λ 100 to 300",
+        of: |j| is_of_one(j) && (100.0..300.0).contains(&j.lambda),
+        hit: |j| j.credible,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "credible set, λ 300 and more",
+        of: |j| is_of_one(j) && (300.0..f64::INFINITY).contains(&j.lambda),
+        hit: |j| j.credible,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "two effects, each λ ≥ 60 beside the other, exact",
+        of: |j| j.truth == Truth::Catalogue(2) && j.lambda_beside >= 60.0,
+        hit: |j| j.classes_right,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "three effects, each λ ≥ 60 beside the others, exact",
+        of: |j| j.truth == Truth::Catalogue(3) && j.lambda_beside >= 60.0,
+        hit: |j| j.classes_right,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "outside the catalogue, flagged, λ < 200",
+        of: |j| j.truth == Truth::Outside && j.lambda < 200.0,
+        hit: |j| j.flagged,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "causes without a closed share",
+        of: |j| j.closed.is_some(),
+        hit: |j| share_of(j).is_none(),
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "without an answer",
+        of: |_| true,
+        hit: |j| j.answer.verdict.is_none(),
+        must: None,
+        aim: None,
+    },
+];
+
 /// Scores judged trials.
 pub fn score(judged: &[Judgement]) -> Score {
-    let healthy = |j: &Judgement| j.truth == Truth::Healthy;
-    let one = |j: &Judgement| j.truth == Truth::Catalogue(1);
-    let in_catalogue = |j: &Judgement| matches!(j.truth, Truth::Catalogue(_));
-    let outside = |j: &Judgement| j.truth == Truth::Outside;
-    let share = |name, of: &dyn Fn(&Judgement) -> bool, hit: &dyn Fn(&Judgement) -> bool, must, aim| {
-        let trials: Vec<&Judgement> = judged.iter().filter(|j| of(j)).collect();
-        let hits = trials.iter().filter(|j| hit(j)).count();
-        Share { name, hits, trials: trials.len(), must, aim }
-    };
-    let right = |j: &Judgement| j.classes_right;
-    // A fault of the recording itself is undone or left out before anything is fitted, and no share is said.
-    let said = |j: &Judgement| j.closed.filter(|closed| closed.interval.is_some());
-    let claimed: Vec<Closed> = judged.iter().filter_map(said).collect();
+    let claimed: Vec<Closed> = judged.iter().filter_map(share_of).collect();
     let covered =
         |closed: &Closed| closed.interval.is_some_and(|[low, high]| (low..=high).contains(&closed.truly));
-    let shares = vec![
-        share(
-            "false alarm on healthy recordings",
-            &healthy,
-            &|j| j.alarmed,
-            Some(AtMost(0.05)),
-            Some(AtMost(0.05)),
-        ),
-        share(
-            "one effect, class-correct, λ ≥ 100",
-            &|j| one(j) && j.lambda >= 100.0,
-            &right,
-            Some(AtLeast(0.95)),
-            None,
-        ),
-        share(
-            "one effect, class-correct, λ ≥ 60",
-            &|j| one(j) && j.lambda >= 60.0,
-            &right,
-            None,
-            Some(AtLeast(0.98)),
-        ),
-        share("one effect, exact or declared equivalent", &one, &|j| j.exact, Some(AtLeast(0.9)), None),
-        share(
-            "one effect, exact or declared equivalent, λ ≥ 100",
-            &|j| one(j) && j.lambda >= 100.0,
-            &|j| j.exact,
-            None,
-            Some(AtLeast(0.97)),
-        ),
-        share(
-            "95 % credible set holds the truth, one effect",
-            &one,
-            &|j| j.credible,
-            Some(AtLeast(0.93)),
-            Some(Within(0.94, 0.98)),
-        ),
-        share(
-            "two effects, exact set of classes",
-            &|j| j.truth == Truth::Catalogue(2),
-            &right,
-            Some(AtLeast(0.85)),
-            Some(AtLeast(0.95)),
-        ),
-        share(
-            "three effects, exact set of classes",
-            &|j| j.truth == Truth::Catalogue(3),
-            &right,
-            Some(AtLeast(0.75)),
-            Some(AtLeast(0.90)),
-        ),
-        share(
-            "an effect asserted that is not there",
-            &in_catalogue,
-            &|j| j.absent_asserted,
-            Some(AtMost(0.10)),
-            Some(AtMost(0.05)),
-        ),
-        share(
-            "outside the catalogue, flagged, λ ≥ 200",
-            &|j| outside(j) && j.lambda >= 200.0,
-            &|j| j.flagged,
-            Some(AtLeast(0.70)),
-            Some(AtLeast(0.85)),
-        ),
-        share(
-            "outside the catalogue, flagged, λ > 800",
-            &|j| outside(j) && j.lambda > 800.0,
-            &|j| j.flagged,
-            None,
-            Some(AtLeast(0.95)),
-        ),
-        share("within the catalogue, flagged", &in_catalogue, &|j| j.flagged, None, Some(AtMost(0.03))),
-        Share {
-            name: "closed share's interval holds the true one",
-            hits: claimed.iter().filter(|closed| covered(closed)).count(),
-            trials: claimed.len(),
-            must: Some(AtLeast(0.90)),
-            aim: Some(Within(0.93, 0.98)),
-        },
-    ];
-    let between = |low: f64, high: f64| move |j: &Judgement| one(j) && (low..high).contains(&j.lambda);
-    let beside = vec![
-        share("one effect, class-correct, λ < 60", &between(0.0, 60.0), &right, None, None),
-        share("one effect, class-correct, λ 60 to 100", &between(60.0, 100.0), &right, None, None),
-        share("one effect, class-correct, λ 100 to 300", &between(100.0, 300.0), &right, None, None),
-        share(
-            "one effect, class-correct, λ 300 and more",
-            &between(300.0, f64::INFINITY),
-            &right,
-            None,
-            None,
-        ),
-        share(
-            "one effect, its class or a declared equivalent's, λ ≥ 100",
-            &|j| one(j) && j.lambda >= 100.0,
-            &|j| j.right_or_equivalent,
-            None,
-            None,
-        ),
-        share("credible set, λ < 100", &between(0.0, 100.0), &|j| j.credible, None, None),
-        share("credible set, λ 100 to 300", &between(100.0, 300.0), &|j| j.credible, None, None),
-        share("credible set, λ 300 and more", &between(300.0, f64::INFINITY), &|j| j.credible, None, None),
-        share(
-            "two effects, each λ ≥ 60 beside the other, exact",
-            &|j| j.truth == Truth::Catalogue(2) && j.lambda_beside >= 60.0,
-            &right,
-            None,
-            None,
-        ),
-        share(
-            "three effects, each λ ≥ 60 beside the others, exact",
-            &|j| j.truth == Truth::Catalogue(3) && j.lambda_beside >= 60.0,
-            &right,
-            None,
-            None,
-        ),
-        share(
-            "outside the catalogue, flagged, λ < 200",
-            &|j| outside(j) && j.lambda < 200.0,
-            &|j| j.flagged,
-            None,
-            None,
-        ),
-        share("causes without a closed share", &|j| j.closed.is_some(), &|j| said(j).is_none(), None, None),
-        share("without an answer", &|_| true, &|j| j.answer.verdict.is_none(), None, None),
-    ];
+    let mut shares: Vec<Share> = CONTRACT.iter().map(|figure| figure.of(judged)).collect();
+    shares.push(Share {
+        name: "closed share's interval holds the true one",
+        hits: claimed.iter().filter(|closed| covered(closed)).count(),
+        trials: claimed.len(),
+        must: Some(AtLeast(0.90)),
+        aim: Some(Within(0.93, 0.98)),
+    });
+    let beside = FURTHER.iter().map(|figure| figure.of(judged)).collect();
     let mut seconds: Vec<f64> = judged.iter().map(|j| j.seconds).collect();
     seconds.sort_by(f64::total_cmp);
-    let trials_healthy = judged.iter().filter(|j| healthy(j)).count();
+    let trials_healthy = judged.iter().filter(|j| is_healthy(j)).count();
     Score {
         trials: [trials_healthy, judged.len() - trials_healthy],
         shares,

@@ -2,7 +2,6 @@
 
 use imucal_core::observation::Moments;
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 use crate::{
     observe::held,
