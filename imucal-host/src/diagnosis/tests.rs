@@ -67,7 +67,7 @@ fn a_healthy_residual_whitened_by_its_own_noise_has_the_energy_of_noise() {
     with_linear(|linear| {
         let white = linear.weighing.white(&linear.scene.residual(&[]).unwrap());
         let judged = linear.judge(&[], &white, &SensorKind::ALL, &FAR).unwrap();
-        let normal = linear.design.normal(&linear.whitenings(&judged.noise), &linear.baseline);
+        let normal = linear.design.normal(&linear.precisions(&judged.noise), &linear.baseline);
         let n = normal.score.len();
         let information = normal.information.clone() + DMatrix::identity(n, n) * 1e-8;
         let left = normal.energy - normal.score.dot(&information.cholesky().unwrap().solve(&normal.score));
@@ -167,7 +167,7 @@ fn a_signature_that_lasts_from_one_fit_to_the_next_is_the_one_taken_anew() {
             let columns = |linear: &Linearisation<'_>| -> Vec<f64> {
                 let of = |(id, channel): (usize, &Channel)| -> Vec<f64> {
                     let at = channel.ids.iter().position(|own| *own == id);
-                    at.map_or(vec![0.0; channel.y.len()], |at| channel.x.column(at).iter().copied().collect())
+                    at.map_or(vec![0.0; channel.y.len()], |at| channel.x[at].to_vec())
                 };
                 let ids = linear.design.of(other).into_iter();
                 ids.flat_map(|id| linear.design.channels.iter().map(move |channel| (id, channel)))
@@ -188,7 +188,7 @@ fn twin(linear: &Linearisation<'_>, own: &[usize]) -> Means {
         .map(|block| {
             let columns = linear.design.channels.iter().flat_map(|channel| {
                 let at = |id: &usize| channel.ids.iter().position(|other| other == id);
-                own.iter().filter_map(at).map(|at| channel.x[(block, at)].powi(2))
+                own.iter().filter_map(at).map(|at| channel.x[at][block].powi(2))
             });
             columns.sum()
         })
@@ -207,7 +207,7 @@ fn twin(linear: &Linearisation<'_>, own: &[usize]) -> Means {
             if let Some(at) = channel.ids.iter().position(|other| other == id) {
                 for (block, value) in column.iter_mut().enumerate() {
                     let sign = if block < middle { 1.0 } else { -1.0 };
-                    value[channel.axis] += sign * channel.x[(block, at)];
+                    value[channel.axis] += sign * channel.x[at][block];
                 }
             }
         }
@@ -219,14 +219,14 @@ fn twin(linear: &Linearisation<'_>, own: &[usize]) -> Means {
 fn the_twin_of_an_effect_with_its_sign_broken_is_not_explained_by_it() {
     with_linear(|linear| {
         let white = linear.weighing.white(&linear.scene.residual(&[]).unwrap());
-        let whitenings = linear.whitenings(&white);
+        let precisions = linear.precisions(&white);
         for effect in &linear.candidates.effects {
             let own = linear.design.of(effect);
             let kept: Vec<usize> = linear.baseline.iter().chain(&own).copied().collect();
             let columns = kept.iter().map(|id| linear.design.columns[*id]).collect();
             let design = linear.design.extended(&kept, columns, &[twin(&linear, &own)]);
             let every: Vec<usize> = (0..design.size).collect();
-            let normal = design.normal(&whitenings, &every);
+            let normal = design.normal(&precisions, &every);
             let left = |fitted: usize| {
                 let projected = Projected::new(&normal, &every[..fitted], &every[kept.len()..]).unwrap();
                 projected.information[(0, 0)]

@@ -54,13 +54,13 @@ impl<'s> Grid<'s> {
         kept: &(dyn Fn(usize) -> Option<GridPosterior> + Sync),
     ) -> Option<Vec<GridPosterior>> {
         let (scene, design) = (self.scene, beside.design);
-        let whitenings = beside.weighing.whitenings(design, noise);
+        let precisions = beside.weighing.precisions(design, noise);
         // Where no rig guides the sensor, what a hand adds hides when an episode began and ended.
         let quiet = match scene.swings {
             Some(_) => None,
-            None => Some(beside.weighing.whitenings(design, &noise.quieter().even())),
+            None => Some(beside.weighing.precisions(design, &noise.quieter().even())),
         };
-        let backdrop = Backdrop::new(scene, design, beside.fitted, &whitenings);
+        let backdrop = Backdrop::new(scene, design, beside.fitted, &precisions);
         let quiet = quiet.as_ref().map(|quiet| Backdrop::new(scene, design, beside.fitted, quiet));
         let best = |effect: &'static Effect| match quiet.as_ref().filter(|_| nonlinear::is_episode(effect)) {
             Some(quiet) => {

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     diagnosis::{
-        mixed_model::{augmented_normal::Bordered, design::Design, whitening::Whitening},
+        mixed_model::{augmented_normal::AugmentedNormal, design::Design, precision::Precision},
         residual::{base_run::Reference, block::Means, forward_model::ForwardModel},
     },
     effect::{Effect, Role},
@@ -38,7 +38,7 @@ pub struct Backdrop<'a> {
     pub scene: &'a ForwardModel<'a>,
     /// Number of those columns.
     fitted: usize,
-    bordered: Bordered<'a>,
+    augmented: AugmentedNormal<'a>,
 }
 
 impl<'a> Backdrop<'a> {
@@ -47,9 +47,9 @@ impl<'a> Backdrop<'a> {
         scene: &'a ForwardModel<'a>,
         design: &'a Design,
         fitted: &[usize],
-        whitenings: &'a [Whitening],
+        precisions: &'a [Precision],
     ) -> Self {
-        Self { scene, fitted: fitted.len(), bordered: Bordered::new(design, whitenings, fitted) }
+        Self { scene, fitted: fitted.len(), augmented: AugmentedNormal::new(design, precisions, fitted) }
     }
 }
 
@@ -164,7 +164,7 @@ fn project(
         .par_iter()
         .map(|(shape, parameter)| reference.known_signature(effect, *parameter, shape))
         .collect();
-    let normal = backdrop.bordered.with(&means?);
+    let normal = backdrop.augmented.with(&means?);
     let first: Vec<usize> = (0..backdrop.fitted).collect();
     let others: Vec<usize> = (backdrop.fitted..normal.score.len()).collect();
     Some((Projected::new(&normal, &first, &others)?, own.len()))

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::covariate::{Covariate, Function};
 use crate::{
-    diagnosis::{mixed_model::whitening::Whitening, search::linearisation::Linearisation},
+    diagnosis::{mixed_model::precision::Precision, search::linearisation::Linearisation},
     effect::Effect,
     recording::{SensorKind, median},
 };
@@ -32,10 +32,10 @@ const PEAK: f64 = 12.0;
 pub fn beat(
     linear: &Linearisation<'_>,
     set: &[&'static Effect],
-    whitenings: &[Whitening],
+    precisions: &[Precision],
     kind: SensorKind,
 ) -> Option<(Covariate, usize)> {
-    let weighed = weighed_residual(linear, set, whitenings, kind)?;
+    let weighed = weighed_residual(linear, set, precisions, kind)?;
     let times: Vec<f64> = linear.scene.blocks.iter().map(|block| block.time).collect();
     let duration = linear.scene.duration();
     let last = (2.0 * duration / SHORTEST) as usize;
@@ -71,17 +71,15 @@ pub fn beat(
 fn weighed_residual(
     linear: &Linearisation<'_>,
     set: &[&'static Effect],
-    whitenings: &[Whitening],
+    precisions: &[Precision],
     kind: SensorKind,
 ) -> Option<Vec<DVector<f64>>> {
     let fitted = linear.fitted(set);
-    let amounts = linear.design.normal(whitenings, &fitted).amounts()?;
-    let channels = linear.design.channels.iter().zip(whitenings).filter(|(channel, _)| channel.kind == kind);
-    let left = channels.map(|(channel, whitening)| {
+    let amounts = linear.design.normal(precisions, &fitted).amounts()?;
+    let channels = linear.design.channels.iter().zip(precisions).filter(|(channel, _)| channel.kind == kind);
+    let left = channels.map(|(channel, precision)| {
         let residual = channel.less(&fitted, &amounts);
-        let mut weighed = DVector::zeros(residual.len());
-        whitening.apply(residual.as_slice(), weighed.as_mut_slice());
-        weighed
+        DVector::from_vec(precision.apply(residual.as_slice()))
     });
     Some(left.collect())
 }

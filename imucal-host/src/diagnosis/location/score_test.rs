@@ -9,7 +9,7 @@ use crate::{
     diagnosis::{
         library::evidence::{Projected, log_evidence},
         mixed_model::{
-            augmented_normal::Bordered,
+            augmented_normal::AugmentedNormal,
             design::Design,
             noise::{NEAR, Noise},
         },
@@ -54,15 +54,15 @@ pub fn following(
     drivers: &[Covariate],
 ) -> Option<Vec<Following>> {
     let fitted = linear.fitted(set);
-    let whitenings = linear.whitenings(noise);
-    let bordered = Bordered::new(&linear.design, &whitenings, &fitted);
+    let precisions = linear.precisions(noise);
+    let augmented = AugmentedNormal::new(&linear.design, &precisions, &fitted);
     let kinds = linear.scene.kinds.iter();
     let pairs: Vec<(SensorKind, &Covariate)> = kinds
         .flat_map(|kind| drivers.iter().map(move |driver| (*kind, driver)))
         .filter(|(kind, driver)| !driver.columns(*kind).is_empty())
         .collect();
     let follow = |(kind, driver): &(SensorKind, &Covariate)| {
-        let normal = bordered.with(&means(*kind, driver, noise));
+        let normal = augmented.with(&means(*kind, driver, noise));
         let every: Vec<usize> = (0..normal.score.len()).collect();
         let (first, others) = every.split_at(fitted.len());
         follow(linear.scene, *kind, driver, &Projected::new(&normal, first, others)?)
@@ -99,9 +99,9 @@ pub fn score_tests_refitted(
             *own = again;
         }
     }
-    let whitenings = linear.whitenings(noise);
+    let precisions = linear.precisions(noise);
     for kind in &linear.scene.kinds {
-        if let Some((driver, choices)) = periodogram::beat(linear, set, &whitenings, *kind) {
+        if let Some((driver, choices)) = periodogram::beat(linear, set, &precisions, *kind) {
             found.push(judged(linear, set, noise, *kind, &driver, choices)?);
         }
     }
@@ -123,13 +123,13 @@ fn judged(
     let mut groups = linear.groups(set, &linear.fitted(set));
     // The other sensors do not show it.
     design.channels.retain(|channel| channel.kind == kind);
-    let others = linear.condensed(noise).picked(None, &linear.fitted(set));
-    let condensed = linear.weighing.condensed(&design, noise).beside(others);
-    let alone = noise.normal(&condensed.picked(None, &every[..fitted]), fitted);
+    let others = linear.products(noise).picked(None, &linear.fitted(set));
+    let products = linear.weighing.products(&design, noise, &every).with_others(others);
+    let alone = noise.normal(&products.picked(None, &every[..fitted]), fitted);
     let before = log_evidence(&alone, noise, linear.baseline.len(), &groups)?;
     let mut anew = noise.clone();
-    anew.sensors[kind as usize] = linear.weighing.fit(&condensed, kind, &every, noise, &NEAR);
-    let normal = anew.normal(&condensed, design.size);
+    anew.sensors[kind as usize] = linear.weighing.fit(&products, kind, &every, noise, &NEAR);
+    let normal = anew.normal(&products, design.size);
     groups.push(every[fitted..].to_vec());
     let gain = log_evidence(&normal, &anew, linear.baseline.len(), &groups)? - before - (choices as f64).ln();
     let gain = if driver.name == TIME { gain - DRIFTING } else { gain };

@@ -8,8 +8,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use rayon::prelude::*;
 
 use super::{
-    random_effects::{CrossProducts, RandomEffects, Sparse},
-    whitening::Whitening,
+    precision::Precision,
+    random_effects::{CrossProducts, RandomEffects},
 };
 use crate::{
     diagnosis::residual::{block::Means, forward_model::ForwardModel},
@@ -48,8 +48,8 @@ pub struct Channel {
     pub axis: usize,
     /// Indices of the columns that are not zero here.
     pub ids: Vec<usize>,
-    /// Those columns, a row a block.
-    pub x: DMatrix<f64>,
+    /// Those columns, block by block; designs about the same fit share them.
+    pub x: Vec<Arc<Vec<f64>>>,
     /// Residual of each block.
     pub y: DVector<f64>,
 }
@@ -65,18 +65,27 @@ pub struct Design {
     pub channels: Vec<Channel>,
 }
 
-/// All channels, as white noise weighs them: what is the same whatever the drift and the scatter.
+/// Channels that share random effects.
 #[derive(Clone, Debug)]
-pub struct DesignProducts {
-    /// The channels, sensor by sensor.
-    pub channels: Vec<ChannelProducts>,
+pub struct ChannelGroup {
+    /// Places of the channels in the design, in the order of the random effects' own.
+    pub channels: Vec<usize>,
+    /// What their blocks share.
+    pub effects: Arc<RandomEffects>,
 }
 
-/// One axis of one sensor.
+/// Cross-products of columns, group by group: what is the same whatever the drift and the scatter.
 #[derive(Clone, Debug)]
-pub struct ChannelProducts {
-    /// Sensor.
-    pub kind: SensorKind,
+pub struct DesignProducts {
+    /// The groups.
+    pub groups: Vec<GroupProducts>,
+}
+
+/// Cross-products of the columns that reach a group of channels.
+#[derive(Clone, Debug)]
+pub struct GroupProducts {
+    /// Sensors, channel by channel.
+    pub kinds: Vec<SensorKind>,
     ids: Vec<usize>,
     /// Its columns and, last, its residual.
     pub columns: CrossProducts,
@@ -111,19 +120,19 @@ impl Normal {
         Some(loosened(self.information.clone())?.solve(&self.score))
     }
 
-    /// Of condensed columns, the last being the residual.
-    fn of(columns: &CrossProducts, whitening: &Whitening) -> Self {
-        Self::within(&whitening.products(columns), whitening)
+    /// Of columns, the last being the residual.
+    pub fn of(columns: &CrossProducts, precision: &Precision) -> Self {
+        Self::within(&precision.products(columns), precision.log_determinant)
     }
 
-    /// Of the products of columns, the last being the residual.
-    pub fn within(all: &DMatrix<f64>, whitening: &Whitening) -> Self {
+    /// Of the products of columns, the last being the residual, and ln |Σ|.
+    pub fn within(all: &DMatrix<f64>, log_determinant: f64) -> Self {
         let n = all.ncols() - 1;
         Self {
             information: all.view((0, 0), (n, n)).into_owned(),
             score: all.view((0, n), (n, 1)).column(0).into_owned(),
             energy: all[(n, n)],
-            log_determinant: whitening.log_determinant,
+            log_determinant,
         }
     }
 
@@ -155,25 +164,22 @@ impl Channel {
         let mut residual = self.y.clone();
         for (id, amount) in fitted.iter().zip(amounts.iter()) {
             if let Some(at) = self.ids.iter().position(|own| own == id) {
-                residual.axpy(-amount, &self.x.column(at), 1.0);
+                residual.iter_mut().zip(self.x[at].iter()).for_each(|(left, x)| *left -= amount * x);
             }
         }
         residual
     }
 
-    /// Some of its columns, by their place in `ids`, and behind them its residual.
-    pub fn gathered(&self, places: &[usize]) -> DMatrix<f64> {
-        let mut x = DMatrix::zeros(self.y.len(), places.len() + 1);
-        for (to, from) in places.iter().enumerate() {
-            x.set_column(to, &self.x.column(*from));
+    /// Columns by index, zero where they do not reach it, and behind them its residual.
+    pub fn gathered(&self, wanted: &[usize]) -> DMatrix<f64> {
+        let mut x = DMatrix::zeros(self.y.len(), wanted.len() + 1);
+        for (mut to, id) in x.column_iter_mut().zip(wanted) {
+            if let Some(at) = self.ids.iter().position(|own| own == id) {
+                to.copy_from_slice(&self.x[at]);
+            }
         }
-        x.set_column(places.len(), &self.y);
+        x.set_column(wanted.len(), &self.y);
         x
-    }
-
-    /// All of its columns, and behind them its residual.
-    fn all(&self) -> DMatrix<f64> {
-        self.gathered(&(0..self.ids.len()).collect::<Vec<_>>())
     }
 }
 
@@ -210,15 +216,17 @@ impl Design {
             .channels
             .par_iter()
             .map(|channel| {
-                let (mut ids, mut data) = (Vec::new(), Vec::new());
+                let (mut ids, mut x) = (Vec::new(), Vec::new());
                 for (to, from) in kept.iter().enumerate() {
                     if let Some(at) = channel.ids.iter().position(|id| id == from) {
                         ids.push(to);
-                        data.extend_from_slice(channel.x.column(at).as_slice());
+                        x.push(Arc::clone(&channel.x[at]));
                     }
                 }
-                append(channel.kind, channel.axis, kept.len(), further, &mut ids, &mut data);
-                let x = DMatrix::from_vec(channel.y.len(), ids.len(), data);
+                for (id, column) in reaching(channel.kind, channel.axis, kept.len(), further) {
+                    ids.push(id);
+                    x.push(Arc::new(column));
+                }
                 Channel { kind: channel.kind, axis: channel.axis, ids, x, y: channel.y.clone() }
             })
             .collect();
@@ -241,7 +249,8 @@ impl Design {
         for channel in &mut self.channels {
             for (id, amplitude) in amplitudes {
                 if let Some(at) = channel.ids.iter().position(|own| own == id) {
-                    channel.y.axpy(*amplitude, &channel.x.column(at), 1.0);
+                    let x = channel.x[at].iter();
+                    channel.y.iter_mut().zip(x).for_each(|(y, x)| *y += amplitude * x);
                 }
             }
         }
@@ -252,80 +261,64 @@ impl Design {
         (0..self.columns.len()).filter(|index| self.columns[*index].is_of(effect)).collect()
     }
 
-    /// Normal equations of some columns, given each channel's whitening.
-    pub fn normal(&self, whitenings: &[Whitening], wanted: &[usize]) -> Normal {
-        let part = |(channel, whitening): (&Channel, &Whitening)| {
-            let (from, ids) = places(&channel.ids, wanted);
-            let columns = whitening.latents().condensed(&channel.gathered(&from));
-            (Normal::of(&columns, whitening), ids)
+    /// Normal equations of some columns, given the precision of each channel.
+    pub fn normal(&self, precisions: &[Precision], wanted: &[usize]) -> Normal {
+        let alone = |(at, precision): (usize, &Precision)| ChannelGroup {
+            channels: vec![at],
+            effects: Arc::clone(precision.effects()),
         };
-        let parts: Vec<(Normal, Vec<usize>)> = self.channels.par_iter().zip(whitenings).map(part).collect();
-        let mut normal = Normal::zeros(wanted.len());
-        parts.iter().for_each(|(part, ids)| normal.add(part, ids));
-        normal
+        let groups: Vec<ChannelGroup> = precisions.iter().enumerate().map(alone).collect();
+        let products = self.products(&groups, wanted);
+        let pairs = products.groups.par_iter().zip(precisions);
+        let parts: Vec<Normal> = pairs.map(|(group, own)| Normal::of(&group.columns, own)).collect();
+        products.sum(wanted.len(), &parts)
     }
 
-    /// All columns and before them `count` sparse ones, which a channel may have, given what its blocks have in common.
-    pub fn condensed_beside(
-        &self,
-        latents: &(dyn Fn(&Channel) -> RandomEffects + Sync),
-        sparse: &(dyn Fn(&Channel) -> Sparse + Sync),
-        count: usize,
-    ) -> DesignProducts {
-        let channels = self.channels.par_iter().map(|channel| {
-            let sparse = sparse(channel);
-            let columns = Arc::new(latents(channel)).condensed_beside(&sparse, &channel.all());
-            let ids = (0..sparse.count).chain(channel.ids.iter().map(|id| count + id)).collect();
-            ChannelProducts { kind: channel.kind, ids, columns }
-        });
-        DesignProducts { channels: channels.collect() }
-    }
-
-    /// All columns, given what the blocks of a channel have in common.
-    pub fn condensed(&self, latents: &(dyn Fn(&Channel) -> RandomEffects + Sync)) -> DesignProducts {
-        let channels = self.channels.par_iter().map(|channel| {
-            let columns = Arc::new(latents(channel)).condensed(&channel.all());
-            ChannelProducts { kind: channel.kind, ids: channel.ids.clone(), columns }
-        });
-        DesignProducts { channels: channels.collect() }
+    /// Cross-products of some columns, group by group.
+    pub fn products(&self, groups: &[ChannelGroup], wanted: &[usize]) -> DesignProducts {
+        let of = |group: &ChannelGroup| {
+            let channels = || group.channels.iter().map(|at| &self.channels[*at]);
+            let reaches = |at: &usize| channels().any(|channel| channel.ids.contains(&wanted[*at]));
+            let ids: Vec<usize> = (0..wanted.len()).filter(reaches).collect();
+            let own: Vec<usize> = ids.iter().map(|at| wanted[*at]).collect();
+            let x: Vec<DMatrix<f64>> = channels().map(|channel| channel.gathered(&own)).collect();
+            let kinds = channels().map(|channel| channel.kind).collect();
+            GroupProducts { kinds, ids, columns: group.effects.cross_products(&x) }
+        };
+        DesignProducts { groups: groups.par_iter().map(of).collect() }
     }
 }
 
 impl DesignProducts {
-    /// Some columns, and the residual; those that are not named are out of reach. Of one sensor, or all of them.
+    /// Some columns, and the residual; those that are not named are out of reach. Of groups of one sensor, or all of them.
     pub fn picked(&self, kind: Option<SensorKind>, wanted: &[usize]) -> Self {
-        let channels = self.channels.iter().filter(|channel| kind.is_none_or(|kind| channel.kind == kind));
-        let picked = channels.map(|channel| {
-            let (mut from, ids) = places(&channel.ids, wanted);
-            from.push(channel.ids.len());
-            ChannelProducts { kind: channel.kind, ids, columns: channel.columns.picked(&from) }
+        let is_asked = |group: &&GroupProducts| kind.is_none_or(|kind| group.kinds.contains(&kind));
+        let picked = self.groups.iter().filter(is_asked).map(|group| {
+            let (mut from, ids) = places(&group.ids, wanted);
+            from.push(group.ids.len());
+            GroupProducts { kinds: group.kinds.clone(), ids, columns: group.columns.picked(&from) }
         });
-        Self { channels: picked.collect() }
+        Self { groups: picked.collect() }
     }
 
-    /// With the channels of another that are of sensors it has none of.
-    pub fn beside(mut self, other: Self) -> Self {
-        let has = |channel: &ChannelProducts| self.channels.iter().any(|own| own.kind == channel.kind);
-        let others: Vec<ChannelProducts> =
-            other.channels.into_iter().filter(|channel| !has(channel)).collect();
-        self.channels.extend(others);
+    /// With the groups of another that are of sensors it has none of.
+    pub fn with_others(mut self, other: Self) -> Self {
+        let has = |group: &GroupProducts| self.groups.iter().any(|own| own.kinds == group.kinds);
+        let others: Vec<GroupProducts> = other.groups.into_iter().filter(|group| !has(group)).collect();
+        self.groups.extend(others);
         self
     }
 
     /// Normal equations of its columns, of which there are `size`.
-    pub fn normal(&self, size: usize, whitening: &(dyn Fn(&ChannelProducts) -> Whitening + Sync)) -> Normal {
-        let parts: Vec<Normal> = self
-            .channels
-            .par_iter()
-            .map(|channel| Normal::of(&channel.columns, &whitening(channel)))
-            .collect();
-        self.sum(size, &parts)
+    pub fn normal(&self, size: usize, precision: &(dyn Fn(&GroupProducts) -> Precision + Sync)) -> Normal {
+        let of = |group: &GroupProducts| Normal::of(&group.columns, &precision(group));
+        self.sum(size, &self.groups.par_iter().map(of).collect::<Vec<_>>())
     }
 
-    /// Normal equations of all channels, of so many columns, from those of each.
+    /// Normal equations of all groups, of so many columns, from those of each.
     pub fn sum(&self, size: usize, parts: &[Normal]) -> Normal {
         let mut normal = Normal::zeros(size);
-        parts.iter().zip(&self.channels).for_each(|(part, channel)| normal.add(part, &channel.ids));
+        parts.iter().zip(&self.groups).for_each(|(part, group)| normal.add(part, &group.ids));
         normal
     }
 }
@@ -343,34 +336,23 @@ fn channel(
     signatures: &[impl Borrow<Means>],
     residual: &Means,
 ) -> Channel {
-    let (mut ids, mut data) = (Vec::new(), Vec::new());
-    append(kind, axis, 0, signatures, &mut ids, &mut data);
-    let x = DMatrix::from_vec(blocks, ids.len(), data);
+    let (ids, x) = reaching(kind, axis, 0, signatures).map(|(id, column)| (id, Arc::new(column))).unzip();
     let y = DVector::from_vec(along(residual, kind, axis).unwrap_or_else(|| vec![0.0; blocks]));
     Channel { kind, axis, ids, x, y }
 }
 
-/// Appends the signatures that reach a channel; they are numbered from `first` on.
-pub fn append(
+/// The signatures that reach a channel, block by block; they are numbered from `first` on.
+pub fn reaching(
     kind: SensorKind,
     axis: usize,
     first: usize,
     signatures: &[impl Borrow<Means>],
-    ids: &mut Vec<usize>,
-    data: &mut Vec<f64>,
-) {
-    let along = |(id, signature)| {
-        let means: &Means = Borrow::borrow(signature);
-        let values = means[kind as usize].as_ref()?;
-        values.iter().any(|v| v[axis] != 0.0).then_some((first + id, values))
-    };
-    let reaching: Vec<(usize, &Vec<Vector3<f64>>)> =
-        signatures.iter().enumerate().filter_map(along).collect();
-    data.reserve(reaching.iter().map(|(_, values)| values.len()).sum());
-    for (id, values) in reaching {
-        ids.push(id);
-        data.extend(values.iter().map(|v| v[axis]));
-    }
+) -> impl Iterator<Item = (usize, Vec<f64>)> {
+    signatures.iter().enumerate().filter_map(move |(id, signature)| {
+        let values = Borrow::<Means>::borrow(signature)[kind as usize].as_ref()?;
+        let reaches = values.iter().any(|v| v[axis] != 0.0);
+        reaches.then(|| (first + id, values.iter().map(|v| v[axis]).collect()))
+    })
 }
 
 fn along(means: &Means, kind: SensorKind, axis: usize) -> Option<Vec<f64>> {

@@ -13,16 +13,21 @@
 //! | file | what |
 //! | --- | --- |
 //! | [`skyline`] | Cholesky factor of a banded matrix |
-//! | [`symmetric_product`], [`schur_complement`] | products and elimination of dense symmetric matrices |
-//! | [`random_effects`] | Z and its cross-products with X and y |
-//! | [`whitening`] | Σ⁻¹, by Woodbury's identity over banded precisions |
-//! | [`design`] | columns X by axis, and their normal equations |
-//! | [`augmented_normal`] | normal equations of trial columns, with nuisance columns projected out |
+//! | [`sparse_rows`], [`symmetric_product`] | rows with few entries; products that are symmetric |
+//! | [`process`] | a drift: a Gauss–Markov process at knots |
+//! | [`random_effects`] | D⁻¹ and Z of channels, and their cross-products with X and y |
+//! | [`precision`] | Σ⁻¹: the random effects eliminated, in the order of time |
+//! | [`design`] | columns X by channel, and their normal equations |
+//! | [`augmented_normal`] | normal equations of trial columns added to fitted ones |
 //! | [`likelihood`] | the restricted likelihood (REML) |
 //! | [`white_noise`] | white noise from neighbouring blocks |
 //! | [`repeatability`] | pointing errors of the table, axis by axis |
-//! | [`noise`] | parameters of the noise and the search for them |
 //! | [`shared_offsets`] | pointing errors that turn all sensors at once |
+//! | [`noise`] | parameters of the noise and the search for them |
+//!
+//! Every question is answered by one product: cross-products of columns with each other and with u, by white noise alone;
+//! then the elimination of u under the drifts and the scatter; then sums over channels in a [`Normal`](design::Normal).
+//! Cost and memory are linear in the length of the recording.
 //!
 //! Sources: Henderson, Biometrics 31 (1975); Patterson and Thompson, Biometrika 58 (1971).
 //!
@@ -32,11 +37,12 @@ pub mod augmented_normal;
 pub mod design;
 pub mod likelihood;
 pub mod noise;
+pub mod precision;
+pub mod process;
 pub mod random_effects;
 pub mod repeatability;
-pub mod schur_complement;
 pub mod shared_offsets;
 pub mod skyline;
+pub mod sparse_rows;
 pub mod symmetric_product;
 pub mod white_noise;
-pub mod whitening;

@@ -12,17 +12,21 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{
-    design::{Channel, Design, DesignProducts, Normal},
+    design::{Channel, ChannelGroup, Design, DesignProducts, Normal},
     likelihood::Likelihood,
-    random_effects::RandomEffects,
+    precision::Precision,
+    process::Process,
+    random_effects::{ChannelBlocks, RandomEffects},
     repeatability::PointingErrors,
-    whitening::{Process, Whitening},
+    sparse_rows::SparseRows,
 };
 use crate::{
     diagnosis::residual::{block::Block, forward_model::ForwardModel},
     recording::SensorKind,
 };
 
+/// A fast drift and a slow one.
+const DRIFTS: usize = 2;
 /// Correlation time of the fast drift, s.
 const FAST: f64 = 8.0;
 /// Correlation times that the slow drift may have, s: the last is a walk, which forgets nothing while it is recorded.
@@ -70,10 +74,20 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Normal equations of all columns of a condensed design, of which there are `size`.
+    /// Normal equations of all columns of a design, of which there are `size`, axis by axis.
     pub fn normal(&self, design: &DesignProducts, size: usize) -> Normal {
-        let sensor = |kind: SensorKind| &self.sensors[kind as usize];
-        design.normal(size, &|channel| sensor(channel.kind).whitening(&channel.columns.latents))
+        design.normal(size, &|group| {
+            let scatter = group.kinds.first().map_or(0.0, |kind| self.sensors[*kind as usize].scatter);
+            self.precision(&group.kinds, &group.columns.effects, scatter)
+        })
+    }
+
+    /// Σ⁻¹ of channels of these sensors, with a scatter of their offsets, rad.
+    pub fn precision(&self, kinds: &[SensorKind], effects: &Arc<RandomEffects>, scatter: f64) -> Precision {
+        let drifts: Vec<[Process; 2]> =
+            kinds.iter().map(|kind| self.sensors[*kind as usize].drifts()).collect();
+        let drifts: Vec<&[Process]> = drifts.iter().map(|drifts| &drifts[..]).collect();
+        Precision::new(Arc::clone(effects), scatter, &drifts)
     }
 
     /// −ln of the prior of all that are as likely, but for a constant.
@@ -138,32 +152,51 @@ impl<'s> Weighing<'s> {
     }
 
     /// Σ⁻¹ of each channel of a design.
-    pub fn whitenings(&self, design: &Design, noise: &Noise) -> Vec<Whitening> {
-        self.whitenings_within(design, noise, &|_| true)
+    pub fn precisions(&self, design: &Design, noise: &Noise) -> Vec<Precision> {
+        self.precisions_within(design, noise, &|_| true)
     }
 
     /// Σ⁻¹ of each channel over some of the blocks, as if the others had not been measured.
-    pub fn whitenings_within(
+    pub fn precisions_within(
         &self,
         design: &Design,
         noise: &Noise,
         inside: &(dyn Fn(usize) -> bool + Sync),
-    ) -> Vec<Whitening> {
-        let whitening = |channel: &Channel| {
-            let latents = self.latents(channel, noise, inside);
-            noise.sensors[channel.kind as usize].whitening(&Arc::new(latents))
+    ) -> Vec<Precision> {
+        let precision = |channel: &Channel| {
+            let effects = Arc::new(self.effects_alone(channel, noise, inside));
+            let scatter = noise.sensors[channel.kind as usize].scatter;
+            noise.precision(&[channel.kind], &effects, scatter)
         };
-        design.channels.par_iter().map(whitening).collect()
+        design.channels.par_iter().map(precision).collect()
     }
 
-    /// What the blocks of a channel have in common, but for the scatter.
-    pub fn drifting(&self, channel: &Channel, noise: &Noise) -> RandomEffects {
-        RandomEffects::new(&self.times, self.weights(channel, noise, &|_| true), &[])
+    /// Random effects of some channels of a design that share their offsets: so many, with a row a block for each channel.
+    pub fn effects_shared(
+        &self,
+        design: &Design,
+        noise: &Noise,
+        channels: Vec<usize>,
+        count: usize,
+        offsets: &dyn Fn(&Channel) -> SparseRows,
+    ) -> ChannelGroup {
+        let rows = |at: &usize| {
+            let channel = &design.channels[*at];
+            ChannelBlocks { weights: self.weights(channel, noise, &|_| true), offsets: offsets(channel) }
+        };
+        let rows = channels.iter().map(rows).collect();
+        let effects = Arc::new(RandomEffects::new(&self.times, rows, count, DRIFTS));
+        ChannelGroup { channels, effects }
     }
 
-    /// A design's columns, as white noise weighs them.
-    pub fn condensed(&self, design: &Design, noise: &Noise) -> DesignProducts {
-        design.condensed(&|channel| self.latents(channel, noise, &|_| true))
+    /// Cross-products of some columns of a design, axis by axis.
+    pub fn products(&self, design: &Design, noise: &Noise, wanted: &[usize]) -> DesignProducts {
+        let alone = |(at, channel): (usize, &Channel)| ChannelGroup {
+            channels: vec![at],
+            effects: Arc::new(self.effects_alone(channel, noise, &|_| true)),
+        };
+        let groups: Vec<ChannelGroup> = design.channels.par_iter().enumerate().map(alone).collect();
+        design.products(&groups, wanted)
     }
 
     /// Variance of a block's mean by noise alone.
@@ -181,16 +214,16 @@ impl<'s> Weighing<'s> {
         PointingErrors { scene: self.scene, kind: channel.kind, axis: channel.axis, given }
     }
 
-    /// What the blocks of a channel have in common, by its white noise; of some of them, as if the others had not been
-    /// measured.
-    fn latents(
+    /// Random effects of a channel by itself; of some of its blocks, as if the others had not been measured.
+    fn effects_alone(
         &self,
         channel: &Channel,
         noise: &Noise,
         inside: &(dyn Fn(usize) -> bool + Sync),
     ) -> RandomEffects {
         let weights = self.weights(channel, noise, inside);
-        RandomEffects::new(&self.times, weights, &self.scattered(channel).shared())
+        let (count, offsets) = self.scattered(channel).offsets();
+        RandomEffects::new(&self.times, vec![ChannelBlocks { weights, offsets }], count, DRIFTS)
     }
 
     fn weights(&self, channel: &Channel, noise: &Noise, inside: &(dyn Fn(usize) -> bool + Sync)) -> Vec<f64> {
@@ -205,7 +238,7 @@ impl<'s> Weighing<'s> {
     }
 
     /// The noise of a sensor under which its residual, less `columns`, is likeliest; the search begins at `start`, by
-    /// whose white noise the design was condensed, and goes by these factors.
+    /// whose white noise the products were taken, and goes by these factors.
     pub fn fit(
         &self,
         design: &DesignProducts,
@@ -287,13 +320,8 @@ impl<'s> Weighing<'s> {
 }
 
 impl SensorNoise {
-    /// Σ⁻¹ of one of the sensor's axes.
-    fn whitening(&self, latents: &Arc<RandomEffects>) -> Whitening {
-        Whitening::new(Arc::clone(latents), self.scatter, &self.drifts())
-    }
-
     /// The fast and the slow drift.
-    fn drifts(&self) -> [Process; 2] {
+    fn drifts(&self) -> [Process; DRIFTS] {
         [(FAST, self.drift[0]), (self.slow, self.drift[1])].map(|(time, sigma)| Process { time, sigma })
     }
 

@@ -1,229 +1,160 @@
-//! What the blocks of a channel have in common beside white noise, and what columns show of it.
+//! What the blocks of one channel, or of several, have in common beyond white noise.
 //!
 //! ```text
-//! x = U t + Z k + e      e ~ N(0, D)
+//! y = X β + Z u + e      e ~ N(0, D)      u: offsets of stretches ~ N(0, σ²), drift of each channel at knots
 //! ```
 //!
 //! | symbol | meaning |
 //! | --- | --- |
 //! | D | white noise of each block mean |
-//! | t | what a stretch has in common, a number for each way the table may stand off its encoders |
-//! | U | their courses |
-//! | k | drift at knots |
-//! | Z | straight lines between knots |
+//! | Z | by how much each random number counts in each block: an offset by its course, drift by straight lines between knots |
 //!
-//! None of it depends on how large t and k are (`whitening`): columns are condensed once, and weighed by as many
-//! drifts and scatters as are asked for. Not modelled: drift within the distance of two knots, what the axes of a triad
-//! have in common.
+//! Nothing here depends on σ or on how large the drifts are ([`super::precision`]): cross-products are computed once for a
+//! white noise. Several channels share their offsets; each has a drift of its own. The random numbers are ordered in
+//! time, an offset before the knots of the blocks that share it, so that Zᵀ D⁻¹ Z is banded (A. George, J. Liu, Computer
+//! Solution of Large Sparse Positive Definite Systems, 1981, ch. 4).
+//!
+//! The states of a knot are all drifts but the first, and their sum: the blocks see the sum alone, so that few rows of the
+//! factor are long.
+//!
+//! Not modelled: drift within the distance of two knots, drift that channels share.
 
-use std::{ops::Range, sync::Arc};
+use std::{iter, sync::Arc};
 
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::DMatrix;
 
-use super::symmetric_product;
+use super::{skyline::Skyline, sparse_rows::SparseRows, symmetric_product};
 
 /// Distance between knots, s.
 pub const SPACING: f64 = 2.5;
-/// Most courses of a stretch: one for each gimbal.
-pub const COURSES: usize = 3;
 
-/// Blocks of one stretch and what they share: random numbers times these courses.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Shared {
-    /// Blocks, consecutive.
-    pub blocks: Range<usize>,
-    /// A value for each of the blocks, channel's unit; of more than [`COURSES`] the last ones are left out.
-    pub courses: Vec<Vec<f64>>,
-}
-
-/// Columns that are zero but for a few blocks: for each block their places and values there.
+/// One channel: an axis of a sensor.
 #[derive(Clone, Debug)]
-pub struct Sparse {
-    /// Number of columns.
-    pub count: usize,
-    /// Places and values, block by block.
-    pub rows: Vec<Vec<(usize, f64)>>,
-}
-
-impl Sparse {
-    /// None at all.
-    pub fn none() -> Self {
-        Self { count: 0, rows: Vec::new() }
-    }
-}
-
-/// A stretch as white noise weighs it. Courses that it does not have are zero.
-#[derive(Clone, Debug)]
-pub struct Stretch {
-    /// Its blocks.
-    pub blocks: Range<usize>,
-    /// Place of its first course among those of all stretches.
-    pub first: usize,
-    /// Number of its courses.
-    pub count: usize,
-    /// U, a row a block.
-    pub u: Vec<[f64; COURSES]>,
-    /// Uᵀ D⁻¹ U.
-    pub gram: Matrix3<f64>,
-    /// First knot that its blocks lie beside.
-    pub base: usize,
-    /// Zᵀ D⁻¹ U over the knots from there on.
-    pub beside: Vec<[f64; COURSES]>,
-}
-
-/// The blocks of one channel, as white noise weighs them.
-#[derive(Clone, Debug)]
-pub struct RandomEffects {
+pub struct ChannelBlocks {
     /// Inverse white variance of each block, zero where it holds nothing.
     pub weights: Vec<f64>,
-    /// The knot before each block and how far it lies on the way to the next, 0 to 1.
-    pub places: Vec<(usize, f64)>,
-    /// Number of knots.
-    pub knots: usize,
-    /// Zᵀ D⁻¹ Z: of each knot with itself and with the next.
-    pub between: Vec<(f64, f64)>,
-    /// What stretches share.
-    pub stretches: Vec<Stretch>,
-    /// Number of courses of all stretches.
-    pub courses: usize,
-    /// ln |D|, over blocks that hold something.
-    pub log_determinant: f64,
+    /// By how much each offset counts in each block.
+    pub offsets: SparseRows,
 }
 
-/// Columns of a channel, as white noise weighs them.
+/// D⁻¹ and Z of some channels.
+#[derive(Clone, Debug)]
+pub struct RandomEffects {
+    channels: Vec<Rows>,
+    /// Drifts of a channel.
+    pub(super) processes: usize,
+    /// The first state of each knot.
+    pub(super) knots: Vec<usize>,
+    /// The state of each offset.
+    pub(super) offsets: Vec<usize>,
+    /// Zᵀ D⁻¹ Z, with room for the precision of the drifts.
+    pub(super) gram: Skyline,
+    /// ln |D|, over blocks that hold something.
+    pub(super) log_determinant: f64,
+}
+
+/// D⁻¹ and Z of one channel.
+#[derive(Clone, Debug)]
+struct Rows {
+    weights: Vec<f64>,
+    z: SparseRows,
+}
+
+/// Cross-products of columns with themselves and with the random effects.
 #[derive(Clone, Debug)]
 pub struct CrossProducts {
-    /// The blocks.
-    pub latents: Arc<RandomEffects>,
+    /// The random effects.
+    pub effects: Arc<RandomEffects>,
     /// Xᵀ D⁻¹ X.
     pub plain: DMatrix<f64>,
-    /// Xᵀ D⁻¹ U, a column for each course of each stretch.
-    pub along: DMatrix<f64>,
-    /// Xᵀ D⁻¹ Z, a column a knot.
-    pub beside: DMatrix<f64>,
+    /// Xᵀ D⁻¹ Z, a column a state.
+    pub states: DMatrix<f64>,
 }
 
+/// The knot before a block, and how far it lies on the way to the next, 0 to 1.
+type Place = (usize, f64);
+
 impl RandomEffects {
-    /// From the blocks' times, s, increasing; their inverse white variances; and what stretches share.
-    pub fn new(times: &[f64], weights: Vec<f64>, shared: &[Shared]) -> Self {
-        let start = times.first().copied().unwrap_or(0.0);
-        let length = times.last().copied().unwrap_or(0.0) - start;
-        let knots = ((length / SPACING).ceil() as usize + 1).max(2);
-        let place = |time: &f64| {
-            let at = (time - start) / SPACING;
-            let knot = (at.floor() as usize).min(knots - 2);
-            (knot, at - knot as f64)
+    /// From the blocks' times, s, increasing; the channels; and the number of offsets and of a channel's drifts.
+    pub fn new(times: &[f64], channels: Vec<ChannelBlocks>, offsets: usize, processes: usize) -> Self {
+        let (places, knots) = places(times);
+        let (knots, offsets) = states(&places, knots, &channels, offsets, channels.len() * processes);
+        let rows = |(at, channel): (usize, ChannelBlocks)| {
+            let sum = |knot: usize| knots[knot] + at * processes + processes - 1;
+            let mut z = SparseRows::default();
+            for (block, (knot, share)) in places.iter().enumerate() {
+                let drift = [(*knot, 1.0 - share), (knot + 1, *share)].into_iter().take(2 * processes.min(1));
+                let shared = channel.offsets.row(block).iter().map(|(offset, u)| (offsets[*offset], *u));
+                z.push(drift.map(|(knot, share)| (sum(knot), share)).chain(shared));
+            }
+            Rows { weights: channel.weights, z }
         };
-        let places: Vec<(usize, f64)> = times.iter().map(place).collect();
-        let mut between = vec![(0.0, 0.0); knots];
-        for ((knot, share), w) in places.iter().zip(&weights) {
-            between[*knot].0 += w * (1.0 - share) * (1.0 - share);
-            between[*knot].1 += w * share * (1.0 - share);
-            between[knot + 1].0 += w * share * share;
+        let channels: Vec<Rows> = channels.into_iter().enumerate().map(rows).collect();
+        let mut gram = Skyline::new(envelope(&channels, &knots, &offsets, processes));
+        for (weight, row) in channels.iter().flat_map(Rows::iter).filter(|(weight, _)| *weight > 0.0) {
+            for (at, (one, a)) in row.iter().enumerate() {
+                row[..=at].iter().for_each(|(other, b)| gram.add(*one, *other, weight * a * b));
+            }
         }
-        let mut courses = 0;
-        let stretches = shared
-            .iter()
-            .filter(|shared| !shared.courses.is_empty())
-            .map(|shared| {
-                let stretch = Stretch::new(shared, courses, &weights, &places);
-                courses += stretch.count;
-                stretch
-            })
-            .collect();
-        let log_determinant = weights.iter().filter(|w| **w > 0.0).map(|w| -w.ln()).sum();
-        Self { weights, places, knots, between, stretches, courses, log_determinant }
+        let weights = channels.iter().flat_map(|rows| &rows.weights);
+        let log_determinant = weights.filter(|w| **w > 0.0).map(|w| -w.ln()).sum();
+        Self { channels, processes, knots, offsets, gram, log_determinant }
     }
 
-    /// (D⁻¹X)ᵀ.
-    pub fn weighted(&self, x: &DMatrix<f64>) -> DMatrix<f64> {
+    /// Number of random numbers.
+    pub fn states(&self) -> usize {
+        self.gram.size()
+    }
+
+    /// The states of all drifts.
+    pub(super) fn drift_states(&self) -> impl Iterator<Item = usize> {
+        let width = self.channels.len() * self.processes;
+        self.knots.iter().flat_map(move |knot| *knot..knot + width)
+    }
+
+    /// Whether blocks share more than drift.
+    pub fn has_offsets(&self) -> bool {
+        !self.offsets.is_empty()
+    }
+
+    /// (D⁻¹X)ᵀ of a channel.
+    pub fn weighted(&self, channel: usize, x: &DMatrix<f64>) -> DMatrix<f64> {
         let mut weighted = x.transpose();
-        for (mut row, w) in weighted.column_iter_mut().zip(&self.weights) {
+        for (mut row, w) in weighted.column_iter_mut().zip(&self.channels[channel].weights) {
             row *= *w;
         }
         weighted
     }
 
-    /// Some columns over the blocks.
-    pub fn condensed(self: &Arc<Self>, x: &DMatrix<f64>) -> CrossProducts {
-        let columns = x.ncols();
-        let weighted = self.weighted(x);
-        let mut beside = DMatrix::zeros(columns, self.knots);
-        for ((knot, share), row) in self.places.iter().zip(weighted.column_iter()) {
-            beside.column_mut(*knot).axpy(1.0 - share, &row, 1.0);
-            beside.column_mut(knot + 1).axpy(*share, &row, 1.0);
-        }
-        let mut along = DMatrix::zeros(columns, self.courses);
-        for stretch in &self.stretches {
-            for (block, u) in stretch.blocks.clone().zip(&stretch.u) {
-                for (course, u) in u.iter().enumerate().take(stretch.count) {
-                    along.column_mut(stretch.first + course).axpy(*u, &weighted.column(block), 1.0);
+    /// Of some columns over the blocks, channel by channel.
+    pub fn cross_products(self: &Arc<Self>, columns: &[DMatrix<f64>]) -> CrossProducts {
+        let count = columns.first().map_or(0, DMatrix::ncols);
+        let mut plain = DMatrix::zeros(count, count);
+        let mut states = DMatrix::zeros(count, self.states());
+        for (at, x) in columns.iter().enumerate() {
+            let weighted = self.weighted(at, x);
+            for (block, row) in weighted.column_iter().enumerate() {
+                for (state, z) in self.channels[at].z.row(block) {
+                    states.column_mut(*state).axpy(*z, &row, 1.0);
                 }
             }
+            plain = symmetric_product::with_product(plain, 1.0, &weighted, x);
         }
-        let plain = symmetric_product::with_product(DMatrix::zeros(columns, columns), 1.0, &weighted, x);
-        CrossProducts { latents: Arc::clone(self), plain, along, beside }
+        CrossProducts { effects: Arc::clone(self), plain, states }
     }
 
-    /// Sparse columns, and behind them some others.
-    pub fn condensed_beside(self: &Arc<Self>, sparse: &Sparse, x: &DMatrix<f64>) -> CrossProducts {
-        let dense = self.condensed(x);
-        let (n, own) = (sparse.count, x.ncols());
-        if n == 0 {
-            return dense;
+    /// D⁻¹ (x − Z u) of one column of a single channel; puts it in the place of x.
+    pub(super) fn weighted_remainder(&self, u: &[f64], x: &mut [f64]) {
+        for (x, (weight, row)) in x.iter_mut().zip(self.channels.iter().flat_map(Rows::iter)) {
+            let shared: f64 = row.iter().map(|(state, z)| z * u[*state]).sum();
+            *x = weight * (*x - shared);
         }
-        let mut plain = DMatrix::zeros(n + own, n + own);
-        plain.view_mut((n, n), (own, own)).copy_from(&dense.plain);
-        let mut beside = DMatrix::zeros(n + own, self.knots);
-        beside.rows_mut(n, own).copy_from(&dense.beside);
-        let mut along = DMatrix::zeros(n + own, self.courses);
-        along.rows_mut(n, own).copy_from(&dense.along);
-        let mut across = DMatrix::zeros(own, n);
-        let rows = x.transpose();
-        let blocks = sparse.rows.iter().zip(self.weights.iter().zip(&self.places));
-        for (block, (row, (w, (knot, share)))) in blocks.enumerate() {
-            for (place, value) in row {
-                beside[(*place, *knot)] += w * value * (1.0 - share);
-                beside[(*place, knot + 1)] += w * value * share;
-                across.column_mut(*place).axpy(w * value, &rows.column(block), 1.0);
-                row.iter().for_each(|(other, also)| plain[(*place, *other)] += w * value * also);
-            }
-        }
-        for stretch in &self.stretches {
-            for (block, u) in stretch.blocks.clone().zip(&stretch.u) {
-                for (place, value) in &sparse.rows[block] {
-                    for (course, u) in u.iter().enumerate().take(stretch.count) {
-                        along[(*place, stretch.first + course)] += self.weights[block] * value * u;
-                    }
-                }
-            }
-        }
-        plain.view_mut((n, 0), (own, n)).copy_from(&across);
-        plain.view_mut((0, n), (n, own)).copy_from(&across.transpose());
-        CrossProducts { latents: Arc::clone(self), plain, along, beside }
     }
 }
 
-impl Stretch {
-    fn new(shared: &Shared, first: usize, weights: &[f64], places: &[(usize, f64)]) -> Self {
-        let blocks = shared.blocks.clone();
-        let course = |course: usize, at: usize| shared.courses.get(course).map_or(0.0, |course| course[at]);
-        let u: Vec<[f64; COURSES]> =
-            (0..blocks.len()).map(|at| std::array::from_fn(|k| course(k, at))).collect();
-        let (weights, places) = (&weights[blocks.clone()], &places[blocks.clone()]);
-        let (base, last) = (places[0].0, places[places.len() - 1].0);
-        let mut beside = vec![[0.0; COURSES]; last + 2 - base];
-        let mut gram = Matrix3::zeros();
-        for ((u, w), (knot, share)) in u.iter().zip(weights).zip(places) {
-            for (k, one) in u.iter().enumerate() {
-                beside[knot - base][k] += w * one * (1.0 - share);
-                beside[knot + 1 - base][k] += w * one * share;
-                for (l, other) in u.iter().enumerate() {
-                    gram[(k, l)] += w * one * other;
-                }
-            }
-        }
-        Self { blocks, first, count: shared.courses.len().min(COURSES), u, gram, base, beside }
+impl Rows {
+    fn iter(&self) -> impl Iterator<Item = (f64, &[(usize, f64)])> {
+        self.weights.iter().enumerate().map(|(block, weight)| (*weight, self.z.row(block)))
     }
 }
 
@@ -232,43 +163,69 @@ impl CrossProducts {
     pub fn picked(&self, places: &[usize]) -> Self {
         let rows = |matrix: &DMatrix<f64>| matrix.select_rows(places);
         Self {
-            latents: Arc::clone(&self.latents),
+            effects: Arc::clone(&self.effects),
             plain: rows(&self.plain).select_columns(places),
-            along: rows(&self.along),
-            beside: rows(&self.beside),
+            states: rows(&self.states),
         }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// The place of each block among the knots, and the number of these.
+fn places(times: &[f64]) -> (Vec<Place>, usize) {
+    let start = times.first().copied().unwrap_or(0.0);
+    let length = times.last().copied().unwrap_or(0.0) - start;
+    let knots = ((length / SPACING).ceil() as usize + 1).max(2);
+    let place = |time: &f64| {
+        let at = (time - start) / SPACING;
+        let knot = (at.floor() as usize).min(knots - 2);
+        (knot, at - knot as f64)
+    };
+    (times.iter().map(place).collect(), knots)
+}
 
-    #[test]
-    fn sparse_columns_are_condensed_as_the_same_columns_with_their_zeros() {
-        let blocks = 40;
-        let times: Vec<f64> = (0..blocks).map(|k| 0.7 * k as f64).collect();
-        let weights = (0..blocks).map(|k| 1.0 + (k % 3) as f64).collect();
-        let courses = vec![(0..9).map(|k| f64::from(k) - 3.5).collect(), vec![0.4; 9]];
-        let latents = Arc::new(RandomEffects::new(&times, weights, &[Shared { blocks: 5..14, courses }]));
-        let value = |block: usize, column: usize| (block as f64 + 2.0 * column as f64).sin();
-        let held = |block: usize, column: usize| column == block / 10 || column == 3 - block / 10;
-        let rows = (0..blocks).map(|block| {
-            (0..4)
-                .filter(|column| held(block, *column))
-                .map(|column| (column, value(block, column)))
-                .collect()
-        });
-        let sparse = Sparse { count: 4, rows: rows.collect() };
-        let x = DMatrix::from_fn(blocks, 3, |block, column| value(block, column + 7));
-        let whole = DMatrix::from_fn(blocks, 7, |block, column| match column {
-            0..4 if held(block, column) => value(block, column),
-            0..4 => 0.0,
-            _ => x[(block, column - 4)],
-        });
-        let (found, expected) = (latents.condensed_beside(&sparse, &x), latents.condensed(&whole));
-        assert!((found.plain - expected.plain).amax() < 1e-12);
-        assert!((found.along - expected.along).amax() < 1e-12);
-        assert!((found.beside - expected.beside).amax() < 1e-12);
+/// The first state of each knot and the state of each offset, in time; `width` states belong to a knot.
+fn states(
+    places: &[Place],
+    knots: usize,
+    channels: &[ChannelBlocks],
+    offsets: usize,
+    width: usize,
+) -> (Vec<usize>, Vec<usize>) {
+    let mut before = vec![knots - 1; offsets];
+    for channel in channels {
+        for (block, (knot, _)) in places.iter().enumerate() {
+            let shared = channel.offsets.row(block).iter();
+            shared.for_each(|(offset, _)| before[*offset] = before[*offset].min(*knot));
+        }
     }
+    let mut ordered: Vec<usize> = (0..offsets).collect();
+    ordered.sort_by_key(|offset| before[*offset]);
+    let mut of_offsets = vec![0; offsets];
+    let (mut of_knots, mut state, mut next) = (Vec::with_capacity(knots), 0, ordered.iter().peekable());
+    for knot in 0..knots {
+        for offset in iter::from_fn(|| next.next_if(|offset| before[**offset] == knot)) {
+            of_offsets[*offset] = state;
+            state += 1;
+        }
+        of_knots.push(state);
+        state += width;
+    }
+    (of_knots, of_offsets)
+}
+
+/// The first state that each state meets, in a block or in the precision of the drifts.
+fn envelope(channels: &[Rows], knots: &[usize], offsets: &[usize], processes: usize) -> Vec<usize> {
+    let width = channels.len() * processes;
+    let mut first: Vec<usize> = (0..knots.len() * width + offsets.len()).collect();
+    for (knot, start) in knots.iter().enumerate() {
+        let before = knots[knot.saturating_sub(1)];
+        for state in 0..width {
+            first[start + state] = before + state / processes * processes;
+        }
+    }
+    for (_, row) in channels.iter().flat_map(Rows::iter) {
+        let lowest = row.iter().map(|(state, _)| *state).min().unwrap_or(0);
+        row.iter().for_each(|(state, _)| first[*state] = first[*state].min(lowest));
+    }
+    first
 }

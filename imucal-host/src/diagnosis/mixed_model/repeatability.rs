@@ -1,4 +1,4 @@
-//! What stretches of a recording have in common because the table stands off its encoders.
+//! Pointing errors of a table: what the blocks of a stretch have in common because it does not stand where its encoders say.
 //!
 //! ```text
 //! s = Σ_g δ_g u_g      at rest u_g = e_g × v, in motion u_g the simulator's derivative along gimbal g      δ_g ~ N(0, σ²)
@@ -18,7 +18,7 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::random_effects::Shared;
+use super::sparse_rows::SparseRows;
 use crate::{
     diagnosis::residual::{
         block::Block, forward_model::ForwardModel, gimbal_derivatives::gimbal_derivatives,
@@ -42,15 +42,22 @@ pub struct PointingErrors<'a> {
 }
 
 impl PointingErrors<'_> {
-    /// What each rest shares, and each stretch of a movement, for a scatter of 1 rad.
-    pub fn shared(&self) -> Vec<Shared> {
+    /// The number of errors, and by how much each counts in each block for a scatter of 1 rad: one for each rest, and one
+    /// for each gimbal and stretch of a movement.
+    pub fn offsets(&self) -> (usize, SparseRows) {
+        let blocks = &self.scene.blocks;
         if self.kind == SensorKind::Gyr {
-            return Vec::new();
+            return (0, SparseRows::empty(blocks.len()));
         }
-        stretches(&self.scene.blocks)
-            .into_iter()
-            .map(|blocks| Shared { courses: self.courses(blocks.clone()), blocks })
-            .collect()
+        let (mut count, mut rows) = (0, SparseRows::default());
+        for stretch in stretches(blocks) {
+            let courses = self.courses(stretch.clone());
+            for block in 0..stretch.len() {
+                rows.push(courses.iter().enumerate().map(|(course, u)| (count + course, u[block])));
+            }
+            count += courses.len();
+        }
+        (count, rows)
     }
 
     fn courses(&self, blocks: Range<usize>) -> Vec<Vec<f64>> {

@@ -1,28 +1,26 @@
-//! The probability of a set of effects where all sensors stand off the encoders together.
+//! Pointing errors of a table that turn all sensors at once.
 //!
 //! ```text
-//! Σ = Σ₀ + σ² V Vᵀ      V = Σ_j h_j(t) u_g      h_j: one at a rest, a straight line in time from each rest to the next
+//! offsets: h_j(t) u_g δ_jg      δ ~ N(0, σ²)      h_j: one at a rest, a straight line in time from each rest to the next
 //! ```
 //!
 //! | symbol | meaning |
 //! | --- | --- |
-//! | Σ₀ | white noise and drift of each axis, as [`super::noise`] has found them |
 //! | u_g | the simulator's derivative along gimbal g, of accelerometer and magnetometer |
 //! | σ | scatter, rad: the likeliest |
 //!
-//! A gimbal's offset turns six axes at once. Taken axis by axis ([`super::repeatability`]), which wants far smaller matrices, one
-//! such chance looks like six, and an effect that turns them all seems sure: it sifts the sets of which the best are
-//! judged here. Not modelled: that the gyroscope sees offsets change.
+//! A gimbal's offset turns six axes at once. Treated axis by axis ([`super::repeatability`]), which needs far smaller
+//! matrices, one such error counts as several independent coincidences, and an effect that turns all axes seems certain:
+//! sets of effects are screened so, and the best are scored with the offsets of this file. Not modelled: that the
+//! gyroscope sees offsets change.
 
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::{
-    design::{Channel, Design, DesignProducts, Normal},
+    design::{Channel, ChannelGroup, Design, GroupProducts, Normal},
     noise::{Noise, Weighing},
-    random_effects::Sparse,
     repeatability::stretches,
-    schur_complement::eliminated,
+    sparse_rows::SparseRows,
 };
 use crate::{
     diagnosis::residual::{
@@ -35,15 +33,13 @@ use crate::{
 const RATIO: f64 = 1.5;
 const STEPS: i32 = 8;
 
-/// All columns, as white noise weighs them, and before them the gimbals' offsets at so many nodes.
+/// The channels of a design, those that the gimbals' offsets turn in one group.
 pub struct SharedOffsets {
-    condensed: DesignProducts,
-    count: usize,
+    groups: Vec<ChannelGroup>,
 }
 
 impl SharedOffsets {
-    /// The gimbals' offsets at nodes beside all columns, by a noise's white one; `None` where no rig guides the sensor, or
-    /// nothing but a gyroscope was recorded.
+    /// By a noise's white one; `None` where no rig guides the sensor, or nothing but a gyroscope was recorded.
     pub fn of(
         scene: &ForwardModel<'_>,
         design: &Design,
@@ -55,37 +51,54 @@ impl SharedOffsets {
             return None;
         }
         let (places, nodes) = nodes(&scene.blocks);
-        let count = turned.len() * nodes;
-        let sparse = |channel: &Channel| {
-            let row = |(block, place): (usize, &[(usize, f64); 2])| {
-                let of = |gimbal: usize| turned[gimbal][channel.kind as usize].as_ref();
-                let u = |gimbal: usize| of(gimbal).map_or(0.0, |means| means[block][channel.axis]);
-                let along = place
-                    .iter()
-                    .flat_map(|(node, share)| (0..turned.len()).map(move |gimbal| (*node, *share, gimbal)));
-                along.map(|(node, share, gimbal)| (turned.len() * node + gimbal, share * u(gimbal))).collect()
-            };
-            match channel.kind {
-                SensorKind::Gyr => Sparse::none(),
-                _ => Sparse { count, rows: places.iter().enumerate().map(row).collect() },
+        let offsets = |channel: &Channel| {
+            let mut rows = SparseRows::default();
+            for (block, place) in places.iter().enumerate() {
+                let u = |gimbal: usize| {
+                    let means = turned[gimbal][channel.kind as usize].as_ref();
+                    means.map_or(0.0, |means| means[block][channel.axis])
+                };
+                let counting = place.iter().filter(|(_, share)| *share != 0.0);
+                rows.push(counting.flat_map(|(node, share)| {
+                    (0..turned.len()).map(move |gimbal| (turned.len() * node + gimbal, share * u(gimbal)))
+                }));
             }
+            rows
         };
-        let latents = |channel: &Channel| weighing.drifting(channel, noise);
-        Some(Self { condensed: design.condensed_beside(&latents, &sparse, count), count })
+        let is_turned = |at: &usize| design.channels[*at].kind != SensorKind::Gyr;
+        let (turned_alike, others): (Vec<usize>, Vec<usize>) =
+            (0..design.channels.len()).partition(is_turned);
+        let none = |_: &Channel| SparseRows::empty(scene.blocks.len());
+        let alone = others.into_iter().map(|at| weighing.effects_shared(design, noise, vec![at], 0, &none));
+        let mut groups: Vec<ChannelGroup> = alone.collect();
+        groups.push(weighing.effects_shared(design, noise, turned_alike, turned.len() * nodes, &offsets));
+        Some(Self { groups })
     }
 
     /// The greatest value of the normal equations of the fitted columns over the scatter of the offsets.
     pub fn likeliest(
         &self,
         scene: &ForwardModel<'_>,
+        design: &Design,
         noise: &Noise,
         fitted: &[usize],
         value_of: &(dyn Fn(&Normal) -> Option<f64> + Sync),
     ) -> Option<f64> {
-        let known: Vec<usize> = (0..self.count).chain(fitted.iter().map(|id| self.count + id)).collect();
-        let normal = noise.normal(&self.condensed.picked(None, &known), known.len());
+        let products = design.products(&self.groups, fitted);
+        let part = |group: &GroupProducts, scatter: f64| {
+            let precision = noise.precision(&group.kinds, &group.columns.effects, scatter);
+            Normal::of(&group.columns, &precision)
+        };
+        // What shares no offset is the same for every scatter.
+        let alone = |group: &GroupProducts| (!group.columns.effects.has_offsets()).then(|| part(group, 0.0));
+        let alone: Vec<Option<Normal>> = products.groups.par_iter().map(alone).collect();
         let usual = usual_scatter(scene, noise);
-        likeliest(&|steps: i32| value_of(&without(&normal, self.count, usual * RATIO.powi(steps))?))
+        likeliest(&|steps: i32| {
+            let scatter = usual * RATIO.powi(steps);
+            let known = products.groups.iter().zip(&alone);
+            let parts = known.map(|(group, known)| known.clone().unwrap_or_else(|| part(group, scatter)));
+            value_of(&products.sum(fitted.len(), &parts.collect::<Vec<_>>()))
+        })
     }
 }
 
@@ -132,28 +145,9 @@ fn likeliest(value: &(dyn Fn(i32) -> Option<f64> + Sync)) -> Option<f64> {
     Some(most)
 }
 
-/// Normal equations with the first `count` columns integrated out, whose amounts are normal with this standard deviation.
-fn without(normal: &Normal, count: usize, sigma: f64) -> Option<Normal> {
-    let (size, n) = (normal.score.len(), normal.score.len() - count);
-    let mut all = DMatrix::zeros(size + 1, size + 1);
-    all.view_mut((0, 0), (size, size)).copy_from(&normal.information);
-    all.view_mut((0, size), (size, 1)).copy_from(&normal.score);
-    all[(size, size)] = normal.energy;
-    all.rows_mut(0, count).scale_mut(sigma);
-    all.columns_mut(0, count).scale_mut(sigma);
-    (0..count).for_each(|own| all[(own, own)] += 1.0);
-    let (left, log_determinant) = eliminated(all, count)?;
-    Some(Normal {
-        information: left.view((0, 0), (n, n)).into_owned(),
-        score: left.view((0, n), (n, 1)).column(0).into_owned(),
-        energy: left[(n, n)],
-        log_determinant: normal.log_determinant + log_determinant,
-    })
-}
-
 #[cfg(test)]
 mod tests {
-    use nalgebra::DVector;
+    use nalgebra::DMatrix;
 
     use super::*;
 
@@ -195,27 +189,5 @@ mod tests {
         // What cannot be computed is no greater than what can.
         assert_eq!(likeliest(&|step| (step == 0).then_some(7.0)), Some(7.0));
         assert_eq!(likeliest(&|step| (step != 0).then_some(7.0)), None);
-    }
-
-    #[test]
-    fn columns_that_are_integrated_out_leave_what_their_covariance_leaves() {
-        let (rows, sigma) = (9, 0.7);
-        let v = DMatrix::from_fn(rows, 2, |i, j| (1.3 * i as f64 + j as f64).sin());
-        let x = DMatrix::from_fn(rows, 3, |i, j| (0.4 * (i * j) as f64 + i as f64).cos());
-        let y = DVector::from_fn(rows, |i, _| (i as f64 - 3.0) * 0.3);
-        let all = DMatrix::from_fn(rows, 5, |i, j| if j < 2 { v[(i, j)] } else { x[(i, j - 2)] });
-        let normal = Normal {
-            information: all.tr_mul(&all),
-            score: all.tr_mul(&y),
-            energy: y.dot(&y),
-            log_determinant: 0.0,
-        };
-        let found = without(&normal, 2, sigma).unwrap();
-        let covariance = DMatrix::identity(rows, rows) + &v * v.transpose() * (sigma * sigma);
-        let inverse = covariance.clone().try_inverse().unwrap();
-        assert!((found.information - x.tr_mul(&(&inverse * &x))).amax() < 1e-12);
-        assert!((found.score - x.tr_mul(&(&inverse * &y))).amax() < 1e-12);
-        assert!((found.energy - y.dot(&(&inverse * &y))).abs() < 1e-12);
-        assert!((found.log_determinant - covariance.determinant().ln()).abs() < 1e-12);
     }
 }

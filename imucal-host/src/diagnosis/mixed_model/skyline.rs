@@ -34,6 +34,21 @@ impl Skyline {
         self.values[self.begins[row] + column - self.first[row]] += value;
     }
 
+    /// Number of its rows.
+    pub fn size(&self) -> usize {
+        self.first.len()
+    }
+
+    /// S A S, S diagonal.
+    pub fn scaled(&self, scales: &[f64]) -> Self {
+        let mut scaled = self.clone();
+        for (row, first) in self.first.iter().enumerate() {
+            let own = &mut scaled.values[self.begins[row]..self.begins[row + 1]];
+            own.iter_mut().zip(&scales[*first..]).for_each(|(value, scale)| *value *= scale * scales[row]);
+        }
+        scaled
+    }
+
     /// Factorises in place. `None` where the matrix is not positive definite.
     pub fn factorised(mut self) -> Option<Factor> {
         let mut log_determinant = 0.0;
@@ -44,11 +59,9 @@ impl Skyline {
                 let start = self.first[j].max(from);
                 let left = &row[start - from..j - from];
                 let other = &above[self.begins[j] + start - self.first[j]..self.begins[j + 1]];
-                let sum: f64 = left.iter().zip(other).map(|(a, b)| a * b).sum();
-                row[j - from] = (row[j - from] - sum) / other[j - start];
+                row[j - from] = (row[j - from] - dot(left, other)) / other[j - start];
             }
-            let square: f64 = row[..i - from].iter().map(|a| a * a).sum();
-            let pivot = row[i - from] - square;
+            let pivot = row[i - from] - dot(&row[..i - from], &row[..i - from]);
             if pivot.is_nan() || pivot <= 0.0 {
                 return None;
             }
@@ -74,6 +87,13 @@ pub struct Factor {
 }
 
 impl Factor {
+    /// Of the identity.
+    pub fn identity(size: usize) -> Self {
+        let mut skyline = Skyline::new((0..size).collect());
+        skyline.values.fill(1.0);
+        Self { skyline, log_determinant: 0.0 }
+    }
+
     /// Puts A⁻¹ x in the place of x.
     pub fn solve(&self, x: &mut [f64]) {
         self.forward(x, 1);
@@ -97,6 +117,19 @@ impl Factor {
             own.iter_mut().for_each(|own| *own /= diagonal);
         }
     }
+}
+
+/// Σ a b over the shorter of both, in partial sums that a processor adds side by side.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    const LANES: usize = 8;
+    let (a, b) = (&a[..a.len().min(b.len())], &b[..a.len().min(b.len())]);
+    let mut sums = [0.0; LANES];
+    let (whole, others) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f64 = whole.remainder().iter().zip(others.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in whole.zip(others) {
+        (0..LANES).for_each(|lane| sums[lane] += a[lane] * b[lane]);
+    }
+    sums.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]

@@ -21,8 +21,8 @@ use crate::{
         mixed_model::{
             design::{Design, DesignProducts, Normal},
             noise::{Noise, SensorNoise, Weighing},
+            precision::Precision,
             shared_offsets::SharedOffsets,
-            whitening::Whitening,
         },
         residual::{base_run::Reference, forward_model::ForwardModel},
     },
@@ -49,7 +49,7 @@ pub struct Linearisation<'s> {
     /// Effects of the fit beside the baseline.
     held: Vec<Dose>,
     normals: Memo<Noise, Normal>,
-    condensed: Memo<White, DesignProducts>,
+    products: Memo<White, DesignProducts>,
     offsets: Memo<White, Option<SharedOffsets>>,
     projected: Memo<Noise, Option<(Projected, Vec<usize>)>>,
 }
@@ -147,7 +147,7 @@ impl<'s> Linearisation<'s> {
             scan,
             held,
             normals: Memo::default(),
-            condensed: Memo::default(),
+            products: Memo::default(),
             offsets: Memo::default(),
             projected: Memo::default(),
         }
@@ -254,7 +254,7 @@ impl<'s> Linearisation<'s> {
         let fitted = self.fitted(&set);
         let (baseline, groups) = (self.baseline.len(), self.groups(&set, &fitted));
         let value = |normal: &Normal| log_evidence(normal, &noise, baseline, &groups);
-        let likeliest = offsets.likeliest(self.scene, &noise, &fitted, &value)?;
+        let likeliest = offsets.likeliest(self.scene, &self.design, &noise, &fitted, &value)?;
         let neg_log_prior: f64 = set.iter().map(|effect| self.neg_log_prior(effect)).sum();
         Some(Scored { log_evidence: likeliest - neg_log_prior, set, noise, sifted })
     }
@@ -272,14 +272,14 @@ impl<'s> Linearisation<'s> {
         let is_new = |column: &usize| !fitted.contains(column);
         let taken_out = self.candidates.taken_out.iter().flat_map(|term| self.design.of(term)).filter(is_new);
         let known: Vec<usize> = fitted.iter().copied().chain(taken_out).collect();
-        let condensed = self.condensed(start).picked(None, &known);
+        let products = self.products(start).picked(None, &known);
         let every: Vec<usize> = (0..known.len()).collect();
-        let fit = |kind: &SensorKind| self.weighing.fit(&condensed, *kind, &every, start, steps);
+        let fit = |kind: &SensorKind| self.weighing.fit(&products, *kind, &every, start, steps);
         let asked: Vec<SensorKind> =
             self.scene.kinds.iter().copied().filter(|kind| anew.contains(kind)).collect();
         let found: Vec<SensorNoise> = asked.par_iter().map(fit).collect();
         asked.into_iter().zip(found).for_each(|(kind, found)| noise.sensors[kind as usize] = found);
-        let normal = noise.normal(&condensed.picked(None, &every[..fitted.len()]), fitted.len());
+        let normal = noise.normal(&products.picked(None, &every[..fitted.len()]), fitted.len());
         let value = log_evidence(&normal, &noise, self.baseline.len(), &self.groups(set, &fitted))?
             - set.iter().map(|effect| self.neg_log_prior(effect)).sum::<f64>();
         Some(Screened { set: set.to_vec(), noise, value })
@@ -306,21 +306,24 @@ impl<'s> Linearisation<'s> {
     }
 
     /// Σ⁻¹ of each channel.
-    pub fn whitenings(&self, noise: &Noise) -> Vec<Whitening> {
-        self.weighing.whitenings(&self.design, noise)
+    pub fn precisions(&self, noise: &Noise) -> Vec<Precision> {
+        self.weighing.precisions(&self.design, noise)
     }
 
     /// Normal equations of all columns.
     pub fn normal(&self, noise: &Noise) -> Arc<Normal> {
-        self.normals.get(noise.clone(), || noise.normal(&self.condensed(noise), self.design.size))
+        self.normals.get(noise.clone(), || noise.normal(&self.products(noise), self.design.size))
     }
 
-    /// All columns, as white noise weighs them.
-    pub fn condensed(&self, noise: &Noise) -> Arc<DesignProducts> {
-        self.condensed.get(white(noise), || self.weighing.condensed(&self.design, noise))
+    /// Cross-products of all columns, by the white noise.
+    pub fn products(&self, noise: &Noise) -> Arc<DesignProducts> {
+        self.products.get(white(noise), || {
+            let every: Vec<usize> = (0..self.design.size).collect();
+            self.weighing.products(&self.design, noise, &every)
+        })
     }
 
-    /// All columns and the gimbals' offsets, as white noise weighs them.
+    /// The gimbals' offsets that all channels share, by the white noise.
     pub fn offsets(&self, noise: &Noise) -> Arc<Option<SharedOffsets>> {
         self.offsets.get(white(noise), || SharedOffsets::of(self.scene, &self.design, &self.weighing, noise))
     }

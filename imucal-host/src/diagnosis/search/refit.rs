@@ -95,9 +95,9 @@ pub fn refit(scene: &ForwardModel<'_>, doses: Vec<Dose>, noise: Option<&Noise>) 
             least.as_ref().map_or_else(|| white.clone(), |least| white.clone().at_most(least))
         });
         least = Some(noise.clone());
-        let whitenings = weighing.whitenings(&design, &noise);
+        let precisions = weighing.precisions(&design, &noise);
         let all: Vec<usize> = (0..columns.len()).collect();
-        let normal = design.normal(&whitenings, &all);
+        let normal = design.normal(&precisions, &all);
         let (precision, at) = prior(&fit.doses, &columns);
         let covariance = (&normal.information + DMatrix::from_diagonal(&precision)).cholesky()?.inverse();
         let step = &covariance * (&normal.score - precision.component_mul(&at));
@@ -106,7 +106,7 @@ pub fn refit(scene: &ForwardModel<'_>, doses: Vec<Dose>, noise: Option<&Noise>) 
         let largest = moved.fold(0.0f64, f64::max);
         let energy = |fit: &Fit| {
             let (precision, at) = prior(&fit.doses, &columns);
-            let data = Design::of_residual(scene, &fit.residual).normal(&whitenings, &[]).energy;
+            let data = Design::of_residual(scene, &fit.residual).normal(&precisions, &[]).energy;
             data + precision.component_mul(&at).dot(&at)
         };
         let before = energy(&fit);

@@ -158,8 +158,8 @@ fn refined(
         return Some(values);
     }
     let fitted = linear.fitted(rest);
-    let whitenings = linear.whitenings(noise);
-    let backdrop = Backdrop::new(scene, &linear.design, &fitted, &whitenings);
+    let precisions = linear.precisions(noise);
+    let backdrop = Backdrop::new(scene, &linear.design, &fitted, &precisions);
     let reference = Reference::new(scene, doses.to_vec(), &scene.fine)?;
     Some(nonlinear::refine(effect, &values, &reference, &backdrop).map_or(values, |(refined, _)| refined))
 }

@@ -42,7 +42,7 @@ pub fn amounts_of(explained: &Solution<'_>, asked: &[&'static Effect]) -> Option
         fitted.iter().map(|id| linear.design.columns[*id]).chain(shape_columns.iter().copied()).collect();
     let design = linear.design.extended(&fitted, columns.clone(), &means);
     let every: Vec<usize> = (0..design.size).collect();
-    let normal = design.normal(&linear.whitenings(&explained.best.noise), &every);
+    let normal = design.normal(&linear.precisions(&explained.best.noise), &every);
     let precision = |column: &Column| {
         let parameter = &column.effect.parameters[column.parameter];
         match parameter.role {

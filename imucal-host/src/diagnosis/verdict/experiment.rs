@@ -63,7 +63,7 @@ pub fn next(
     let linear = &explained.linear;
     let noise = &explained.best.noise;
     let every: Vec<usize> = (0..linear.design.columns.len()).collect();
-    let here = linear.design.normal(&linear.whitenings(noise), &every);
+    let here = linear.design.normal(&linear.precisions(noise), &every);
     let segments: Vec<(&Segment, f64, Normal)> =
         MENU.par_iter().filter_map(|segment| information(explained, axes, segment, noise)).collect();
     let mut experiments = Vec::new();
@@ -132,7 +132,7 @@ fn information<'m>(
     let design = Design::new(&scene, columns, &means, &Default::default());
     let weighing = Weighing::new(&scene, SensorKind::ALL.map(|kind| reference.output(kind)));
     let every: Vec<usize> = (0..design.size).collect();
-    let normal = design.normal(&weighing.whitenings(&design, noise), &every);
+    let normal = design.normal(&weighing.precisions(&design, noise), &every);
     Some((segment, replay.duration() - later, normal))
 }
 

@@ -123,7 +123,7 @@ impl Fault {
     fn errors(&self, explained: &Solution<'_>) -> Option<f64> {
         let Solution { linear, best, .. } = explained;
         let fitted = linear.fitted(&best.set);
-        let normal = linear.design.normal(&linear.whitenings(&best.noise), &fitted);
+        let normal = linear.design.normal(&linear.precisions(&best.noise), &fitted);
         let mut own = DMatrix::zeros(fitted.len(), fitted.len());
         for channel in linear.design.channels.iter().filter(|channel| channel.kind == self.kind) {
             let (from, to) = places(&channel.ids, &fitted);
@@ -132,7 +132,7 @@ impl Fault {
                 let weight = piece.rows.sqrt() / self.white[channel.axis];
                 from.iter()
                     .zip(&to)
-                    .for_each(|(from, to)| x[(row, *to)] = weight * channel.x[(piece.block, *from)]);
+                    .for_each(|(from, to)| x[(row, *to)] = weight * channel.x[*from][piece.block]);
             }
             own += x.tr_mul(&x);
         }

@@ -114,8 +114,8 @@ fn closed_in(
             // A row that holds no samples is a convention, and belongs to every fold.
             let empty = |block: usize| linear.scene.blocks[block].rows.is_empty();
             let inside = |block: usize| empty(block) || time(block) as usize % FOLDS == fold;
-            let whitenings = linear.weighing.whitenings_within(design, noise, &inside);
-            design.normal(&whitenings, &fitted)
+            let precisions = linear.weighing.precisions_within(design, noise, &inside);
+            design.normal(&precisions, &fitted)
         })
         .collect();
     let baseline = linear.baseline.len();
@@ -163,7 +163,7 @@ fn closed_in(
 /// Whitened squared size of what a set explains beyond the baseline, less what noise alone would give.
 pub fn size(linear: &Linearisation<'_>, set: &[&'static Effect], noise: &Noise) -> Option<f64> {
     let fitted = linear.fitted(set);
-    let normal = linear.design.normal(&linear.whitenings(noise), &fitted);
+    let normal = linear.design.normal(&linear.precisions(noise), &fitted);
     let every: Vec<usize> = (0..fitted.len()).collect();
     let (baseline, own) = every.split_at(linear.baseline.len());
     let projected = Projected::new(&normal, baseline, own)?;
@@ -213,8 +213,8 @@ fn held_out(folds: &[Normal], places: &[usize], baseline: usize) -> Option<Vec<F
 
 /// Root mean squares of each channel's block means, before and after, and what noise alone would leave.
 pub fn table(linear: &Linearisation<'_>, set: &[&'static Effect], noise: &Noise) -> Option<Vec<Gap>> {
-    let whitenings = linear.whitenings(noise);
-    let solve = |fitted: &[usize]| linear.design.normal(&whitenings, fitted).amounts();
+    let precisions = linear.precisions(noise);
+    let solve = |fitted: &[usize]| linear.design.normal(&precisions, fitted).amounts();
     let all = linear.fitted(set);
     let (before, after) = (solve(&linear.baseline)?, solve(&all)?);
     let gaps = linear.design.channels.iter().map(|channel| {
