@@ -65,7 +65,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Some(Err(damaged)) => return Ok(refuse(&damaged)),
         model => model.and_then(Result::ok),
     };
-    let options = Options { without: arguments.without.clone(), model };
+    let options = Options { without: arguments.without.clone(), model, settings: None };
     let progress = Progress::start();
     let diagnosis = diagnose(&recording, &options, &|stage| progress.stage(stage));
     drop(progress);

@@ -1,5 +1,6 @@
 //! Where the gap between simulator and recording lies, which unmodelled effect causes it, and how far it shrinks.
 
+pub mod error;
 pub mod finding;
 pub mod library;
 pub mod location;
@@ -8,35 +9,53 @@ pub mod reference;
 pub mod residual;
 pub mod screening;
 pub mod search;
+pub mod settings;
 pub mod verdict;
 
-pub use self::finding::{Diagnosis, Verdict};
+pub use self::{
+    error::DiagnosisError,
+    finding::{Diagnosis, Verdict},
+};
 use self::{
     library::candidates::{Candidates, Setting},
     residual::forward_model::ForwardModel,
     screening::preparation::Preparation,
     search::stepwise,
+    settings::{Settings, Source},
     verdict::answer::{answer, untestable},
 };
 use crate::{recording::Recording, store::StoredCalibration};
 
-/// What a diagnosis may be told beforehand.
+/// What is known before a diagnosis.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// Catalogue entries to be withheld from the candidates, and terms to be taken out of the baseline.
     pub without: Vec<String>,
     /// The simulator's present model of the unit; without it, the baseline is calibrated from the recording.
     pub model: Option<StoredCalibration>,
+    /// Settings; without them, the preset of the source of the movement.
+    pub settings: Option<Settings>,
 }
 
-/// Diagnoses a recording; `progress` hears of each stage.
+/// Diagnoses a recording; `progress` hears of each stage. Where no diagnosis can be made, a remark says why.
 pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str)) -> Diagnosis {
-    let preparation = match Preparation::new(recording, options.model.as_ref()) {
-        Ok(preparation) => preparation,
-        Err(why) => return untestable(recording, why),
-    };
-    let mut scene =
-        ForwardModel::new(recording, preparation.usable.clone(), &*preparation.movement, preparation.triads);
+    try_diagnose(recording, options, progress).unwrap_or_else(|why| untestable(recording, why.to_string()))
+}
+
+/// Likewise.
+///
+/// # Errors
+///
+/// The stage that failed, and the figure that shows why.
+pub fn try_diagnose(
+    recording: &Recording,
+    options: &Options,
+    progress: &dyn Fn(&str),
+) -> Result<Diagnosis, DiagnosisError> {
+    let settings = options.settings.clone().unwrap_or_else(|| Settings::preset(Source::of(recording)));
+    let preparation = Preparation::new(recording, options.model.as_ref(), &settings)?;
+    let (usable, movement) = (preparation.usable.clone(), &*preparation.movement);
+    let mut scene = ForwardModel::new(recording, usable, movement, preparation.triads, &settings);
     if let Some(held) = &preparation.held {
         scene = scene.through(held);
     }
@@ -45,16 +64,12 @@ pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str
         kinds: &scene.kinds,
         thermometer: recording.temperature.is_some(),
         calibrated: &preparation.model.calibrated,
-        gimbals: scene.swings.is_some(),
-        hand: preparation.held.is_some(),
+        provided: settings.source,
         field_known: recording.manifest.site.field_ned_ut.is_some(),
     };
     let candidates = Candidates::new(&setting, &options.without);
-    let explained = stepwise::search(&scene, &candidates, progress);
-    let answered = explained.and_then(|explained| answer(recording, &preparation, &explained, progress));
-    answered.unwrap_or_else(|| {
-        untestable(recording, "the baseline cannot be fitted to this recording".to_owned())
-    })
+    let explained = stepwise::search(&scene, &candidates, progress)?;
+    answer(recording, &preparation, &explained, progress)
 }
 
 #[cfg(test)]

@@ -19,6 +19,7 @@ use crate::{
             linearisation::Linearisation,
             refit::{Fit, refit},
         },
+        settings::Settings,
     },
     effect::find,
     recording::{Recording, SensorKind},
@@ -40,15 +41,15 @@ fn with_linear<T>(check: impl FnOnce(Linearisation<'_>) -> T) -> T {
 
 /// Likewise, and the fit.
 fn with_fit<T>(recording: &Recording, check: impl FnOnce(Linearisation<'_>, &Fit) -> T) -> T {
-    let preparation = Preparation::new(recording, None).unwrap();
-    let scene =
-        ForwardModel::new(recording, preparation.usable.clone(), &*preparation.movement, preparation.triads);
+    let settings = Settings::default();
+    let preparation = Preparation::new(recording, None, &settings).unwrap();
+    let (usable, movement) = (preparation.usable.clone(), &*preparation.movement);
+    let scene = ForwardModel::new(recording, usable, movement, preparation.triads, &settings);
     let setting = Setting {
         kinds: &scene.kinds,
         thermometer: true,
         calibrated: &[],
-        gimbals: true,
-        hand: false,
+        provided: settings.source,
         field_known: true,
     };
     let candidates = Candidates::new(&setting, &[]);
@@ -140,7 +141,7 @@ fn samples_beside_clipped_ones_are_left_out_whatever_their_own_noise() {
     let effect = find("acc.saturation").unwrap();
     simulation.doses.push(Dose { effect, values: vec![full_scale / 9.5 - 1.0] });
     let recording = simulation.record("clipped").unwrap();
-    let preparation = Preparation::new(&recording, None).unwrap();
+    let preparation = Preparation::new(&recording, None, &Settings::default()).unwrap();
     let (values, usable) =
         (&recording.acc.as_ref().unwrap().values, &preparation.usable[SensorKind::Acc as usize]);
     let clipped: Vec<f64> =
@@ -224,7 +225,7 @@ fn the_twin_of_an_effect_with_its_sign_broken_is_not_explained_by_it() {
             let own = linear.design.of(effect);
             let kept: Vec<usize> = linear.baseline.iter().chain(&own).copied().collect();
             let columns = kept.iter().map(|id| linear.design.columns[*id]).collect();
-            let design = linear.design.extended(&kept, columns, &[twin(&linear, &own)]);
+            let design = linear.design.extended(&kept, columns, &[twin(&linear, &own).into()]);
             let every: Vec<usize> = (0..design.size).collect();
             let normal = design.normal(&precisions, &every);
             let left = |fitted: usize| {

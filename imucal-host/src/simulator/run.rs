@@ -24,7 +24,7 @@ use crate::{
 /// Rates there is a recording of, Hz.
 const RATES: (f64, f64) = (10.0, 1000.0);
 /// Longest recording, s.
-const LONGEST: f64 = 7200.0;
+const LONGEST: f64 = 21_600.0;
 /// A step of the encoders, rad: twenty bits a turn.
 const ENCODER_STEP: f64 = std::f64::consts::TAU / 1_048_576.0;
 /// An arc second, rad.
@@ -43,7 +43,7 @@ pub struct Simulation {
     pub axes: [Axis; 3],
     /// Sampling rate, Hz, 10 to 1000.
     pub rate: f64,
-    /// Length, s, to two hours; `None` as long as the programme takes.
+    /// Length, s, to six hours; `None` as long as the programme takes.
     pub duration: Option<f64>,
     /// Everything random follows from it.
     pub seed: u64,

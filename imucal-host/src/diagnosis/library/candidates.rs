@@ -2,6 +2,7 @@
 
 use super::grid_posterior::GridPosterior;
 use crate::{
+    diagnosis::settings::Provided,
     effect::{Act, CATALOGUE, Effect, Free, NUISANCES, Needs, Part},
     recording::SensorKind,
 };
@@ -28,10 +29,8 @@ pub struct Setting<'a> {
     pub thermometer: bool,
     /// Sensors whose triad is given by a calibration made elsewhere.
     pub calibrated: &'a [SensorKind],
-    /// The movement is that of a rig's gimbals; else of a reference that is fixed to the sensor.
-    pub gimbals: bool,
-    /// The movement is what the sensors themselves tell from rest to rest.
-    pub hand: bool,
+    /// What the source of the movement provides.
+    pub provided: Provided,
     /// The site tells the field.
     pub field_known: bool,
 }
@@ -43,7 +42,7 @@ impl Setting<'_> {
         match effect.part {
             Part::TriadTerm => is_there(effect.sensors),
             Part::RigTerm(shown_by) => is_there(shown_by),
-            Part::ClockTerm => !self.gimbals,
+            Part::ClockTerm => self.provided.clock,
             Part::Candidate | Part::Nuisance(_) | Part::Fault(_) => false,
         }
     }
@@ -60,8 +59,8 @@ impl Setting<'_> {
     fn is_free(&self, nuisance: &Effect) -> bool {
         let Part::Nuisance(free) = nuisance.part else { return false };
         match free {
-            Free::NoGimbals => !self.gimbals,
-            Free::NoGimbalsTriadGiven => !self.gimbals && self.gives(nuisance),
+            Free::NoGimbals => !self.provided.gimbals,
+            Free::NoGimbalsTriadGiven => !self.provided.gimbals && self.gives(nuisance),
             // Without the vertical, the levelling tilts stand for the dip.
             Free::FieldUnknown => !self.field_known && self.kinds.contains(&SensorKind::Acc),
             Free::FieldUnknownTriadGiven => !self.field_known && self.gives(nuisance),
@@ -71,30 +70,26 @@ impl Setting<'_> {
     /// Why the recording cannot show an effect.
     fn cannot_show(&self, effect: &Effect) -> Option<&'static str> {
         let Needs { gimbals, thermometer, heading, other_calibration, exact_attitude } = effect.needs;
-        if self.hand {
-            match effect.act {
-                Act::Rig(_) => {
-                    return Some("there is no rig: gravity itself gives the attitude of each rest");
-                }
-                Act::Clock(_) => return Some("there is no clock but the sensors' own"),
-                _ if heading => {
-                    return Some(
-                        "the heading is not known, so that Earth's rotation is not known in the sensor's axes",
-                    );
-                }
-                _ => {}
+        let provided = &self.provided;
+        match effect.act {
+            Act::Rig(_) if !provided.table => {
+                return Some("there is no rig: gravity itself gives the attitude of each rest");
             }
+            Act::Clock(_) if !provided.table => return Some("there is no clock but the sensors' own"),
+            _ => {}
         }
-        if thermometer && !self.thermometer {
+        if heading && !provided.heading {
+            Some("the heading is not known, so that Earth's rotation is not known in the sensor's axes")
+        } else if thermometer && !self.thermometer {
             Some("no temperature was recorded")
         } else if other_calibration && !self.calibrated.contains(&SensorKind::Mag) {
             Some("it shows against a calibration made elsewhere (--model)")
-        } else if exact_attitude && !self.gimbals && !self.hand {
+        } else if exact_attitude && !provided.exact_attitude {
             Some(
                 "a reference attitude has noise and a filter of its own: nothing distinguishes a sensor's low-pass from \
                  them",
             )
-        } else if gimbals && !self.gimbals {
+        } else if gimbals && !provided.gimbals {
             Some("no gimbals turn the sensor")
         } else {
             None

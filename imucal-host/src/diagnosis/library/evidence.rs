@@ -17,14 +17,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::diagnosis::mixed_model::{
-    design::{LOOSE, Normal, loosened},
-    likelihood::reml_criterion,
-    noise::Noise,
+use crate::diagnosis::{
+    error::DiagnosisError,
+    mixed_model::{
+        design::{LOOSE, Normal, loosened},
+        likelihood::reml_criterion,
+        noise::Noise,
+    },
 };
 
-/// A signature of this whitened squared size is found in four of five recordings.
-pub const SEEN: f64 = 25.0;
 /// Sizes an effect may have, in usual ones.
 const SCALES: [f64; 8] = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
 /// Share of effects of several amplitudes of which one stands alone: a shock moves one axis, one of them is curved.
@@ -45,16 +46,17 @@ pub struct Projected {
 
 impl Projected {
     /// Projects the columns `baseline` out of the others, which keep their order. `None` where that is impossible.
-    pub fn new(normal: &Normal, baseline: &[usize], others: &[usize]) -> Option<Self> {
+    pub fn new(normal: &Normal, baseline: &[usize], others: &[usize]) -> Result<Self, DiagnosisError> {
         let pick = |rows: &[usize], columns: &[usize]| {
             DMatrix::from_fn(rows.len(), columns.len(), |i, j| normal.information[(rows[i], columns[j])])
         };
         let score = |rows: &[usize]| DVector::from_fn(rows.len(), |i, _| normal.score[rows[i]]);
         let across = pick(baseline, others);
-        let factor = loosened(pick(baseline, baseline))?;
+        let columns = baseline.len();
+        let factor = loosened(pick(baseline, baseline)).ok_or(DiagnosisError::Score { columns })?;
         let information = pick(others, others) - across.transpose() * factor.solve(&across);
         let before = DVector::from_fn(others.len(), |i, _| normal.information[(others[i], others[i])]);
-        Some(Self {
+        Ok(Self {
             score: score(others) - across.transpose() * factor.solve(&score(baseline)),
             information,
             before,
@@ -215,7 +217,12 @@ fn log_bayes_factor(score: f64, information: f64, usual: f64) -> f64 {
 
 /// ln of the probability of the data and of the noise that they are weighed by, but for a constant: columns of the
 /// baseline come first, then `groups` of columns, each an effect or what may stand for one.
-pub fn log_evidence(normal: &Normal, noise: &Noise, baseline: usize, groups: &[Vec<usize>]) -> Option<f64> {
+pub fn log_evidence(
+    normal: &Normal,
+    noise: &Noise,
+    baseline: usize,
+    groups: &[Vec<usize>],
+) -> Result<f64, DiagnosisError> {
     let first: Vec<usize> = (0..baseline).collect();
     let others: Vec<usize> = (baseline..normal.score.len()).collect();
     let projected = Projected::new(normal, &first, &others)?;
@@ -227,7 +234,7 @@ pub fn log_evidence(normal: &Normal, noise: &Noise, baseline: usize, groups: &[V
         score: normal.score.rows(0, baseline).into_owned(),
         ..normal.clone()
     };
-    Some(projected.log_bayes_factor(&parts) - 0.5 * reml_criterion(&alone) - noise.neg_log_prior())
+    Ok(projected.log_bayes_factor(&parts) - 0.5 * reml_criterion(&alone) - noise.neg_log_prior())
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::{candidates::Candidates, grid_posterior::GridPosterior, nonlinear, nonlinear::Backdrop};
 use crate::{
     diagnosis::{
+        error::DiagnosisError,
         mixed_model::{
             design::Design,
             noise::{Noise, Weighing},
@@ -40,8 +41,12 @@ pub struct NuisanceColumns<'a> {
 
 impl<'s> Grid<'s> {
     /// About a fit. `None` where the simulator fails.
-    pub fn new(scene: &'s ForwardModel<'s>, candidates: &'s Candidates, doses: Vec<Dose>) -> Option<Self> {
-        Some(Self { scene, candidates, coarse: Arc::new(Reference::new(scene, doses, &scene.coarse)?) })
+    pub fn new(
+        scene: &'s ForwardModel<'s>,
+        candidates: &'s Candidates,
+        doses: Vec<Dose>,
+    ) -> Result<Self, DiagnosisError> {
+        Ok(Self { scene, candidates, coarse: Arc::new(Reference::new(scene, doses, &scene.coarse)?) })
     }
 
     /// The shape of each candidate that is best under a noise; that of the doses for those they hold, as widely `spread`
@@ -52,21 +57,18 @@ impl<'s> Grid<'s> {
         noise: &Noise,
         spread: &(dyn Fn(usize) -> f64 + Sync),
         kept: &(dyn Fn(usize) -> Option<GridPosterior> + Sync),
-    ) -> Option<Vec<GridPosterior>> {
+    ) -> Result<Vec<GridPosterior>, DiagnosisError> {
         let (scene, design) = (self.scene, beside.design);
         let precisions = beside.weighing.precisions(design, noise);
-        // Where no rig guides the sensor, what a hand adds hides when an episode began and ended.
-        let quiet = match scene.swings {
-            Some(_) => None,
-            None => Some(beside.weighing.precisions(design, &noise.quieter().even())),
-        };
+        let in_quiet = || beside.weighing.precisions(design, &noise.quieter().even());
+        let quiet = scene.settings.library.places_in_quiet_noise.then(in_quiet);
         let backdrop = Backdrop::new(scene, design, beside.fitted, &precisions);
         let quiet = quiet.as_ref().map(|quiet| Backdrop::new(scene, design, beside.fitted, quiet));
         let best = |effect: &'static Effect| match quiet.as_ref().filter(|_| nonlinear::is_episode(effect)) {
             Some(quiet) => {
                 let best = nonlinear::best(effect, &self.coarse, quiet)?;
                 let (values, _) = nonlinear::refine(effect, &best.values, &self.coarse, quiet)?;
-                Some(GridPosterior { values, ..best })
+                Ok(GridPosterior { values, ..best })
             }
             None => nonlinear::best(effect, &self.coarse, &backdrop),
         };
@@ -74,11 +76,20 @@ impl<'s> Grid<'s> {
             let held = beside.doses.iter().find(|dose| dose.effect == *effect);
             let held = held.map(|dose| GridPosterior { values: dose.values.clone(), spread: spread(at) });
             match held.or_else(|| kept(at)) {
-                Some(shape) => Some(shape),
+                Some(shape) => Ok(shape),
                 None if effect.is_shaped() => best(effect),
-                None => Some(GridPosterior::alone(effect.neutral(scene.duration()))),
+                None => Ok(GridPosterior::alone(effect.neutral(scene.duration()))),
             }
         };
-        self.candidates.effects.par_iter().enumerate().map(shape).collect()
+        // Of an episode the signatures of all instants are held at once: one after the other.
+        let effects = &self.candidates.effects;
+        let alone = |at: &usize| effects[*at].is_shaped() && nonlinear::is_episode(effects[*at]);
+        let (episodes, others): (Vec<usize>, Vec<usize>) = (0..effects.len()).partition(alone);
+        let placed = |at: &usize| Ok((*at, shape((*at, &effects[*at]))?));
+        let mut shapes: Vec<(usize, GridPosterior)> =
+            others.par_iter().map(placed).collect::<Result<_, DiagnosisError>>()?;
+        shapes.extend(episodes.iter().map(placed).collect::<Result<Vec<_>, DiagnosisError>>()?);
+        shapes.sort_by_key(|(at, _)| *at);
+        Ok(shapes.into_iter().map(|(_, shape)| shape).collect())
     }
 }

@@ -2,8 +2,6 @@
 //!
 //! A menu of shapes for each, the best by evidence, and from there a search by halved steps.
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
 use super::{
@@ -12,14 +10,17 @@ use super::{
 };
 use crate::{
     diagnosis::{
-        mixed_model::{augmented_normal::AugmentedNormal, design::Design, precision::Precision},
-        residual::{base_run::Reference, block::Means, forward_model::ForwardModel},
+        error::DiagnosisError,
+        mixed_model::{
+            augmented_normal::AugmentedNormal,
+            design::{Design, Signature},
+            precision::Precision,
+        },
+        residual::{base_run::Reference, forward_model::ForwardModel},
     },
     effect::{Effect, Role},
 };
 
-/// Distance of instants in a menu, s, and as a share of the recording where that is more.
-const GRID: (f64, f64) = (5.0, 1.0 / 60.0);
 /// About the best instants, a menu this many times as dense.
 const CLOSER: i32 = 8;
 /// Factors of a usual duration that are scanned beside an instant; about the best of those, further ones, two of which
@@ -58,10 +59,10 @@ pub fn best(
     effect: &'static Effect,
     reference: &Reference<'_>,
     backdrop: &Backdrop<'_>,
-) -> Option<GridPosterior> {
-    let duration = backdrop.scene.duration();
+) -> Result<GridPosterior, DiagnosisError> {
+    let (scene, none) = (backdrop.scene, || DiagnosisError::Grid { effect: &effect.id });
     if is_episode(effect) {
-        return episode(effect, reference, backdrop, duration);
+        return episode(effect, reference, backdrop);
     }
     let judged = |menu: Vec<Vec<f64>>| {
         let mut values = Vec::with_capacity(menu.len());
@@ -69,12 +70,12 @@ pub fn best(
             values.extend(judge(effect, shapes, reference, backdrop)?);
         }
         let priors = menu.iter().map(|shape| prior(effect, shape)).collect();
-        Some(Scanned { shapes: menu, values, priors })
+        Ok::<_, DiagnosisError>(Scanned { shapes: menu, values, priors })
     };
-    let whole = judged(menu(effect, duration))?;
-    let (near, dense) = closer(effect, &whole.shapes[whole.best()?], duration);
-    let (values, spread) = whole.refined(&judged(near)?, dense)?;
-    Some(GridPosterior { values, spread })
+    let whole = judged(menu(effect, scene))?;
+    let (near, dense) = closer(effect, &whole.shapes[whole.best().ok_or_else(none)?], scene);
+    let (values, spread) = whole.refined(&judged(near)?, dense).ok_or_else(none)?;
+    Ok(GridPosterior { values, spread })
 }
 
 /// ln of a shape's prior, but for a constant: durations are lognormal, all else is as likely here as there.
@@ -88,7 +89,7 @@ fn prior(effect: &Effect, shape: &[f64]) -> f64 {
 }
 
 /// Shapes about one of a menu, itself among them, and how many of them lie within a cell of the menu.
-fn closer(effect: &Effect, about: &[f64], duration: f64) -> (Vec<Vec<f64>>, f64) {
+fn closer(effect: &Effect, about: &[f64], scene: &ForwardModel<'_>) -> (Vec<Vec<f64>>, f64) {
     let mut menu = vec![about.to_vec()];
     let mut dense = 1.0;
     if !is_timed(effect) {
@@ -96,7 +97,7 @@ fn closer(effect: &Effect, about: &[f64], duration: f64) -> (Vec<Vec<f64>>, f64)
     }
     for (at, parameter) in effect.parameters.iter().enumerate() {
         let (values, more): (Vec<f64>, f64) = match parameter.role {
-            Role::Instant { .. } => (instants(about[at], duration), f64::from(CLOSER)),
+            Role::Instant { .. } => (instants(about[at], scene), f64::from(CLOSER)),
             Role::Shape { .. } if parameter.range.0 >= 0.0 => {
                 (DURATIONS.iter().map(|factor| about[at] * factor).collect(), DENSER)
             }
@@ -109,15 +110,16 @@ fn closer(effect: &Effect, about: &[f64], duration: f64) -> (Vec<Vec<f64>>, f64)
 }
 
 /// Instants about one of a menu, s.
-fn instants(about: f64, duration: f64) -> Vec<f64> {
-    let step = grid(duration) / f64::from(CLOSER);
+fn instants(about: f64, scene: &ForwardModel<'_>) -> Vec<f64> {
+    let step = grid(scene) / f64::from(CLOSER);
     let closer = (1 - CLOSER..CLOSER).map(|k| about + step * f64::from(k));
-    closer.filter(|time| (0.0..duration).contains(time)).collect()
+    closer.filter(|time| (0.0..scene.duration()).contains(time)).collect()
 }
 
 /// Distance of instants in a menu, s.
-fn grid(duration: f64) -> f64 {
-    GRID.0.max(GRID.1 * duration)
+fn grid(scene: &ForwardModel<'_>) -> f64 {
+    let (least, share) = scene.settings.library.grid;
+    least.max(share * scene.duration())
 }
 
 fn is_timed(effect: &Effect) -> bool {
@@ -129,9 +131,9 @@ pub fn is_episode(effect: &Effect) -> bool {
     effect.parameters.iter().filter(|p| matches!(p.role, Role::Instant { .. })).count() == 2
 }
 
-/// Number of shapes that an effect's menu holds in a recording of `duration` s: a choice among them that costs evidence.
-pub fn choices(effect: &Effect, duration: f64) -> usize {
-    let single = menu(effect, duration).len();
+/// Number of shapes that an effect's grid holds: a choice among them that costs evidence.
+pub fn choices(effect: &Effect, scene: &ForwardModel<'_>) -> usize {
+    let single = menu(effect, scene).len();
     // Of two instants the second comes after the first.
     if is_episode(effect) { single / 2 } else { single }
 }
@@ -142,9 +144,9 @@ pub fn judge(
     shapes: &[Vec<f64>],
     reference: &Reference<'_>,
     backdrop: &Backdrop<'_>,
-) -> Option<Vec<f64>> {
+) -> Result<Vec<f64>, DiagnosisError> {
     let (projected, each) = project(effect, shapes, reference, backdrop)?;
-    Some((0..shapes.len()).map(|k| projected.log_bayes_factor(&[&places(k, each)])).collect())
+    Ok((0..shapes.len()).map(|k| projected.log_bayes_factor(&[&places(k, each)])).collect())
 }
 
 fn places(shape: usize, each: usize) -> Vec<usize> {
@@ -156,22 +158,23 @@ fn project(
     shapes: &[Vec<f64>],
     reference: &Reference<'_>,
     backdrop: &Backdrop<'_>,
-) -> Option<(Projected, usize)> {
+) -> Result<(Projected, usize), DiagnosisError> {
     let own: Vec<usize> = effect.amplitudes().collect();
     let asked: Vec<(&Vec<f64>, usize)> =
         shapes.iter().flat_map(|shape| own.iter().map(move |parameter| (shape, *parameter))).collect();
-    let means: Option<Vec<Arc<Means>>> = asked
-        .par_iter()
-        .map(|(shape, parameter)| reference.known_signature(effect, *parameter, shape))
-        .collect();
-    let normal = backdrop.augmented.with(&means?);
+    let of = |(shape, parameter): &(&Vec<f64>, usize)| {
+        Ok(Signature::from(reference.signature(effect, *parameter, shape)?))
+    };
+    let signatures: Vec<Signature> = asked.par_iter().map(of).collect::<Result<_, DiagnosisError>>()?;
+    let normal = backdrop.augmented.with(&signatures);
     let first: Vec<usize> = (0..backdrop.fitted).collect();
     let others: Vec<usize> = (backdrop.fitted..normal.score.len()).collect();
-    Some((Projected::new(&normal, &first, &others)?, own.len()))
+    Ok((Projected::new(&normal, &first, &others)?, own.len()))
 }
 
 /// Shapes to try: positive ones by factors, others along their axes, instants along the recording.
-fn menu(effect: &Effect, duration: f64) -> Vec<Vec<f64>> {
+fn menu(effect: &Effect, scene: &ForwardModel<'_>) -> Vec<Vec<f64>> {
+    let duration = scene.duration();
     let mut menu = vec![effect.neutral(duration)];
     let either: Vec<usize> = (0..effect.parameters.len())
         .filter(|at| {
@@ -198,7 +201,7 @@ fn menu(effect: &Effect, duration: f64) -> Vec<Vec<f64>> {
                 vary(&menu, at, &values)
             }
             Role::Instant { .. } => {
-                let step = grid(duration);
+                let step = grid(scene);
                 let instants: Vec<f64> = (1..(duration / step) as usize).map(|k| step * k as f64).collect();
                 vary(&menu, at, &instants)
             }
@@ -226,18 +229,19 @@ fn episode(
     effect: &'static Effect,
     reference: &Reference<'_>,
     backdrop: &Backdrop<'_>,
-    duration: f64,
-) -> Option<GridPosterior> {
-    let step = grid(duration);
+) -> Result<GridPosterior, DiagnosisError> {
+    let (scene, duration) = (backdrop.scene, backdrop.scene.duration());
+    let none = || DiagnosisError::Grid { effect: &effect.id };
+    let step = grid(scene);
     let all: Vec<f64> = (1..(duration / step) as usize).map(|k| step * k as f64).collect();
     let whole = pairs(effect, reference, backdrop, &all, &all)?;
-    let (start, end) = whole.shapes[whole.best()?];
+    let (start, end) = whole.shapes[whole.best().ok_or_else(none)?];
     let lasts = end.is_finite();
-    let ends = if lasts { instants(end, duration) } else { Vec::new() };
-    let near = pairs(effect, reference, backdrop, &instants(start, duration), &ends)?;
+    let ends = if lasts { instants(end, scene) } else { Vec::new() };
+    let near = pairs(effect, reference, backdrop, &instants(start, scene), &ends)?;
     let dense = f64::from(CLOSER).powi(if lasts { 2 } else { 1 });
-    let ((start, end), spread) = whole.refined(&near.lasting(lasts), dense)?;
-    Some(GridPosterior { values: placed(effect, duration, start, end), spread })
+    let ((start, end), spread) = whole.refined(&near.lasting(lasts), dense).ok_or_else(none)?;
+    Ok(GridPosterior { values: placed(effect, duration, start, end), spread })
 }
 
 impl Scanned<(f64, f64)> {
@@ -266,7 +270,7 @@ fn pairs(
     backdrop: &Backdrop<'_>,
     starts: &[f64],
     ends: &[f64],
-) -> Option<Scanned<(f64, f64)>> {
+) -> Result<Scanned<(f64, f64)>, DiagnosisError> {
     let mut times: Vec<f64> = starts.iter().chain(ends).copied().collect();
     times.sort_by(f64::total_cmp);
     times.dedup();
@@ -284,7 +288,7 @@ fn pairs(
             scanned.shapes.push((*start, j.map_or(f64::INFINITY, |j| times[j])));
         }
     }
-    Some(scanned)
+    Ok(scanned)
 }
 
 /// Improves a shape by steps that are halved, and tells how far each parameter may move before the evidence falls by a
@@ -294,14 +298,13 @@ pub fn refine(
     start: &[f64],
     reference: &Reference<'_>,
     backdrop: &Backdrop<'_>,
-) -> Option<(Vec<f64>, Vec<f64>)> {
-    let duration = backdrop.scene.duration();
+) -> Result<(Vec<f64>, Vec<f64>), DiagnosisError> {
     let steps: Vec<f64> = effect
         .parameters
         .iter()
         .zip(start)
         .map(|(parameter, value)| match parameter.role {
-            Role::Instant { .. } if value.is_finite() => 0.5 * grid(duration),
+            Role::Instant { .. } if value.is_finite() => 0.5 * grid(backdrop.scene),
             Role::Shape { usual } => 0.5 * if parameter.range.0 < 0.0 { usual.abs() } else { value.abs() },
             _ => 0.0,
         })
@@ -333,5 +336,5 @@ pub fn refine(
             }
         }
     }
-    Some((best, errors))
+    Ok((best, errors))
 }

@@ -7,7 +7,7 @@
 //! Against the median of its neighbours, since noise that is taken for drift is not alike at all frequencies. Not looked
 //! for: periods shorter than a few blocks, and those so long that half-waves of the recording follow them.
 
-use std::f64::consts::TAU;
+use std::{f64::consts::TAU, ops::Range};
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -19,14 +19,12 @@ use crate::{
     recording::{SensorKind, median},
 };
 
-/// Shortest period, s.
-const SHORTEST: f64 = 4.0;
 /// Lowest frequency, half-waves in the recording.
 const LOWEST: usize = 7;
+/// Frequencies of a run.
+const RUN: usize = 64;
 /// Neighbours to each side.
 const ABOUT: usize = 12;
-/// A peak this many times as high as its neighbours is looked at.
-const PEAK: f64 = 12.0;
 
 /// The beat of a sensor that stands out most, if any does, and among how many it was looked for.
 pub fn beat(
@@ -38,24 +36,19 @@ pub fn beat(
     let weighed = weighed_residual(linear, set, precisions, kind)?;
     let times: Vec<f64> = linear.scene.blocks.iter().map(|block| block.time).collect();
     let duration = linear.scene.duration();
-    let last = (2.0 * duration / SHORTEST) as usize;
-    let power = |half_waves: usize| -> f64 {
-        let turn = 0.5 * TAU * half_waves as f64 / duration;
-        let waves: Vec<(f64, f64)> = times.iter().map(|time| libm::sincos(turn * time)).collect();
-        let of = |w: &DVector<f64>| {
-            let along = |(c, s), (w, (sin, cos)): (&f64, &(f64, f64))| (c + w * cos, s + w * sin);
-            let sum = w.iter().zip(&waves).fold((0.0, 0.0), along);
-            sum.0 * sum.0 + sum.1 * sum.1
-        };
-        weighed.iter().map(of).sum()
-    };
-    let powers: Vec<f64> = (LOWEST..last).into_par_iter().map(power).collect();
+    let last = (2.0 * duration / linear.scene.settings.location.shortest_period) as usize;
+    let powers: Vec<f64> = (LOWEST..last)
+        .step_by(RUN)
+        .collect::<Vec<_>>()
+        .par_iter()
+        .flat_map(|from| powers(&weighed, &times, 0.5 * TAU / duration, *from..(*from + RUN).min(last)))
+        .collect();
     let height = |at: usize| {
         let about = at.saturating_sub(ABOUT)..(at + ABOUT + 1).min(powers.len());
         powers[at] / median(powers[about].to_vec()).unwrap_or(f64::INFINITY).max(f64::MIN_POSITIVE)
     };
     let (most, highest) = (0..powers.len()).map(|at| (at, height(at))).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    if highest < PEAK {
+    if highest < linear.scene.settings.location.peak {
         return None;
     }
     let period = 2.0 * duration / (LOWEST + most) as f64;
@@ -65,6 +58,27 @@ pub fn beat(
     };
     let functions = vec![wave(libm::cos), wave(libm::sin)];
     Some((Covariate { name: "frequency".into(), functions }, powers.len()))
+}
+
+/// P at successive multiples of a frequency, `half_wave` in rad/s. Each wave is the one before turned by a half-wave's
+/// angle, which is cheaper than a sine and exact for a run.
+fn powers(weighed: &[DVector<f64>], times: &[f64], half_wave: f64, multiples: Range<usize>) -> Vec<f64> {
+    let turned = |by: f64| times.iter().map(|time| libm::sincos(by * time)).collect();
+    let (mut waves, steps): (Vec<(f64, f64)>, Vec<(f64, f64)>) =
+        (turned(half_wave * multiples.start as f64), turned(half_wave));
+    let next = |_: usize| {
+        let of = |w: &DVector<f64>| {
+            let along = |(c, s), (w, (sin, cos)): (&f64, &(f64, f64))| (c + w * cos, s + w * sin);
+            let sum = w.iter().zip(&waves).fold((0.0, 0.0), along);
+            sum.0 * sum.0 + sum.1 * sum.1
+        };
+        let power = weighed.iter().map(of).sum();
+        for ((sin, cos), (by_sin, by_cos)) in waves.iter_mut().zip(&steps) {
+            (*sin, *cos) = (*sin * by_cos + *cos * by_sin, *cos * by_cos - *sin * by_sin);
+        }
+        power
+    };
+    multiples.map(next).collect()
 }
 
 /// Σ⁻¹ r of each axis of a sensor, r what baseline and set leave.
@@ -82,4 +96,24 @@ fn weighed_residual(
         DVector::from_vec(precision.apply(residual.as_slice()))
     });
     Some(left.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn powers_are_those_of_their_definition() {
+        let times: Vec<f64> = (0..50).map(|k| 0.1 * f64::from(k) + 0.03 * f64::from(k % 3)).collect();
+        let weighed = [3.0, 5.0].map(|f| DVector::from_fn(50, |k, _| (f * k as f64).sin()));
+        let found = powers(&weighed, &times, 0.6, 7..7 + RUN);
+        for (at, found) in found.into_iter().enumerate() {
+            let sum = |w: &DVector<f64>, of: fn(f64) -> f64| -> f64 {
+                times.iter().zip(w.iter()).map(|(time, w)| w * of(0.6 * (7 + at) as f64 * time)).sum()
+            };
+            let expected: f64 =
+                weighed.iter().map(|w| sum(w, f64::cos).powi(2) + sum(w, f64::sin).powi(2)).sum();
+            assert!((found - expected).abs() < 1e-9 * expected.max(1.0), "{at}: {found} {expected}");
+        }
+    }
 }

@@ -7,10 +7,11 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::{covariate::Covariate, covariates::TIME, periodogram};
 use crate::{
     diagnosis::{
+        error::DiagnosisError,
         library::evidence::{Projected, log_evidence},
         mixed_model::{
             augmented_normal::AugmentedNormal,
-            design::Design,
+            design::{Design, Signature},
             noise::{NEAR, Noise},
         },
         residual::{block::Means, forward_model::ForwardModel},
@@ -20,14 +21,6 @@ use crate::{
     recording::SensorKind,
 };
 
-/// The χ² of a test is divided by this: white noise is known to a few per cent.
-const CAUTION: f64 = 1.1;
-/// A driver that would be followed by chance less often than this in a quieter noise is tested again.
-const SUSPECT: f64 = 1e-9;
-/// What half-waves of the time must raise the evidence by beyond others: a drift is no sum of two processes.
-const DRIFTING: f64 = 12.0;
-/// Drivers tested again, of those as slow as drift and of the others.
-const SUSPECTS: (usize, usize) = (2, 4);
 /// Directions that keep less than this share of their information are others by another name, and do not count.
 pub const RETAINED: f64 = 1e-4;
 
@@ -52,7 +45,7 @@ pub fn following(
     set: &[&'static Effect],
     noise: &Noise,
     drivers: &[Covariate],
-) -> Option<Vec<Following>> {
+) -> Result<Vec<Following>, DiagnosisError> {
     let fitted = linear.fitted(set);
     let precisions = linear.precisions(noise);
     let augmented = AugmentedNormal::new(&linear.design, &precisions, &fitted);
@@ -62,14 +55,14 @@ pub fn following(
         .filter(|(kind, driver)| !driver.columns(*kind).is_empty())
         .collect();
     let follow = |(kind, driver): &(SensorKind, &Covariate)| {
-        let normal = augmented.with(&means(*kind, driver, noise));
+        let normal = augmented.with(&signatures(*kind, driver, noise));
         let every: Vec<usize> = (0..normal.score.len()).collect();
         let (first, others) = every.split_at(fitted.len());
         follow(linear.scene, *kind, driver, &Projected::new(&normal, first, others)?)
     };
-    let mut found: Vec<Following> = pairs.par_iter().map(follow).collect::<Option<_>>()?;
+    let mut found: Vec<Following> = pairs.par_iter().map(follow).collect::<Result<_, _>>()?;
     sort(&mut found);
-    Some(found)
+    Ok(found)
 }
 
 /// As [`following`], but what would show in a quieter noise is judged again by its evidence, with a noise estimated
@@ -80,18 +73,20 @@ pub fn score_tests_refitted(
     set: &[&'static Effect],
     noise: &Noise,
     drivers: &[Covariate],
-) -> Option<Vec<Following>> {
+) -> Result<Vec<Following>, DiagnosisError> {
+    let by = &linear.scene.settings.location;
     let mut found = following(linear, set, noise, drivers)?;
     let suspects = following(linear, set, &noise.quieter(), drivers)?;
     let suspects = |slow: bool, most: usize| {
-        suspects.iter().filter(move |f| f.p_value < SUSPECT && f.is_slow() == slow).take(most)
+        suspects.iter().filter(move |f| f.p_value < by.suspect && f.is_slow() == slow).take(most)
     };
     let again = |suspect: &Following| {
         let driver = drivers.iter().find(|driver| driver.name == suspect.driver)?;
-        judged(linear, set, noise, suspect.kind, driver, 1)
+        Some(judged(linear, set, noise, suspect.kind, driver, 1))
     };
-    let tested: Vec<&Following> = suspects(true, SUSPECTS.0).chain(suspects(false, SUSPECTS.1)).collect();
-    let again: Vec<Following> = tested.into_par_iter().map(again).collect::<Option<_>>()?;
+    let tested: Vec<&Following> =
+        suspects(true, by.slow_suspects).chain(suspects(false, by.other_suspects)).collect();
+    let again: Vec<Following> = tested.into_par_iter().filter_map(again).collect::<Result<_, _>>()?;
     for again in again {
         if let Some(own) = found.iter_mut().find(|f| f.kind == again.kind && f.driver == again.driver)
             && again.p_value < own.p_value
@@ -106,7 +101,7 @@ pub fn score_tests_refitted(
         }
     }
     sort(&mut found);
-    Some(found)
+    Ok(found)
 }
 
 /// A driver, chosen among so many, beside a set, by the evidence that it adds with a noise of its own.
@@ -117,7 +112,7 @@ fn judged(
     kind: SensorKind,
     driver: &Covariate,
     choices: usize,
-) -> Option<Following> {
+) -> Result<Following, DiagnosisError> {
     let (mut design, fitted) = with_driver(linear, set, kind, driver, noise);
     let every: Vec<usize> = (0..design.size).collect();
     let mut groups = linear.groups(set, &linear.fitted(set));
@@ -132,10 +127,10 @@ fn judged(
     let normal = anew.normal(&products, design.size);
     groups.push(every[fitted..].to_vec());
     let gain = log_evidence(&normal, &anew, linear.baseline.len(), &groups)? - before - (choices as f64).ln();
-    let gain = if driver.name == TIME { gain - DRIFTING } else { gain };
+    let gain = if driver.name == TIME { gain - linear.scene.settings.location.time_gain } else { gain };
     let projected = Projected::new(&normal, &every[..fitted], &every[fitted..])?;
     let following = follow(linear.scene, kind, driver, &projected)?;
-    Some(Following { p_value: libm::exp(-gain.max(0.0)), ..following })
+    Ok(Following { p_value: libm::exp(-gain.max(0.0)), ..following })
 }
 
 fn sort(found: &mut [Following]) {
@@ -159,22 +154,22 @@ fn with_driver(
 ) -> (Design, usize) {
     let fitted = linear.fitted(set);
     let columns = fitted.iter().map(|id| linear.design.columns[*id]).collect();
-    (linear.design.extended(&fitted, columns, &means(kind, driver, noise)), fitted.len())
+    (linear.design.extended(&fitted, columns, &signatures(kind, driver, noise)), fitted.len())
 }
 
 /// Signatures of a driver on a sensor, of the size of white noise in a sample.
-fn means(kind: SensorKind, driver: &Covariate, noise: &Noise) -> Vec<Means> {
+fn signatures(kind: SensorKind, driver: &Covariate, noise: &Noise) -> Vec<Signature> {
     let usual = noise.sensors[kind as usize].white.iter().sum::<f64>() / 3.0;
     let columns = driver.columns(kind).into_iter();
     columns.map(|(function, axis)| on(kind, axis, &driver.functions[function].values, usual)).collect()
 }
 
 /// A signature on one axis of one sensor.
-fn on(kind: SensorKind, axis: usize, values: &[f64], usual: f64) -> Means {
+fn on(kind: SensorKind, axis: usize, values: &[f64], usual: f64) -> Signature {
     let mut means: Means = Default::default();
     let along = |value: &f64| Vector3::from_fn(|k, _| if k == axis { usual * value } else { 0.0 });
     means[kind as usize] = Some(values.iter().map(along).collect());
-    means
+    means.into()
 }
 
 fn follow(
@@ -182,18 +177,19 @@ fn follow(
     kind: SensorKind,
     driver: &Covariate,
     projected: &Projected,
-) -> Option<Following> {
+) -> Result<Following, DiagnosisError> {
     let places: Vec<usize> = (0..projected.score.len()).collect();
     let (statistic, dimensions) = score_test(projected, &places);
     let p_value = match ChiSquared::new(dimensions.max(1) as f64) {
-        Ok(distribution) if dimensions > 0 => distribution.sf(statistic / CAUTION),
+        Ok(distribution) if dimensions > 0 => distribution.sf(statistic / scene.settings.location.caution),
         _ => 1.0,
     };
     let single =
         |place: &usize| projected.score[*place].powi(2) / projected.information[(*place, *place)].max(1e-12);
-    let most = places.iter().max_by(|a, b| single(a).total_cmp(&single(b)))?;
-    let (function, axis) = *driver.columns(kind).get(*most)?;
-    Some(Following {
+    let most = places.iter().max_by(|a, b| single(a).total_cmp(&single(b)));
+    let column = most.and_then(|most| driver.columns(kind).get(*most).copied());
+    let (function, axis) = column.ok_or(DiagnosisError::ScoreTest { covariate: driver.name.clone() })?;
+    Ok(Following {
         kind,
         driver: driver.name.clone(),
         detail: match scene.axis(kind, axis) {

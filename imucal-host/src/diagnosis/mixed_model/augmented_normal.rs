@@ -1,7 +1,7 @@
 //! Normal equations of what is fitted in any case, augmented by columns that are tried with it.
 //!
 //! ```text
-//! XᵀΣ⁻¹X  XᵀΣ⁻¹F      XᵀΣ⁻¹F = (D⁻¹X)ᵀ F − Y_Xᵀ Y_F
+//! XᵀΣ⁻¹X  XᵀΣ⁻¹F      XᵀΣ⁻¹F = Xᵀ D⁻¹ F − Y_Xᵀ Y_F
 //!    ·    FᵀΣ⁻¹F
 //! ```
 //!
@@ -11,18 +11,18 @@
 //! | F | further columns |
 //! | D, Y | white noise and the eliminated random effects: [`super::precision`] |
 //!
-//! D⁻¹X and Y_X are the same for all that is tried.
+//! XᵀΣ⁻¹X and Y_X are the same for all that is tried.
 
-use std::borrow::Borrow;
+use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::{
-    design::{Channel, Design, Normal, places, reaching},
+    design::{Channel, Design, Normal, Signature, places, reaching},
     precision::Precision,
+    random_effects::Columns,
 };
-use crate::diagnosis::residual::block::Means;
 
 /// What is fitted in any case, and the residual.
 pub struct AugmentedNormal<'a> {
@@ -34,9 +34,9 @@ pub struct AugmentedNormal<'a> {
 struct Fitted<'a> {
     channel: &'a Channel,
     precision: &'a Precision,
-    /// (D⁻¹X)ᵀ.
-    weighted: DMatrix<f64>,
-    /// Y_Xᵀ.
+    /// X.
+    columns: Columns<'a>,
+    /// Y_Xᵀ: a row a column.
     eliminated: DMatrix<f64>,
     normal: Normal,
     ids: Vec<usize>,
@@ -48,19 +48,18 @@ impl<'a> AugmentedNormal<'a> {
         let fitted = |(channel, precision): (&'a Channel, &'a Precision)| {
             let (from, ids) = places(&channel.ids, wanted);
             let own: Vec<usize> = from.iter().map(|at| channel.ids[*at]).collect();
-            let (x, effects) = (channel.gathered(&own), precision.effects());
-            let weighted = effects.weighted(0, &x);
-            let products = effects.cross_products(&[x]);
+            let columns = channel.columns(&own);
+            let products = precision.effects().cross_products(std::slice::from_ref(&columns));
             let eliminated = precision.eliminated(&products);
             let normal = Normal::within(&precision.less(&products, &eliminated), precision.log_determinant);
-            Fitted { channel, precision, weighted, eliminated, normal, ids }
+            Fitted { channel, precision, columns, eliminated, normal, ids }
         };
         let channels = design.channels.par_iter().zip(precisions).map(fitted).collect();
         Self { channels, size: wanted.len() }
     }
 
     /// Normal equations of the columns and, behind them, of further ones.
-    pub fn with<M: Borrow<Means> + Sync>(&self, further: &[M]) -> Normal {
+    pub fn with(&self, further: &[Signature]) -> Normal {
         let parts: Vec<Option<(Normal, Vec<usize>)>> =
             self.channels.par_iter().map(|fitted| fitted.with(self.size, further)).collect();
         let mut sum = Normal::zeros(self.size + further.len());
@@ -76,27 +75,25 @@ impl<'a> AugmentedNormal<'a> {
 
 impl Fitted<'_> {
     /// Augmented by what reaches the channel, and the places of all columns; `None` where nothing does.
-    fn with<M: Borrow<Means>>(&self, first: usize, further: &[M]) -> Option<(Normal, Vec<usize>)> {
-        let more: Vec<(usize, Vec<f64>)> =
+    fn with(&self, first: usize, further: &[Signature]) -> Option<(Normal, Vec<usize>)> {
+        let more: Vec<(usize, Arc<Vec<f64>>)> =
             reaching(self.channel.kind, self.channel.axis, first, further).collect();
         if more.is_empty() {
             return None;
         }
         let (n, m) = (self.ids.len(), more.len());
-        let f =
-            DMatrix::from_vec(self.channel.y.len(), m, more.iter().flat_map(|(_, f)| f).copied().collect());
-        let mut across = &self.weighted * &f;
-        let products = self.precision.effects().cross_products(&[f]);
+        let further: Columns<'_> = more.iter().map(|(_, f)| &f[..]).collect();
+        let (products, mut across) = self.precision.effects().cross_products_with(&further, &self.columns);
         let eliminated = self.precision.eliminated(&products);
-        across.gemm(-1.0, &self.eliminated, &eliminated.transpose(), 1.0);
+        across.gemm(-1.0, &eliminated, &self.eliminated.transpose(), 1.0);
         let mut normal = Normal { energy: self.normal.energy, ..Normal::zeros(n + m) };
         normal.log_determinant = self.normal.log_determinant;
         normal.information.view_mut((0, 0), (n, n)).copy_from(&self.normal.information);
         normal.information.view_mut((n, n), (m, m)).copy_from(&self.precision.less(&products, &eliminated));
-        normal.information.view_mut((0, n), (n, m)).copy_from(&across.rows(0, n));
-        normal.information.view_mut((n, 0), (m, n)).copy_from(&across.rows(0, n).transpose());
+        normal.information.view_mut((0, n), (n, m)).copy_from(&across.columns(0, n).transpose());
+        normal.information.view_mut((n, 0), (m, n)).copy_from(&across.columns(0, n));
         normal.score.rows_mut(0, n).copy_from(&self.normal.score);
-        normal.score.rows_mut(n, m).copy_from(&across.row(n).transpose());
+        normal.score.rows_mut(n, m).copy_from(&across.column(n));
         let ids = self.ids.iter().copied().chain(more.iter().map(|(id, _)| *id)).collect();
         Some((normal, ids))
     }
@@ -104,15 +101,13 @@ impl Fitted<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use nalgebra::{DVector, Vector3};
 
     use super::{
         super::precision::tests::{DRIFTS, SIGMA, Toy},
         *,
     };
-    use crate::recording::SensorKind;
+    use crate::{diagnosis::residual::block::Means, recording::SensorKind};
 
     const BLOCKS: usize = 5;
 
@@ -138,11 +133,12 @@ mod tests {
             size: 3,
             channels: vec![channel(0, vec![0, 1, 2]), channel(1, vec![1]), channel(2, vec![0, 2])],
         };
-        let means = |reach: [f64; 2], id: usize| -> Means {
+        let signature = |reach: [f64; 2], id: usize| {
             let value = |block| Vector3::new(reach[0], reach[1], 0.0) * column(id)(block);
-            [Some((0..BLOCKS).map(value).collect()), None, None]
+            let means: Means = [Some((0..BLOCKS).map(value).collect()), None, None];
+            Signature::from(means)
         };
-        let further = [means([1.0, 1.0], 7), means([1.0, 0.0], 8)];
+        let further = [signature([1.0, 1.0], 7), signature([1.0, 0.0], 8)];
         let found = AugmentedNormal::new(&design, &precisions, &[0, 2]).with(&further);
         let kept = [0, 2];
         let all = design.extended(&kept, Vec::new(), &further).normal(&precisions, &[0, 1, 2, 3]);

@@ -2,14 +2,14 @@
 //!
 //! A channel is one axis of one sensor. Columns are in usual sizes of their parameters, so that one means usual.
 
-use std::{borrow::Borrow, sync::Arc};
+use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use rayon::prelude::*;
 
 use super::{
     precision::Precision,
-    random_effects::{CrossProducts, RandomEffects},
+    random_effects::{Columns, CrossProducts, RandomEffects},
 };
 use crate::{
     diagnosis::residual::{block::Means, forward_model::ForwardModel},
@@ -36,6 +36,22 @@ impl Column {
     /// It belongs to this effect.
     pub fn is_of(&self, effect: &Effect) -> bool {
         self.effect == effect
+    }
+}
+
+/// What a usual size of one parameter changes, block by block, by sensor and axis; none where it changes nothing.
+#[derive(Clone, Debug)]
+pub struct Signature([[Option<Arc<Vec<f64>>>; 3]; 3]);
+
+impl From<Means> for Signature {
+    fn from(means: Means) -> Self {
+        Self(means.map(|values| {
+            std::array::from_fn(|axis| {
+                let values = values.as_ref()?;
+                let reaches = values.iter().any(|value| value[axis] != 0.0);
+                reaches.then(|| Arc::new(values.iter().map(|value| value[axis]).collect()))
+            })
+        }))
     }
 }
 
@@ -170,16 +186,10 @@ impl Channel {
         residual
     }
 
-    /// Columns by index, zero where they do not reach it, and behind them its residual.
-    pub fn gathered(&self, wanted: &[usize]) -> DMatrix<f64> {
-        let mut x = DMatrix::zeros(self.y.len(), wanted.len() + 1);
-        for (mut to, id) in x.column_iter_mut().zip(wanted) {
-            if let Some(at) = self.ids.iter().position(|own| own == id) {
-                to.copy_from_slice(&self.x[at]);
-            }
-        }
-        x.set_column(wanted.len(), &self.y);
-        x
+    /// Columns by index, without a value where they do not reach it, and behind them its residual.
+    pub fn columns(&self, wanted: &[usize]) -> Columns<'_> {
+        let of = |id: &usize| self.ids.iter().position(|own| own == id).map_or(&[][..], |at| &self.x[at]);
+        wanted.iter().map(of).chain([self.y.as_slice()]).collect()
     }
 }
 
@@ -188,7 +198,7 @@ impl Design {
     pub fn new(
         scene: &ForwardModel<'_>,
         columns: Vec<Column>,
-        signatures: &[impl Borrow<Means> + Sync],
+        signatures: &[Signature],
         residual: &Means,
     ) -> Self {
         let places: Vec<(SensorKind, usize)> =
@@ -202,16 +212,11 @@ impl Design {
 
     /// A residual without columns.
     pub fn of_residual(scene: &ForwardModel<'_>, residual: &Means) -> Self {
-        Self::new(scene, Vec::new(), &[] as &[Means], residual)
+        Self::new(scene, Vec::new(), &[], residual)
     }
 
     /// Some of its columns, by index, and further ones behind them; `columns` names the first of these.
-    pub fn extended(
-        &self,
-        kept: &[usize],
-        columns: Vec<Column>,
-        further: &[impl Borrow<Means> + Sync],
-    ) -> Self {
+    pub fn extended(&self, kept: &[usize], columns: Vec<Column>, further: &[Signature]) -> Self {
         let channels = self
             .channels
             .par_iter()
@@ -225,7 +230,7 @@ impl Design {
                 }
                 for (id, column) in reaching(channel.kind, channel.axis, kept.len(), further) {
                     ids.push(id);
-                    x.push(Arc::new(column));
+                    x.push(column);
                 }
                 Channel { kind: channel.kind, axis: channel.axis, ids, x, y: channel.y.clone() }
             })
@@ -281,7 +286,7 @@ impl Design {
             let reaches = |at: &usize| channels().any(|channel| channel.ids.contains(&wanted[*at]));
             let ids: Vec<usize> = (0..wanted.len()).filter(reaches).collect();
             let own: Vec<usize> = ids.iter().map(|at| wanted[*at]).collect();
-            let x: Vec<DMatrix<f64>> = channels().map(|channel| channel.gathered(&own)).collect();
+            let x: Vec<Columns<'_>> = channels().map(|channel| channel.columns(&own)).collect();
             let kinds = channels().map(|channel| channel.kind).collect();
             GroupProducts { kinds, ids, columns: group.effects.cross_products(&x) }
         };
@@ -333,25 +338,23 @@ fn channel(
     kind: SensorKind,
     axis: usize,
     blocks: usize,
-    signatures: &[impl Borrow<Means>],
+    signatures: &[Signature],
     residual: &Means,
 ) -> Channel {
-    let (ids, x) = reaching(kind, axis, 0, signatures).map(|(id, column)| (id, Arc::new(column))).unzip();
+    let (ids, x) = reaching(kind, axis, 0, signatures).unzip();
     let y = DVector::from_vec(along(residual, kind, axis).unwrap_or_else(|| vec![0.0; blocks]));
     Channel { kind, axis, ids, x, y }
 }
 
-/// The signatures that reach a channel, block by block; they are numbered from `first` on.
+/// The signatures that reach a channel; they are numbered from `first` on.
 pub fn reaching(
     kind: SensorKind,
     axis: usize,
     first: usize,
-    signatures: &[impl Borrow<Means>],
-) -> impl Iterator<Item = (usize, Vec<f64>)> {
-    signatures.iter().enumerate().filter_map(move |(id, signature)| {
-        let values = Borrow::<Means>::borrow(signature)[kind as usize].as_ref()?;
-        let reaches = values.iter().any(|v| v[axis] != 0.0);
-        reaches.then(|| (first + id, values.iter().map(|v| v[axis]).collect()))
+    signatures: &[Signature],
+) -> impl Iterator<Item = (usize, Arc<Vec<f64>>)> {
+    signatures.iter().enumerate().filter_map(move |(id, Signature(columns))| {
+        Some((first + id, Arc::clone(columns[kind as usize][axis].as_ref()?)))
     })
 }
 

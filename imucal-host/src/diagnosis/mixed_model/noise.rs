@@ -148,7 +148,7 @@ impl<'s> Weighing<'s> {
     /// The smallest scatter that is looked for, rad: a rig repeats its rests; a hand does not, nor is the field of a
     /// room the same all over it.
     pub fn least_scatter(&self) -> f64 {
-        if self.scene.swings.is_some() { 1e-7 } else { 1e-5 }
+        self.scene.settings.noise.least_scatter
     }
 
     /// Σ⁻¹ of each channel of a design.

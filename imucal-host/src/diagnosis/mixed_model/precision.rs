@@ -83,8 +83,7 @@ impl Precision {
 
     /// Σ⁻¹ x of one column over the blocks of a single channel.
     pub fn apply(&self, x: &[f64]) -> Vec<f64> {
-        let column = DMatrix::from_column_slice(x.len(), 1, x);
-        let mut u = self.effects.cross_products(std::slice::from_ref(&column)).states.as_slice().to_vec();
+        let mut u = self.effects.cross_products(&[vec![x]]).states.as_slice().to_vec();
         u.iter_mut().zip(&self.scales).for_each(|(u, scale)| *u *= scale);
         self.factor.solve(&mut u);
         u.iter_mut().zip(&self.scales).for_each(|(u, scale)| *u *= scale);
@@ -161,7 +160,13 @@ fn parts(process: usize, count: usize) -> impl Iterator<Item = (usize, f64)> {
 pub(super) mod tests {
     use nalgebra::DVector;
 
-    use super::{super::random_effects::ChannelBlocks, super::sparse_rows::SparseRows, *};
+    use super::{
+        super::{
+            random_effects::{ChannelBlocks, Columns},
+            sparse_rows::SparseRows,
+        },
+        *,
+    };
 
     /// Anything but one.
     pub const SIGMA: f64 = 0.8;
@@ -239,6 +244,11 @@ pub(super) mod tests {
         }
     }
 
+    /// The columns of a matrix.
+    pub fn slices(x: &DMatrix<f64>) -> Columns<'_> {
+        x.as_slice().chunks_exact(x.nrows()).collect()
+    }
+
     /// Some columns over the blocks, channel by channel.
     pub fn columns(toy: &Toy, count: usize) -> Vec<DMatrix<f64>> {
         let value =
@@ -253,9 +263,10 @@ pub(super) mod tests {
         for (blocks, channels) in [(5, 1), (5, 2), (40, 1), (40, 3)] {
             let toy = Toy::new(blocks, channels);
             let x = columns(&toy, 4);
+            let of: Vec<Columns<'_>> = x.iter().map(slices).collect();
             for drifts in [&DRIFTS[..], &DRIFTS[..1], &[]] {
                 let effects = toy.effects(drifts.len());
-                let products = effects.cross_products(&x);
+                let products = effects.cross_products(&of);
                 let precision = Precision::new(effects, SIGMA, &vec![drifts; channels]);
                 let (expected, log_determinant) = toy.products(&x, drifts);
                 let found = precision.products(&products);
@@ -283,7 +294,7 @@ pub(super) mod tests {
         let toy = Toy::new(40, 2);
         let x = columns(&toy, 3);
         let effects = toy.effects(2);
-        let products = effects.cross_products(&x);
+        let products = effects.cross_products(&x.iter().map(slices).collect::<Vec<_>>());
         let none = Precision::new(Arc::clone(&effects), 0.0, &[]);
         assert_eq!(none.products(&products), products.plain);
         // Numbers that are none leave what can be computed.

@@ -19,7 +19,7 @@
 //!
 //! Not modelled: drift within the distance of two knots, drift that channels share.
 
-use std::{iter, sync::Arc};
+use std::{iter, ops::Range, sync::Arc};
 
 use nalgebra::DMatrix;
 
@@ -27,6 +27,8 @@ use super::{skyline::Skyline, sparse_rows::SparseRows, symmetric_product};
 
 /// Distance between knots, s.
 pub const SPACING: f64 = 2.5;
+/// Blocks that are multiplied at a time: few enough to stay in a processor's cache.
+const PART: usize = 512;
 
 /// One channel: an axis of a sensor.
 #[derive(Clone, Debug)]
@@ -70,6 +72,9 @@ pub struct CrossProducts {
     /// Xᵀ D⁻¹ Z, a column a state.
     pub states: DMatrix<f64>,
 }
+
+/// Columns of a channel, block by block; one without a value is zero.
+pub type Columns<'a> = Vec<&'a [f64]>;
 
 /// The knot before a block, and how far it lies on the way to the next, 0 to 1.
 type Place = (usize, f64);
@@ -117,30 +122,31 @@ impl RandomEffects {
         !self.offsets.is_empty()
     }
 
-    /// (D⁻¹X)ᵀ of a channel.
-    pub fn weighted(&self, channel: usize, x: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut weighted = x.transpose();
-        for (mut row, w) in weighted.column_iter_mut().zip(&self.channels[channel].weights) {
-            row *= *w;
+    /// Of some columns, channel by channel.
+    pub fn cross_products(self: &Arc<Self>, columns: &[Columns<'_>]) -> CrossProducts {
+        let count = columns.first().map_or(0, Vec::len);
+        let mut products = CrossProducts::zeros(self, count);
+        for (rows, columns) in self.channels.iter().zip(columns) {
+            rows.for_each_part(columns, |part, weighted, x| products.add(rows, part, weighted, x));
         }
-        weighted
+        products
     }
 
-    /// Of some columns over the blocks, channel by channel.
-    pub fn cross_products(self: &Arc<Self>, columns: &[DMatrix<f64>]) -> CrossProducts {
-        let count = columns.first().map_or(0, DMatrix::ncols);
-        let mut plain = DMatrix::zeros(count, count);
-        let mut states = DMatrix::zeros(count, self.states());
-        for (at, x) in columns.iter().enumerate() {
-            let weighted = self.weighted(at, x);
-            for (block, row) in weighted.column_iter().enumerate() {
-                for (state, z) in self.channels[at].z.row(block) {
-                    states.column_mut(*state).axpy(*z, &row, 1.0);
-                }
-            }
-            plain = symmetric_product::with_product(plain, 1.0, &weighted, x);
+    /// Of some columns of a single channel, and F D⁻¹ Xᵀ of these with others.
+    pub fn cross_products_with(
+        self: &Arc<Self>,
+        columns: &Columns<'_>,
+        others: &Columns<'_>,
+    ) -> (CrossProducts, DMatrix<f64>) {
+        let mut products = CrossProducts::zeros(self, columns.len());
+        let mut across = DMatrix::zeros(columns.len(), others.len());
+        for rows in &self.channels {
+            rows.for_each_part(columns, |part, weighted, x| {
+                across.gemm(1.0, weighted, &gathered(others, part.clone()), 1.0);
+                products.add(rows, part, weighted, x);
+            });
         }
-        CrossProducts { effects: Arc::clone(self), plain, states }
+        (products, across)
     }
 
     /// D⁻¹ (x − Z u) of one column of a single channel; puts it in the place of x.
@@ -153,12 +159,54 @@ impl RandomEffects {
 }
 
 impl Rows {
+    /// Hears of some blocks at a time, so that no copy of all columns is held: (D⁻¹X)ᵀ and X over them.
+    fn for_each_part(
+        &self,
+        columns: &Columns<'_>,
+        mut hear: impl FnMut(Range<usize>, &DMatrix<f64>, &DMatrix<f64>),
+    ) {
+        for from in (0..self.weights.len()).step_by(PART) {
+            let part = from..(from + PART).min(self.weights.len());
+            let x = gathered(columns, part.clone());
+            let mut weighted = x.transpose();
+            weighted.column_iter_mut().zip(&self.weights[part.clone()]).for_each(|(mut row, w)| row *= *w);
+            hear(part, &weighted, &x);
+        }
+    }
+
     fn iter(&self) -> impl Iterator<Item = (f64, &[(usize, f64)])> {
         self.weights.iter().enumerate().map(|(block, weight)| (*weight, self.z.row(block)))
     }
 }
 
+/// Some blocks of columns.
+fn gathered(columns: &Columns<'_>, part: Range<usize>) -> DMatrix<f64> {
+    let mut x = DMatrix::zeros(part.len(), columns.len());
+    for (mut to, column) in x.column_iter_mut().zip(columns).filter(|(_, column)| !column.is_empty()) {
+        to.copy_from_slice(&column[part.clone()]);
+    }
+    x
+}
+
 impl CrossProducts {
+    fn zeros(effects: &Arc<RandomEffects>, count: usize) -> Self {
+        Self {
+            effects: Arc::clone(effects),
+            plain: DMatrix::zeros(count, count),
+            states: DMatrix::zeros(count, effects.states()),
+        }
+    }
+
+    /// Adds some blocks of a channel.
+    fn add(&mut self, rows: &Rows, part: Range<usize>, weighted: &DMatrix<f64>, x: &DMatrix<f64>) {
+        for (block, row) in part.zip(weighted.column_iter()) {
+            for (state, z) in rows.z.row(block) {
+                self.states.column_mut(*state).axpy(*z, &row, 1.0);
+            }
+        }
+        symmetric_product::add_product(&mut self.plain, 1.0, weighted, x);
+    }
+
     /// Some of the columns, by their place.
     pub fn picked(&self, places: &[usize]) -> Self {
         let rows = |matrix: &DMatrix<f64>| matrix.select_rows(places);

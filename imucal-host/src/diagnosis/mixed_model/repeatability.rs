@@ -26,9 +26,6 @@ use crate::{
     recording::SensorKind,
 };
 
-/// In motion what the table stands off changes; it is as good as another after this, s.
-const LONGEST: f64 = 20.0;
-
 /// One axis of a sensor and what it is given.
 pub struct PointingErrors<'a> {
     /// The scene.
@@ -50,7 +47,7 @@ impl PointingErrors<'_> {
             return (0, SparseRows::empty(blocks.len()));
         }
         let (mut count, mut rows) = (0, SparseRows::default());
-        for stretch in stretches(blocks) {
+        for stretch in stretches(blocks, self.scene.settings.noise.longest_stretch) {
             let courses = self.courses(stretch.clone());
             for block in 0..stretch.len() {
                 rows.push(courses.iter().enumerate().map(|(course, u)| (count + course, u[block])));
@@ -81,10 +78,10 @@ impl PointingErrors<'_> {
     }
 }
 
-/// Blocks that stand off their encoders alike: a rest, or a part of a movement.
-pub fn stretches(blocks: &[Block]) -> Vec<Range<usize>> {
+/// Blocks that share their pointing errors: a rest, or a part of a movement that lasts no longer than `longest`, s.
+pub fn stretches(blocks: &[Block], longest: f64) -> Vec<Range<usize>> {
     let goes_on = |first: &Block, block: &Block| {
-        block.rest == first.rest && (block.rest.is_some() || block.time - first.time < LONGEST)
+        block.rest == first.rest && (block.rest.is_some() || block.time - first.time < longest)
     };
     let (mut stretches, mut from) = (Vec::new(), 0);
     for at in 1..=blocks.len() {
@@ -111,7 +108,7 @@ mod tests {
             .chain(blocks(500, 0.1, None, 3.0))
             .chain(blocks(4, 0.5, Some(2), 53.0))
             .collect();
-        let lengths: Vec<usize> = stretches(&blocks).into_iter().map(|blocks| blocks.len()).collect();
+        let lengths: Vec<usize> = stretches(&blocks, 20.0).into_iter().map(|blocks| blocks.len()).collect();
         assert_eq!(lengths, [6, 200, 200, 100, 4]);
     }
 }

@@ -50,7 +50,7 @@ impl SharedOffsets {
         if turned.is_empty() || scene.kinds == [SensorKind::Gyr] {
             return None;
         }
-        let (places, nodes) = nodes(&scene.blocks);
+        let (places, nodes) = nodes(&scene.blocks, scene.settings.noise.longest_stretch);
         let offsets = |channel: &Channel| {
             let mut rows = SparseRows::default();
             for (block, place) in places.iter().enumerate() {
@@ -111,10 +111,10 @@ fn usual_scatter(scene: &ForwardModel<'_>, noise: &Noise) -> f64 {
 
 /// By how much the offsets of nodes count in each block, and the number of nodes: one for each rest, which keeps its own
 /// and shares it with one that follows without a movement, and others where a movement begins, ends or goes on for long.
-fn nodes(blocks: &[Block]) -> (Vec<[(usize, f64); 2]>, usize) {
+fn nodes(blocks: &[Block], longest: f64) -> (Vec<[(usize, f64); 2]>, usize) {
     let mut places = Vec::with_capacity(blocks.len());
     let mut node = 0;
-    for stretch in stretches(blocks) {
+    for stretch in stretches(blocks, longest) {
         let (first, last) = (&blocks[stretch.start], &blocks[stretch.end - 1]);
         if first.rest.is_some() {
             places.extend(stretch.map(|_| [(node, 1.0), (node, 0.0)]));
@@ -163,7 +163,7 @@ mod tests {
             .chain(blocks(1, Some(2), 3.0))
             .chain(blocks(1, None, 3.5))
             .collect();
-        let (places, count) = nodes(&blocks);
+        let (places, count) = nodes(&blocks, 20.0);
         let mut h = DMatrix::zeros(blocks.len(), count);
         for (block, place) in places.iter().enumerate() {
             place.iter().for_each(|(node, share)| h[(block, *node)] += share);

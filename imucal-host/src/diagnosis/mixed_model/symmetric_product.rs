@@ -7,6 +7,12 @@ const WIDTH: usize = 96;
 
 /// C + α A B, where both C and A B are symmetric.
 pub fn with_product(mut c: DMatrix<f64>, alpha: f64, a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    add_product(&mut c, alpha, a, b);
+    c
+}
+
+/// Adds α A B to C, where both are symmetric.
+pub fn add_product(c: &mut DMatrix<f64>, alpha: f64, a: &DMatrix<f64>, b: &DMatrix<f64>) {
     let n = c.ncols();
     // Of like widths: a last narrow one would be multiplied by another kernel.
     let parts = n.div_ceil(WIDTH);
@@ -15,7 +21,6 @@ pub fn with_product(mut c: DMatrix<f64>, alpha: f64, a: &DMatrix<f64>, b: &DMatr
         c.view_mut((0, from), (to, to - from)).gemm(alpha, &a.rows(0, to), &b.columns(from, to - from), 1.0);
     }
     c.fill_lower_triangle_with_upper_triangle();
-    c
 }
 
 #[cfg(test)]

@@ -8,8 +8,6 @@ use crate::{
     recording::{SensorKind, median},
 };
 
-/// Lengths of groups of moving blocks that are compared where no rig guides the sensor; what is slower is drift.
-const SWAY: [usize; 6] = [1, 2, 4, 8, 16, 32];
 /// Pieces of which neighbours are compared, s.
 const PIECE: f64 = 0.1;
 
@@ -30,12 +28,11 @@ impl Weighing<'_> {
     /// At rest: what the samples do, and on no rig what the residual does as well, since a reference trembles with the hand.
     fn still(&self, kind: SensorKind, residual: &Means) -> [f64; 3] {
         let mut white = self.resting(kind);
-        let Some(values) = residual[kind as usize].as_ref().filter(|_| self.scene.swings.is_none()) else {
-            return white;
-        };
-        for length in SWAY {
-            let bends = self
-                .bends(kind, values, length, |first, other| first.rest.is_some() && first.rest == other.rest);
+        let Some(values) = residual[kind as usize].as_ref() else { return white };
+        for length in self.scene.settings.noise.sway {
+            let bends = self.bends(kind, values, *length, |first, other| {
+                first.rest.is_some() && first.rest == other.rest
+            });
             for (white, bends) in white.iter_mut().zip(bends) {
                 *white = white.max(usual_square(bends).sqrt());
             }
@@ -76,13 +73,13 @@ impl Weighing<'_> {
     /// no white noise: where no rig guides the sensor, groups of blocks count as well, and that which scatters most.
     fn moving(&self, kind: SensorKind, residual: &Means, resting: &[f64; 3]) -> [f64; 3] {
         let Some(values) = &residual[kind as usize] else { return [1.0; 3] };
-        let guided = self.scene.swings.is_some();
+        let sway = self.scene.settings.noise.sway;
         let in_motion = |_: &Block, other: &Block| other.rest.is_none();
         let bends = |length: usize| self.bends(kind, values, length, in_motion);
-        let most: Vec<[f64; 3]> = match guided {
+        let most: Vec<[f64; 3]> = match sway {
             // The median of a χ² of one degree is 0.455.
-            true => vec![bends(1).map(|b| median(b).unwrap_or(0.0) / 0.455)],
-            false => SWAY.iter().map(|length| bends(*length).map(usual_square)).collect(),
+            [] => vec![bends(1).map(|b| median(b).unwrap_or(0.0) / 0.455)],
+            _ => sway.iter().map(|length| bends(*length).map(usual_square)).collect(),
         };
         std::array::from_fn(|axis| {
             let square = most.iter().map(|squares| squares[axis]).fold(0.0, f64::max);
@@ -100,12 +97,13 @@ impl Weighing<'_> {
         alike: impl Fn(&Block, &Block) -> bool,
     ) -> [Vec<f64>; 3] {
         let counts = &self.scene.counts[kind as usize];
-        let guided = self.scene.swings.is_some();
+        let whole_blocks = self.scene.settings.noise.whole_blocks;
         let mut squares: [Vec<f64>; 3] = Default::default();
         for from in (0..(values.len() + 1).saturating_sub(3 * length)).step_by(length) {
             // On a rig a block with fewer rows is one that it has just left or reached.
-            let full =
-                |k: usize| if guided { counts[k] == counts[from] } else { 2 * counts[k] > counts[from] };
+            let full = |k: usize| {
+                if whole_blocks { counts[k] == counts[from] } else { 2 * counts[k] > counts[from] }
+            };
             let blocks = &self.scene.blocks;
             let whole = |k: usize| alike(&blocks[from], &blocks[k]) && counts[k] > 0 && full(k);
             if !(from..from + 3 * length).all(whole) {

@@ -8,16 +8,12 @@
 //!
 //! Not modelled: what two effects change together, which is of the second order.
 
-use std::{
-    collections::HashMap,
-    sync::{Arc, Mutex, PoisonError},
-};
-
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{block::Means, forward_model::ForwardModel, sample_points::SamplePoints};
 use crate::{
+    diagnosis::error::DiagnosisError,
     effect::{Act, Effect, Input, Parameter, Role, Truth},
     recording::SensorKind,
     simulator::Dose,
@@ -37,19 +33,19 @@ pub struct Reference<'s> {
     truth: Vec<Truth>,
     input: Vec<Input>,
     outputs: [Vec<Vector3<f64>>; 3],
-    known: Known,
 }
-
-/// Signatures that were asked for: effect, parameter, and the bits of all parameters.
-type Known = Mutex<HashMap<(&'static str, usize, Vec<u64>), Arc<Means>>>;
 
 impl<'s> Reference<'s> {
     /// The run with these effects. `None` where a triad is singular.
-    pub fn new(scene: &'s ForwardModel<'s>, doses: Vec<Dose>, nodes: &'s SamplePoints) -> Option<Self> {
+    pub fn new(
+        scene: &'s ForwardModel<'s>,
+        doses: Vec<Dose>,
+        nodes: &'s SamplePoints,
+    ) -> Result<Self, DiagnosisError> {
         let truth = scene.truth(&doses, nodes);
         let input: Vec<Input> = truth.iter().map(Input::of).collect();
         let outputs = scene.outputs(&doses, &SensorKind::ALL, &input)?;
-        Some(Self { scene, nodes, doses, truth, input, outputs, known: Known::default() })
+        Ok(Self { scene, nodes, doses, truth, input, outputs })
     }
 
     /// What a sensor puts out, block by block.
@@ -65,37 +61,22 @@ impl<'s> Reference<'s> {
         &self.truth
     }
 
-    /// A [`signature`](Self::signature), computed once.
-    pub fn known_signature(
+    /// What a usual size of one parameter changes, block by block, by the simulator's difference quotient. Where the
+    /// run holds the effect already, its own parameter is altered; else `neutral` with this parameter switched on.
+    pub fn signature(
         &self,
         effect: &'static Effect,
         parameter: usize,
-        shape: &[f64],
-    ) -> Option<Arc<Means>> {
-        // What the run holds is altered where it stands.
-        let is_held = self.doses.iter().any(|dose| dose.effect == effect);
-        let bits = shape.iter().filter(|_| !is_held).map(|value| value.to_bits()).collect();
-        let key = (effect.id.as_str(), parameter, bits);
-        let locked = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = locked().get(&key) {
-            return Some(Arc::clone(known));
-        }
-        let signature = Arc::new(self.signature(effect, parameter, shape)?);
-        locked().insert(key, Arc::clone(&signature));
-        Some(signature)
-    }
-
-    /// What a usual size of one parameter changes, block by block, by the simulator's difference quotient. Where the
-    /// run holds the effect already, its own parameter is altered; else `neutral` with this parameter switched on.
-    pub fn signature(&self, effect: &'static Effect, parameter: usize, neutral: &[f64]) -> Option<Means> {
-        let scale = effect.parameters.get(parameter)?.prior_scale;
+        neutral: &[f64],
+    ) -> Result<Means, DiagnosisError> {
+        let scale = effect.parameters[parameter].prior_scale;
         let mut doses = self.doses.clone();
-        let step = step(effect.parameters.get(parameter)?);
+        let step = step(&effect.parameters[parameter]);
         match doses.iter_mut().find(|dose| dose.effect == effect) {
-            Some(dose) => *dose.values.get_mut(parameter)? += step,
+            Some(dose) => dose.values[parameter] += step,
             None => {
                 let mut values = neutral.to_vec();
-                *values.get_mut(parameter)? += step;
+                values[parameter] += step;
                 doses.push(Dose { effect, values });
             }
         }
@@ -105,10 +86,9 @@ impl<'s> Reference<'s> {
             }
             Act::Field(alter) if !self.doses.iter().any(|dose| dose.effect == effect) => {
                 // Field effects come after all that moves the rig; their order among themselves is of second order.
-                let values = &doses.last()?.values;
                 let altered = |row: &Truth| {
                     let mut row = *row;
-                    alter(values, &mut row);
+                    doses.last().into_iter().for_each(|dose| alter(&dose.values, &mut row));
                     Input::of(&row)
                 };
                 let input: Vec<Input> = self.truth.par_iter().map(altered).collect();
@@ -127,7 +107,7 @@ impl<'s> Reference<'s> {
             let change: Vec<_> = with.iter().zip(without).map(|(a, b)| (a - b) * (scale / step)).collect();
             means[*kind as usize] = Some(self.nodes.averaged(&change, self.scene.cuts.len()));
         }
-        Some(self.scene.seen(means))
+        Ok(self.scene.seen(means))
     }
 }
 

@@ -10,26 +10,22 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{
-    block::{Block, Means, cut},
+    block::{Block, Means, cut_at_most},
     gravity_observables::GravityObservables,
     sample_points::SamplePoints,
     transient,
 };
 use crate::{
-    diagnosis::reference::rest_to_rest::RestToRest,
+    diagnosis::{error::DiagnosisError, reference::rest_to_rest::RestToRest, settings::Settings},
     effect::{Effect, Input, Swing, Truth},
     recording::{Recording, SensorKind},
     simulator::{Dose, Recorded, chain::Chain},
 };
 
-/// Nodes of signatures are this far apart in motion, s; where no rig guides the sensor, which moves briskly then, the
-/// latter.
-const NODES: (f64, f64) = (0.045, 0.0175);
-/// At rest on a rig nothing changes from one to the next, s.
-const RESTING: f64 = 0.25;
-
 /// What is simulated beside a recording.
 pub struct ForwardModel<'a> {
+    /// Settings of the diagnosis.
+    pub settings: &'a Settings,
     /// The recording.
     pub recording: &'a Recording,
     /// Its blocks; where a view looks at it, those of the view.
@@ -62,31 +58,32 @@ impl<'a> ForwardModel<'a> {
         usable: [Vec<bool>; 3],
         motion: &'a dyn Recorded,
         triads: [Triad<f64>; 3],
+        settings: &'a Settings,
     ) -> Self {
         let interval = recording.median_interval().unwrap_or(0.01);
-        let blocks = cut(&recording.time, motion.moving(), interval);
+        let by = &settings.residual;
+        let blocks = cut_at_most(&recording.time, motion.moving(), interval, by);
         let mut counts = usable.each_ref().map(|usable| {
             let count = |block: &Block| usable.get(block.rows.clone()).unwrap_or_default();
             blocks.iter().map(|block| count(block).iter().filter(|usable| **usable).count()).collect()
         });
-        if recording.reference.is_some() && motion.swings().is_none() {
-            transient::leave_out(recording, &usable, &blocks, &mut counts);
+        if by.leaves_out_passages {
+            transient::leave_out(recording, &usable, &blocks, by, &mut counts);
         }
-        // On a rig a sensor without a usable row stays: its samples may be told from another unit.
-        let is_used = |kind: SensorKind| motion.swings().is_some() || usable[kind as usize].contains(&true);
+        let is_used =
+            |kind: SensorKind| by.keeps_sensors_without_rows || usable[kind as usize].contains(&true);
         let is_there = |kind: &SensorKind| recording.sensor(*kind).is_some() && is_used(*kind);
         let kinds = SensorKind::ALL.into_iter().filter(is_there).collect();
-        let apart = if motion.swings().is_some() { NODES.0 } else { NODES.1 };
         let fine = |block: &Block| {
-            let still = block.rest.is_some() && motion.swings().is_some();
-            let stride = ((if still { RESTING } else { apart } / interval).round() as usize).max(1);
+            let apart = if block.rest.is_some() { by.resting_points } else { by.moving_points };
+            let stride = ((apart / interval).round() as usize).max(1);
             block.rows.len().div_ceil(stride)
         };
-        // Across a gap of a reference it is bridged as if it turned evenly: no derivative is to be taken there.
-        let told = |row: usize| motion.swings().is_some() || motion.known()[row];
-        let fine = SamplePoints::choose(&recording.time, &blocks, fine, told);
+        let is_known = |row: usize| by.points_in_gaps || motion.known()[row];
+        let fine = SamplePoints::choose(&recording.time, &blocks, fine, is_known);
         let coarse = SamplePoints::choose(&recording.time, &blocks, |_| 1, |_| true);
         Self {
+            settings,
             recording,
             cuts: blocks.clone(),
             view: None,
@@ -124,10 +121,11 @@ impl<'a> ForwardModel<'a> {
     /// Without the blocks in which something is brought near the magnetometer or taken away, where no rig guides it.
     #[must_use]
     pub fn without_passages(mut self) -> Self {
-        if self.swings.is_none() && self.view.is_none() && self.recording.reference.is_some() {
+        if self.settings.residual.leaves_out_passages {
             // A shock of a hand is movement, and no passage.
             let of_mag = self.residual(&[]).map(|[_, _, mag]| [None, None, mag]);
-            transient::leave_out_passages(&of_mag.unwrap_or_default(), &self.blocks, &mut self.counts);
+            let (of_mag, by) = (of_mag.unwrap_or_default(), &self.settings.residual);
+            transient::leave_out_passages(&of_mag, &self.blocks, by, &mut self.counts);
         }
         self
     }
@@ -142,12 +140,7 @@ impl<'a> ForwardModel<'a> {
 
     /// Sensors whose blocks an effect may alter: by way of an attitude, others than its own.
     pub fn reach(&self, effect: &Effect) -> &'static [SensorKind] {
-        if self.view.is_some() { &SensorKind::ALL } else { effect.sensors }
-    }
-
-    /// It is looked at by way of the rests of a hand.
-    pub fn is_viewed(&self) -> bool {
-        self.view.is_some()
+        self.settings.residual.coupled.unwrap_or(effect.sensors)
     }
 
     /// The movement is told at a row.
@@ -193,23 +186,22 @@ impl<'a> ForwardModel<'a> {
     }
 
     /// What the simulator puts out at each row, by sensor. `None` where a triad is singular.
-    pub fn simulated(&self, doses: &[Dose]) -> Option<Vec<(SensorKind, Vec<Vector3<f64>>)>> {
+    pub fn simulated(&self, doses: &[Dose]) -> Result<Vec<(SensorKind, Vec<Vector3<f64>>)>, DiagnosisError> {
         let chain = Chain::new(doses);
         let input = chain.inputs(self.motion, &self.recording.time);
-        let of =
-            |kind: &SensorKind| Some((*kind, chain.output(*kind, &self.triads[*kind as usize], &input)?));
+        let of = |kind: &SensorKind| Ok((*kind, self.output(&chain, *kind, &input)?));
         self.kinds.par_iter().map(of).collect()
     }
 
     /// Recorded less simulated, block by block. `None` where a triad is singular.
-    pub fn residual(&self, doses: &[Dose]) -> Option<Means> {
+    pub fn residual(&self, doses: &[Dose]) -> Result<Means, DiagnosisError> {
         let simulated = self.simulated(doses)?;
         let of = |(kind, output): &(SensorKind, Vec<_>)| (*kind, self.difference(*kind, output));
         let mut means: Means = Default::default();
         for (kind, difference) in simulated.par_iter().map(of).collect::<Vec<_>>() {
             means[kind as usize] = difference;
         }
-        Some(self.seen(means))
+        Ok(self.seen(means))
     }
 
     fn difference(&self, kind: SensorKind, output: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
@@ -233,12 +225,22 @@ impl<'a> ForwardModel<'a> {
         doses: &[Dose],
         kinds: &[SensorKind],
         input: &[Input],
-    ) -> Option<[Vec<Vector3<f64>>; 3]> {
+    ) -> Result<[Vec<Vector3<f64>>; 3], DiagnosisError> {
         let chain = Chain::new(doses);
         let mut outputs: [Vec<Vector3<f64>>; 3] = Default::default();
         for kind in kinds.iter().filter(|kind| self.kinds.contains(kind)) {
-            outputs[*kind as usize] = chain.output(*kind, &self.triads[*kind as usize], input)?;
+            outputs[*kind as usize] = self.output(&chain, *kind, input)?;
         }
-        Some(outputs)
+        Ok(outputs)
+    }
+
+    fn output(
+        &self,
+        chain: &Chain<'_>,
+        kind: SensorKind,
+        input: &[Input],
+    ) -> Result<Vec<Vector3<f64>>, DiagnosisError> {
+        let output = chain.output(kind, &self.triads[kind as usize], input);
+        output.ok_or(DiagnosisError::Simulation { sensor: kind })
     }
 }

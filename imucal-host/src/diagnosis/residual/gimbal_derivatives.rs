@@ -11,12 +11,12 @@ pub fn gimbal_derivatives<'s>(scene: &'s ForwardModel<'_>) -> &'s [Means] {
 }
 
 fn computed(scene: &ForwardModel<'_>) -> Option<Vec<Means>> {
-    let offset = find("rig.encoder_offset").filter(|_| scene.swings.is_some())?;
-    let reference = Reference::new(scene, Vec::new(), &scene.coarse)?;
+    let offset = find("rig.encoder_offset").filter(|_| scene.settings.source.gimbals)?;
+    let reference = Reference::new(scene, Vec::new(), &scene.coarse).ok()?;
     let neutral = offset.neutral(scene.duration());
     let of = |gimbal: usize| {
         let scale = 1.0 / offset.parameters[gimbal].prior_scale;
-        let mut means = reference.signature(offset, gimbal, &neutral)?;
+        let mut means = reference.signature(offset, gimbal, &neutral).ok()?;
         means.iter_mut().flatten().flatten().for_each(|value| *value *= scale);
         Some(means)
     };

@@ -7,13 +7,11 @@
 use nalgebra::Vector3;
 
 use super::block::{Block, Means};
-use crate::recording::{Recording, SensorKind, median};
+use crate::{
+    diagnosis::settings::ResidualSettings,
+    recording::{Recording, SensorKind, median},
+};
 
-/// Samples scatter by so many times what is usual at rest.
-const FAR: f64 = 5.0;
-
-/// What is left changes by so many times what is usual.
-const ABRUPT: f64 = 8.0;
 /// Within twice this time, s.
 const PASSAGE: f64 = 0.25;
 /// Between two abrupt changes no further apart, s, a hand stops on its way: that belongs to the same passage.
@@ -21,10 +19,15 @@ const STOP: f64 = 0.5;
 
 /// Takes the rows of blocks in which `residual` changes abruptly, or between two such, out of `counts`, usable rows of
 /// each block by sensor.
-pub fn leave_out_passages(residual: &Means, blocks: &[Block], counts: &mut [Vec<usize>; 3]) {
+pub fn leave_out_passages(
+    residual: &Means,
+    blocks: &[Block],
+    by: &ResidualSettings,
+    counts: &mut [Vec<usize>; 3],
+) {
     for (values, counts) in residual.iter().zip(counts).filter_map(|(v, c)| Some((v.as_ref()?, c))) {
         let told: Vec<usize> = (0..blocks.len()).filter(|k| counts[*k] > 0).collect();
-        let abrupt = abrupt(values, blocks, &told);
+        let abrupt = abrupt(values, blocks, &told, by.passage_change);
         let time = |at: usize| blocks[told[at]].time;
         abrupt.iter().for_each(|at| counts[told[*at]] = 0);
         for stop in abrupt.windows(2).filter(|pair| time(pair[1]) - time(pair[0]) <= STOP) {
@@ -34,7 +37,7 @@ pub fn leave_out_passages(residual: &Means, blocks: &[Block], counts: &mut [Vec<
 }
 
 /// Places among the blocks `told` of those about which a sensor's residual changes abruptly, in their order.
-fn abrupt(values: &[Vector3<f64>], blocks: &[Block], told: &[usize]) -> Vec<usize> {
+fn abrupt(values: &[Vector3<f64>], blocks: &[Block], told: &[usize], usual_times: f64) -> Vec<usize> {
     let change = |at: usize| -> f64 {
         let time = blocks[told[at]].time;
         let before = told[..at].iter().rev().take_while(|k| time - blocks[**k].time <= PASSAGE).last();
@@ -50,7 +53,7 @@ fn abrupt(values: &[Vector3<f64>], blocks: &[Block], told: &[usize]) -> Vec<usiz
         median(alike.map(|at| changes[at]).collect())
     });
     let is_abrupt =
-        |at: &usize| usual[usize::from(rests(at))].is_some_and(|usual| changes[*at] > ABRUPT * usual);
+        |at: &usize| usual[usize::from(rests(at))].is_some_and(|usual| changes[*at] > usual_times * usual);
     (0..told.len()).filter(is_abrupt).collect()
 }
 
@@ -59,6 +62,7 @@ pub fn leave_out(
     recording: &Recording,
     usable: &[Vec<bool>; 3],
     blocks: &[Block],
+    by: &ResidualSettings,
     counts: &mut [Vec<usize>; 3],
 ) {
     for kind in SensorKind::ALL {
@@ -77,7 +81,7 @@ pub fn leave_out(
             .collect();
         let Some(usual) = median(spreads.iter().flatten().copied().collect()) else { continue };
         for (count, spread) in counts[kind as usize].iter_mut().zip(spreads) {
-            if spread.is_some_and(|spread| spread > FAR * usual) {
+            if spread.is_some_and(|spread| spread > by.passage_scatter * usual) {
                 *count = 0;
             }
         }
@@ -87,6 +91,7 @@ pub fn leave_out(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnosis::settings::Settings;
 
     #[test]
     fn a_passage_is_left_out_with_the_moment_at_which_the_hand_stops_and_nothing_far_from_it_is() {
@@ -98,7 +103,7 @@ mod tests {
         let noise = |k: usize| 0.5 * ((k * k) as f64).sin();
         let values = (0..400).map(|k| Vector3::new(field(time(k)), noise(k), noise(k + 7))).collect();
         let mut counts = [Vec::new(), Vec::new(), vec![3; 400]];
-        leave_out_passages(&[None, None, Some(values)], &blocks, &mut counts);
+        leave_out_passages(&[None, None, Some(values)], &blocks, &Settings::default().residual, &mut counts);
         for (k, count) in counts[2].iter().enumerate() {
             match time(k) {
                 t if (20.0..21.2).contains(&t) => assert_eq!(*count, 0, "{t}"),

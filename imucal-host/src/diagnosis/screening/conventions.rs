@@ -5,7 +5,7 @@
 //! those of [`Recording::time`]. Not looked for: columns that are shifted by a row, wrong byte order.
 
 use crate::{
-    diagnosis::finding::Amount,
+    diagnosis::{finding::Amount, settings::Provided},
     effect,
     effect::{Effect, Truth},
     recording::{Recording, SensorKind, check::integrity::Integrity},
@@ -107,19 +107,23 @@ fn truth(recording: &Recording, motion: &dyn Motion, rows: &[usize], offset: f64
 }
 
 /// Checks a recording against a movement that was told from it or besides it.
-pub fn check(recording: &Recording, integrity: &Integrity, motion: &dyn Motion) -> Conventions {
+pub fn check(
+    recording: &Recording,
+    integrity: &Integrity,
+    motion: &dyn Motion,
+    source: Provided,
+) -> Conventions {
     let mut found = Conventions::default();
     let rows = rows(recording);
     let truth = truth(recording, motion, &rows, 0.0);
-    // Gravity and the gyroscope tell no heading: there is no field to compare a magnetometer with.
-    let by_rests = motion.encoders(0.0).is_none() && recording.reference.is_none();
-    let is_compared = |kind: SensorKind| !(by_rests && kind == SensorKind::Mag);
+    // Without the heading there is no field to compare a magnetometer with.
+    let is_compared = |kind: SensorKind| source.heading || kind != SensorKind::Mag;
     let mut pairs = SensorKind::ALL.map(|kind| {
         let pairs = is_compared(kind).then(|| Pairs::of(recording, integrity, kind, &rows, &truth));
         pairs.flatten()
     });
-    let carried = carried_about::check(recording, integrity, &rows, &truth, &pairs);
-    if let Some(remark) = carried {
+    let carried = || carried_about::check(recording, integrity, &rows, &truth, &pairs);
+    if let Some(remark) = if source.position { None } else { carried() } {
         found.remarks.push(remark);
         found.beyond_movement = Some(SensorKind::Acc);
         pairs[SensorKind::Acc as usize] = None;

@@ -11,7 +11,11 @@ use super::{
     reference_offset,
 };
 use crate::{
-    diagnosis::reference::{model::Model, movement, movement::Reference, rest_to_rest::RestToRest, revisits},
+    diagnosis::{
+        error::DiagnosisError,
+        reference::{model::Model, movement, movement::Reference, rest_to_rest::RestToRest, revisits},
+        settings::Settings,
+    },
     effect::{Act, DataRun, Effect, Spoils, axis_swap},
     recording::{
         Recording, SensorKind, Triple,
@@ -53,21 +57,29 @@ impl Preparation {
     /// # Errors
     ///
     /// Why the recording cannot be diagnosed, for a reader.
-    pub fn new(recording: &Recording, model: Option<&StoredCalibration>) -> Result<Self, String> {
-        let model = model.map(|model| Model::new(recording, model)).transpose()?.unwrap_or_default();
+    pub fn new(
+        recording: &Recording,
+        model: Option<&StoredCalibration>,
+        settings: &Settings,
+    ) -> Result<Self, DiagnosisError> {
+        let model = model.map(|model| Model::new(recording, model)).transpose();
+        let model = model.map_err(DiagnosisError::Recording)?.unwrap_or_default();
         let integrity = integrity::inspect(recording);
-        let mut as_read = movement::reference(recording, &integrity, &model, 0.0)?;
+        let reference = |moved: f64| {
+            movement::reference(recording, &integrity, &model, moved).map_err(DiagnosisError::Recording)
+        };
+        let mut as_read = reference(0.0)?;
         let mut moved = 0.0;
-        if recording.gimbal.is_none() && recording.reference.is_some() {
+        if settings.source.clock {
             moved = reference_offset::coarse(recording, &integrity, &*as_read.movement);
             if moved != 0.0 {
-                as_read = movement::reference(recording, &integrity, &model, moved)?;
+                as_read = reference(moved)?;
             }
         }
         let Reference { movement, held } = as_read;
-        let conventions = conventions::check(recording, &integrity, &*movement);
+        let conventions = conventions::check(recording, &integrity, &*movement, settings.source);
         if let Some(contradiction) = conventions.contradiction {
-            return Err(contradiction);
+            return Err(DiagnosisError::Recording(contradiction));
         }
         let mut usable = SensorKind::ALL.map(|kind| usable_rows(recording, &integrity, &conventions, kind));
         if let Some(kind) = conventions.beyond_movement {
@@ -99,7 +111,7 @@ impl Preparation {
         let Some(measured) =
             SensorKind::ALL.iter().find(|kind| usable[**kind as usize].iter().any(|row| *row))
         else {
-            return Err("no sensor has a usable row".to_owned());
+            return Err(DiagnosisError::Recording("no sensor has a usable row".to_owned()));
         };
         debug_assert!(recording.sensor(*measured).is_some());
         let mut remarks = conventions.remarks;

@@ -11,6 +11,7 @@ use super::{
 };
 use crate::{
     diagnosis::{
+        error::DiagnosisError,
         library::{
             candidates::Candidates,
             evidence::{Projected, log_evidence},
@@ -51,7 +52,7 @@ pub struct Linearisation<'s> {
     normals: Memo<Noise, Normal>,
     products: Memo<White, DesignProducts>,
     offsets: Memo<White, Option<SharedOffsets>>,
-    projected: Memo<Noise, Option<(Projected, Vec<usize>)>>,
+    projected: Memo<Noise, Result<(Projected, Vec<usize>), DiagnosisError>>,
 }
 
 /// White noise of each sensor at rest and in motion, by axis.
@@ -59,7 +60,11 @@ type White = [[[f64; 3]; 2]; 3];
 
 impl<'s> Linearisation<'s> {
     /// About a fit, with its columns alone: nothing can be added.
-    pub fn fitted_alone(scene: &'s ForwardModel<'s>, candidates: &'s Candidates, fit: &Fit) -> Option<Self> {
+    pub fn fitted_alone(
+        scene: &'s ForwardModel<'s>,
+        candidates: &'s Candidates,
+        fit: &Fit,
+    ) -> Result<Self, DiagnosisError> {
         let scan = Grid::new(scene, candidates, fit.doses.clone())?;
         Self::alone(&Reference::new(scene, fit.doses.clone(), &scene.fine)?, scan, scene, candidates, fit)
     }
@@ -70,14 +75,14 @@ impl<'s> Linearisation<'s> {
         scene: &'s ForwardModel<'s>,
         candidates: &'s Candidates,
         fit: &Fit,
-    ) -> Option<Self> {
+    ) -> Result<Self, DiagnosisError> {
         let neutral = |effect: &&'static Effect| GridPosterior::alone(effect.neutral(scene.duration()));
         let shapes = candidates.effects.iter().map(neutral).collect();
         let columns = columns(&fit.doses.iter().map(|dose| dose.effect).collect::<Vec<_>>());
-        let means = signatures(reference, &columns, &|_| Vec::new())?;
-        let design = Design::new(scene, columns, &means, &fit.residual);
+        let signatures = signatures(reference, &columns, &|_| Vec::new())?;
+        let design = Design::new(scene, columns, &signatures, &fit.residual);
         let weighing = Weighing::new(scene, SensorKind::ALL.map(|kind| reference.output(kind)));
-        Some(Self::of(scene, candidates, scan, fit, design, weighing, shapes))
+        Ok(Self::of(scene, candidates, scan, fit, design, weighing, shapes))
     }
 
     /// About a fit; shapes of candidates that it does not hold are those best under `noise`. What reaches no sensor on
@@ -88,7 +93,7 @@ impl<'s> Linearisation<'s> {
         fit: &Fit,
         noise: &Noise,
         before: Option<&Self>,
-    ) -> Option<Self> {
+    ) -> Result<Self, DiagnosisError> {
         let reference = Reference::new(scene, fit.doses.clone(), &scene.fine)?;
         let scan = match before {
             Some(before) => before.scan.clone(),
@@ -113,17 +118,17 @@ impl<'s> Linearisation<'s> {
             .copied()
             .partition(|effect| lasts(effect) && fit.doses.iter().all(|dose| dose.effect != *effect));
         let fresh = columns(&candidates.baseline.iter().copied().chain(new).collect::<Vec<_>>());
-        let means = signatures(&reference, &fresh, &|effect| candidates.shape(&shapes, effect))?;
+        let signatures = signatures(&reference, &fresh, &|effect| candidates.shape(&shapes, effect))?;
         let mut design = match before {
             Some(before) => {
                 let kept: Vec<usize> = old.iter().flat_map(|effect| before.design.of(effect)).collect();
                 let columns = kept.iter().map(|id| before.design.columns[*id]).chain(fresh).collect();
-                before.design.extended(&kept, columns, &means).leaving(&fit.residual)
+                before.design.extended(&kept, columns, &signatures).leaving(&fit.residual)
             }
-            None => Design::new(scene, fresh, &means, &fit.residual),
+            None => Design::new(scene, fresh, &signatures, &fit.residual),
         };
         restore(&mut design, fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect)));
-        Some(Self::of(scene, candidates, scan, fit, design, alone.weighing, shapes))
+        Ok(Self::of(scene, candidates, scan, fit, design, alone.weighing, shapes))
     }
 
     fn of(
@@ -183,7 +188,7 @@ impl<'s> Linearisation<'s> {
         let spread = |at: usize| self.shapes[at].spread;
         let kept =
             |at: usize| Some(&self.shapes[at]).filter(|_| !meets(self.candidates.effects[at])).cloned();
-        let shapes = self.scan.shapes(&beside, noise, &spread, &kept)?;
+        let shapes = self.scan.shapes(&beside, noise, &spread, &kept).ok()?;
         let others: Vec<&'static Effect> = self
             .candidates
             .effects
@@ -195,13 +200,14 @@ impl<'s> Linearisation<'s> {
         if others.is_empty() {
             return None;
         }
-        let reference = Reference::new(self.scene, doses.clone(), &self.scene.fine)?;
+        let reference = Reference::new(self.scene, doses.clone(), &self.scene.fine).ok()?;
         let changed = columns(&others);
-        let means = signatures(&reference, &changed, &|effect| self.candidates.shape(&shapes, effect))?;
+        let signatures =
+            signatures(&reference, &changed, &|effect| self.candidates.shape(&shapes, effect)).ok()?;
         let is_kept = |id: &usize| !others.iter().any(|effect| self.design.columns[*id].is_of(effect));
         let kept: Vec<usize> = (0..self.design.columns.len()).filter(is_kept).collect();
         let columns = kept.iter().map(|id| self.design.columns[*id]).chain(changed).collect();
-        let design = self.design.extended(&kept, columns, &means);
+        let design = self.design.extended(&kept, columns, &signatures);
         let weighing = Weighing::new(self.scene, self.weighing.given.clone());
         Some(Self::of(self.scene, self.candidates, self.scan.clone(), fit, design, weighing, shapes))
     }
@@ -240,23 +246,28 @@ impl<'s> Linearisation<'s> {
         start: &Noise,
         anew: &[SensorKind],
         steps: &[f64],
-    ) -> Option<Scored> {
+    ) -> Result<Scored, DiagnosisError> {
         let sifted = self.screen(set, start, anew, steps)?;
         self.scored_jointly(sifted, &self.offsets(start))
     }
 
     /// Evidence of a sifted set; as it was sifted where no rig guides the sensor, or none that would show its offsets.
-    pub fn scored_jointly(&self, sifted: Screened, offsets: &Option<SharedOffsets>) -> Option<Scored> {
+    pub fn scored_jointly(
+        &self,
+        sifted: Screened,
+        offsets: &Option<SharedOffsets>,
+    ) -> Result<Scored, DiagnosisError> {
         let Screened { set, noise, value: sifted } = sifted;
         let Some(offsets) = offsets else {
-            return Some(Scored { set, noise, log_evidence: sifted, sifted });
+            return Ok(Scored { set, noise, log_evidence: sifted, sifted });
         };
         let fitted = self.fitted(&set);
         let (baseline, groups) = (self.baseline.len(), self.groups(&set, &fitted));
-        let value = |normal: &Normal| log_evidence(normal, &noise, baseline, &groups);
-        let likeliest = offsets.likeliest(self.scene, &self.design, &noise, &fitted, &value)?;
+        let value = |normal: &Normal| log_evidence(normal, &noise, baseline, &groups).ok();
+        let likeliest = offsets.likeliest(self.scene, &self.design, &noise, &fitted, &value);
+        let likeliest = likeliest.ok_or(DiagnosisError::JointScore { effects: set.len() })?;
         let neg_log_prior: f64 = set.iter().map(|effect| self.neg_log_prior(effect)).sum();
-        Some(Scored { log_evidence: likeliest - neg_log_prior, set, noise, sifted })
+        Ok(Scored { log_evidence: likeliest - neg_log_prior, set, noise, sifted })
     }
 
     /// The same axis by axis.
@@ -266,7 +277,7 @@ impl<'s> Linearisation<'s> {
         start: &Noise,
         anew: &[SensorKind],
         steps: &[f64],
-    ) -> Option<Screened> {
+    ) -> Result<Screened, DiagnosisError> {
         let fitted = self.fitted(set);
         let mut noise = start.clone();
         let is_new = |column: &usize| !fitted.contains(column);
@@ -282,7 +293,7 @@ impl<'s> Linearisation<'s> {
         let normal = noise.normal(&products.picked(None, &every[..fitted.len()]), fitted.len());
         let value = log_evidence(&normal, &noise, self.baseline.len(), &self.groups(set, &fitted))?
             - set.iter().map(|effect| self.neg_log_prior(effect)).sum::<f64>();
-        Some(Screened { set: set.to_vec(), noise, value })
+        Ok(Screened { set: set.to_vec(), noise, value })
     }
 
     /// Places of each effect's columns among the fitted.
@@ -301,7 +312,7 @@ impl<'s> Linearisation<'s> {
         }
         let at = self.candidates.effects.iter().position(|other| *other == effect);
         let spread = at.map_or(0.0, |at| self.shapes[at].spread);
-        let shapes = (nonlinear::choices(effect, self.scene.duration()) as f64).ln();
+        let shapes = (nonlinear::choices(effect, self.scene) as f64).ln();
         (self.candidates.effects.len() as f64).ln() + (shapes - spread).max(0.0)
     }
 
@@ -329,11 +340,11 @@ impl<'s> Linearisation<'s> {
     }
 
     /// Scores of all columns but the baseline's, with the baseline projected out, and those columns.
-    pub fn projected(&self, noise: &Noise) -> Arc<Option<(Projected, Vec<usize>)>> {
+    pub fn projected(&self, noise: &Noise) -> Arc<Result<(Projected, Vec<usize>), DiagnosisError>> {
         self.projected.get(noise.clone(), || {
             let every = 0..self.design.columns.len();
             let others: Vec<usize> = every.filter(|id| !self.baseline.contains(id)).collect();
-            Some((Projected::new(&self.normal(noise), &self.baseline, &others)?, others))
+            Ok((Projected::new(&self.normal(noise), &self.baseline, &others)?, others))
         })
     }
 
@@ -342,7 +353,7 @@ impl<'s> Linearisation<'s> {
         &self,
         set: &[&'static Effect],
         noise: &Noise,
-    ) -> Option<(f64, Vec<(f64, &'static Effect)>)> {
+    ) -> Result<(f64, Vec<(f64, &'static Effect)>), DiagnosisError> {
         // Two of a class explain each other's noise and not the gap.
         let is_new = |effect: &&'static Effect| !set.iter().any(|own| class(&own.id) == class(&effect.id));
         let others: Vec<[&'static Effect; 1]> =
@@ -351,7 +362,7 @@ impl<'s> Linearisation<'s> {
         let mut ranked: Vec<(f64, &'static Effect)> =
             values.into_iter().zip(others).map(|(value, [effect])| (value, effect)).collect();
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        Some((own, ranked))
+        Ok((own, ranked))
     }
 
     /// ln BF of a set, and of the set with each of `additions` added.
@@ -360,9 +371,9 @@ impl<'s> Linearisation<'s> {
         set: &[&'static Effect],
         additions: &[[&'static Effect; N]],
         noise: &Noise,
-    ) -> Option<(f64, Vec<f64>)> {
+    ) -> Result<(f64, Vec<f64>), DiagnosisError> {
         let projected = self.projected(noise);
-        let (projected, others) = projected.as_ref().as_ref()?;
+        let (projected, others) = projected.as_ref().as_ref().map_err(Clone::clone)?;
         let places = |effect: &&'static Effect| -> Vec<usize> {
             (0..others.len()).filter(|at| self.design.columns[others[*at]].is_of(effect)).collect()
         };
@@ -374,7 +385,7 @@ impl<'s> Linearisation<'s> {
         };
         let neg_log_prior =
             |more: &[&'static Effect]| more.iter().map(|effect| self.neg_log_prior(effect)).sum::<f64>();
-        Some((value(&[]), additions.par_iter().map(|more| value(more) - neg_log_prior(more)).collect()))
+        Ok((value(&[]), additions.par_iter().map(|more| value(more) - neg_log_prior(more)).collect()))
     }
 }
 

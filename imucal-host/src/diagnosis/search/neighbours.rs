@@ -8,22 +8,14 @@ use super::{
     refit::Fit,
 };
 use crate::{
-    diagnosis::mixed_model::noise::{NEAR, Noise},
+    diagnosis::{
+        error::DiagnosisError,
+        mixed_model::noise::{NEAR, Noise},
+        settings::SearchSettings,
+    },
     effect::{Effect, class::class},
     recording::SensorKind,
 };
-
-/// Sets judged with a noise of their own at each move: the likeliest, and for each sensor those that a quieter noise
-/// would have.
-const JUDGED: (usize, usize) = (8, 4);
-/// Of those, the likeliest, which are judged with all sensors together.
-const TOGETHER: usize = 3;
-/// What falls behind the set that is to be improved by this, axis by axis, is not judged any further.
-const FAR: f64 = 25.0;
-/// Effects replaced by the likeliest others.
-const REPLACED: usize = 5;
-/// Of the effects that a quieter noise would have on a sensor, those that are tried in pairs.
-const PAIRED: usize = 8;
 
 type Set = Vec<&'static Effect>;
 /// A set, and the sensors whose noise it may change.
@@ -31,7 +23,11 @@ type Reaching = (Set, Vec<SensorKind>);
 
 impl Linearisation<'_> {
     /// The best set with one effect more, judged with its own noise; of `among`.
-    pub fn added(&self, from: &Scored, among: &dyn Fn(&'static Effect) -> bool) -> Option<Option<Scored>> {
+    pub fn added(
+        &self,
+        from: &Scored,
+        among: &dyn Fn(&'static Effect) -> bool,
+    ) -> Result<Option<Scored>, DiagnosisError> {
         let (own, ranked) = self.ranked(&from.set, &from.noise)?;
         let likely = |own: f64, ranked: Vec<(f64, &'static Effect)>| -> Set {
             ranked
@@ -40,12 +36,14 @@ impl Linearisation<'_> {
                 .map(|(_, e)| e)
                 .collect()
         };
-        let mut shortlist: Set = likely(own, ranked).into_iter().take(JUDGED.0).collect();
+        let mut shortlist: Set = likely(own, ranked).into_iter().take(self.settings().screened).collect();
         // Less noise than is true makes evidence, never takes it; most where the noise is furthest from true.
         let (own, ranked) = self.ranked(&from.set, &from.noise.quieter())?;
         let quiet = likely(own, ranked);
         for kind in &self.scene.kinds {
-            for effect in quiet.iter().filter(|effect| self.reaches(effect, *kind)).take(JUDGED.1) {
+            for effect in
+                quiet.iter().filter(|effect| self.reaches(effect, *kind)).take(self.settings().screened_quiet)
+            {
                 if !is_among(&shortlist, effect) {
                     shortlist.push(effect);
                 }
@@ -56,23 +54,28 @@ impl Linearisation<'_> {
             set.push(effect);
             (set, self.scene.reach(effect).to_vec())
         });
-        Some(self.best_of(sets.collect(), from))
+        Ok(self.best_of(sets.collect(), from))
     }
 
     /// The best set with two effects of one sensor more. Each alone may leave the other in the drift, and so gain nothing.
-    pub fn paired(&self, from: &Scored) -> Option<Option<Scored>> {
+    pub fn paired(&self, from: &Scored) -> Result<Option<Scored>, DiagnosisError> {
         let mut sets = Vec::new();
         for kind in &self.scene.kinds {
             sets.extend(self.pairs(&from.set, *kind, &from.noise.quieter())?);
         }
-        Some(self.best_of(sets, from))
+        Ok(self.best_of(sets, from))
     }
 
     /// A set with the likeliest pairs of effects that reach a sensor.
-    fn pairs(&self, set: &[&'static Effect], kind: SensorKind, noise: &Noise) -> Option<Vec<Reaching>> {
+    fn pairs(
+        &self,
+        set: &[&'static Effect],
+        kind: SensorKind,
+        noise: &Noise,
+    ) -> Result<Vec<Reaching>, DiagnosisError> {
         let (_, ranked) = self.ranked(set, noise)?;
         let likely = ranked.into_iter().map(|(_, effect)| effect).filter(|effect| self.reaches(effect, kind));
-        let likely: Set = likely.take(PAIRED).collect();
+        let likely: Set = likely.take(self.settings().paired).collect();
         let pairs: Vec<[&'static Effect; 2]> = (0..likely.len())
             .flat_map(|i| (0..i).map(move |j| (j, i)))
             .map(|(i, j)| [likely[i], likely[j]])
@@ -85,11 +88,11 @@ impl Linearisation<'_> {
             let reach = either(self.scene.reach(pair[0]), self.scene.reach(pair[1]));
             (set.iter().copied().chain(pair).collect(), reach)
         };
-        Some(valued.into_iter().take(JUDGED.1).map(with).collect())
+        Ok(valued.into_iter().take(self.settings().screened_quiet).map(with).collect())
     }
 
     /// The best set with one effect replaced or taken out.
-    pub fn changed(&self, from: &Scored) -> Option<Option<Scored>> {
+    pub fn changed(&self, from: &Scored) -> Result<Option<Scored>, DiagnosisError> {
         let mut sets = Vec::new();
         for at in 0..from.set.len() {
             let (fewer, taken) = without(&from.set, at);
@@ -100,12 +103,12 @@ impl Linearisation<'_> {
             }
             sets.push((fewer, taken.sensors.to_vec()));
         }
-        Some(self.best_of(sets, from))
+        Ok(self.best_of(sets, from))
     }
 
     /// The best set with one effect replaced by another, or all those of a sensor by one or two, in the shapes that are
     /// best where the first ones are not: together they may be what two others do. With the problem of these shapes.
-    pub fn changed_anew(&self, fit: &Fit, from: &Scored) -> Option<Option<(Self, Scored)>> {
+    pub fn changed_anew(&self, fit: &Fit, from: &Scored) -> Result<Option<(Self, Scored)>, DiagnosisError> {
         let mut best: Option<(Self, Scored)> = None;
         let mut better = |linear: Self, sets: Vec<Reaching>| {
             let found = linear.best_of(sets, from);
@@ -138,7 +141,7 @@ impl Linearisation<'_> {
                 better(linear, sets);
             }
         }
-        Some(best)
+        Ok(best)
     }
 
     /// Sets with one effect more, of `among`, that take the place of what reached some sensors.
@@ -148,28 +151,32 @@ impl Linearisation<'_> {
         reach: &[SensorKind],
         among: &dyn Fn(&'static Effect) -> bool,
         noise: &Noise,
-    ) -> Option<Vec<Reaching>> {
+    ) -> Result<Vec<Reaching>, DiagnosisError> {
         let (_, ranked) = self.ranked(fewer, noise)?;
         let others = ranked.into_iter().map(|(_, effect)| effect).filter(|effect| among(effect));
         let with = |effect: &'static Effect| {
             let set = fewer.iter().copied().chain([effect]).collect();
             (set, either(reach, self.scene.reach(effect)))
         };
-        Some(others.take(REPLACED).map(with).collect())
+        Ok(others.take(self.settings().replaced).map(with).collect())
     }
 
     /// The best of some sets that may do better than another, the noise of the sensors beside each estimated anew.
     fn best_of(&self, sets: Vec<Reaching>, from: &Scored) -> Option<Scored> {
         let sift = |(set, anew): &Reaching| self.screen(set, &from.noise, anew, &NEAR);
-        let sifted: Vec<Option<Screened>> = sets.par_iter().map(sift).collect();
-        let is_near = |sifted: &Screened| sifted.value > from.sifted - FAR;
+        let sifted: Vec<Result<Screened, _>> = sets.par_iter().map(sift).collect();
+        let is_near = |sifted: &Screened| sifted.value > from.sifted - self.settings().behind;
         let mut sifted: Vec<Screened> = sifted.into_iter().flatten().filter(is_near).collect();
         sifted.sort_by(|a, b| b.value.total_cmp(&a.value));
-        sifted.truncate(TOGETHER);
+        sifted.truncate(self.settings().scored);
         let offsets = self.offsets(&from.noise);
         let together = |sifted| self.scored_jointly(sifted, &offsets);
-        let judged: Vec<Option<Scored>> = sifted.into_par_iter().map(together).collect();
+        let judged: Vec<Result<Scored, _>> = sifted.into_par_iter().map(together).collect();
         judged.into_iter().flatten().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
+    }
+
+    fn settings(&self) -> &SearchSettings {
+        &self.scene.settings.search
     }
 
     fn reaches(&self, effect: &Effect, kind: SensorKind) -> bool {

@@ -2,16 +2,15 @@
 //!
 //! Gauss–Newton: the residual at full rate, its derivative from the nodes. Steps that make it worse are halved.
 
-use std::sync::Arc;
-
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::{
     diagnosis::{
+        error::DiagnosisError,
         library::candidates,
         mixed_model::{
-            design::{Column, Design},
+            design::{Column, Design, Signature},
             noise::{Noise, Weighing},
         },
         residual::{base_run::Reference, block::Means, forward_model::ForwardModel},
@@ -65,15 +64,20 @@ pub fn signatures(
     reference: &Reference<'_>,
     columns: &[Column],
     neutral: &(dyn Fn(&'static Effect) -> Vec<f64> + Sync),
-) -> Option<Vec<Arc<Means>>> {
-    columns
-        .par_iter()
-        .map(|column| reference.known_signature(column.effect, column.parameter, &neutral(column.effect)))
-        .collect()
+) -> Result<Vec<Signature>, DiagnosisError> {
+    let of = |column: &Column| {
+        let means = reference.signature(column.effect, column.parameter, &neutral(column.effect))?;
+        Ok(Signature::from(means))
+    };
+    columns.par_iter().map(of).collect()
 }
 
 /// Fits the amplitudes of all doses. `None` where the simulator fails.
-pub fn refit(scene: &ForwardModel<'_>, doses: Vec<Dose>, noise: Option<&Noise>) -> Option<Fit> {
+pub fn refit(
+    scene: &ForwardModel<'_>,
+    doses: Vec<Dose>,
+    noise: Option<&Noise>,
+) -> Result<Fit, DiagnosisError> {
     let columns = free(&doses);
     let residual = scene.residual(&doses)?;
     let mut fit = Fit { doses, residual };
@@ -99,7 +103,8 @@ pub fn refit(scene: &ForwardModel<'_>, doses: Vec<Dose>, noise: Option<&Noise>) 
         let all: Vec<usize> = (0..columns.len()).collect();
         let normal = design.normal(&precisions, &all);
         let (precision, at) = prior(&fit.doses, &columns);
-        let covariance = (&normal.information + DMatrix::from_diagonal(&precision)).cholesky()?.inverse();
+        let covariance = (&normal.information + DMatrix::from_diagonal(&precision)).cholesky();
+        let covariance = covariance.ok_or(DiagnosisError::Fit { columns: columns.len() })?.inverse();
         let step = &covariance * (&normal.score - precision.component_mul(&at));
         let variances = covariance.diagonal();
         let moved = step.iter().zip(variances.iter()).map(|(s, v)| s.abs() / v.sqrt());
@@ -123,14 +128,14 @@ pub fn refit(scene: &ForwardModel<'_>, doses: Vec<Dose>, noise: Option<&Noise>) 
                 break None;
             }
         };
-        let Some(better) = better else { return Some(fit) };
+        let Some(better) = better else { return Ok(fit) };
         fit = better;
         if largest < SETTLED {
             break;
         }
         near = (largest < NEAR).then_some((weighing, design));
     }
-    Some(fit)
+    Ok(fit)
 }
 
 /// Precision of each column's prior, and where the column stands, in usual sizes. A term of the baseline may be of any

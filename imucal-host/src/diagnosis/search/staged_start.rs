@@ -8,6 +8,7 @@
 use super::refit::{Fit, refit};
 use crate::{
     diagnosis::{
+        error::DiagnosisError,
         mixed_model::noise::{Noise, Weighing},
         residual::{base_run::Reference, forward_model::ForwardModel},
     },
@@ -24,7 +25,7 @@ const ROUNDS: usize = 2;
 const MUTED: f64 = 1e6;
 
 /// Fits the baseline to the sensors in turn. `None` where the simulator fails.
-pub fn start(scene: &ForwardModel<'_>, mut doses: Vec<Dose>) -> Option<Fit> {
+pub fn start(scene: &ForwardModel<'_>, mut doses: Vec<Dose>) -> Result<Fit, DiagnosisError> {
     for heard in STAGES {
         let is_shown = |effect: &Effect| match effect.part {
             Part::ClockTerm => true,
@@ -42,7 +43,7 @@ pub fn start(scene: &ForwardModel<'_>, mut doses: Vec<Dose>) -> Option<Fit> {
         doses = asked;
         doses.extend(rest);
     }
-    Some(Fit { residual: scene.residual(&doses)?, doses })
+    Ok(Fit { residual: scene.residual(&doses)?, doses })
 }
 
 /// A noise that lets only these sensors be heard.

@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     diagnosis::{
+        error::DiagnosisError,
         library::{candidates::Candidates, nonlinear, nonlinear::Backdrop},
         mixed_model::noise::{FAR, Noise},
         residual::{base_run::Reference, forward_model::ForwardModel},
@@ -20,17 +21,6 @@ use crate::{
     recording::SensorKind,
     simulator::Dose,
 };
-
-/// Most effects in a set; where no rig guides the sensor, the latter: a hand and a reference add gaps of their own.
-const MOST: (usize, usize) = (3, 5);
-/// The first effect must raise the evidence by this, beyond its share of the prior, and each further one by the latter:
-/// where one thing is wrong, another is less of a surprise. How many false alarms that makes is told by `imucal blind`.
-const GAIN: (f64, f64) = (0.5, 0.0);
-/// A set of as many effects must raise it by this; one of fewer need not, since what the data would rather be without is
-/// not asserted.
-const CHANGE: f64 = 0.5;
-/// Fits of the baseline, each with the noise that the last one left, where no rig guides the sensor.
-const SETTLING: usize = 2;
 
 /// A search that has come to its end.
 pub struct Solution<'s> {
@@ -49,30 +39,28 @@ pub fn search<'s>(
     scene: &'s ForwardModel<'s>,
     candidates: &'s Candidates,
     trace: &dyn Fn(&str),
-) -> Option<Solution<'s>> {
+) -> Result<Solution<'s>, DiagnosisError> {
     let doses: Vec<Dose> = candidates
         .baseline
         .iter()
         .map(|effect| Dose { effect, values: vec![0.0; effect.parameters.len()] })
         .collect();
-    let mut fit = match scene.swings {
-        Some(_) => refit(scene, doses, None)?,
-        None => staged_start::start(scene, doses)?,
-    };
+    let by = &scene.settings.search;
+    let mut fit =
+        if by.staged_start { staged_start::start(scene, doses)? } else { refit(scene, doses, None)? };
     trace("baseline fitted");
     let mut linear = Linearisation::fitted_alone(scene, candidates, &fit)?;
     let white = linear.weighing.white(&fit.residual);
     let mut none = linear.judge(&[], &white, &SensorKind::ALL, &FAR)?;
     trace(&format!("none: {:.1} {:?}", none.log_evidence, none.noise));
-    // Where no rig guides the sensor, the first noise holds much of the misfit that the first fit began with.
-    for _ in 0..if scene.swings.is_none() { SETTLING } else { 0 } {
+    // The first noise may hold much of the misfit that the first fit began with.
+    for _ in 0..by.settling {
         fit = refit(scene, fit.doses, Some(&none.noise))?;
         linear = Linearisation::fitted_alone(scene, candidates, &fit)?;
         let start = with_white(&none.noise, &linear.weighing.white(&fit.residual));
         none = linear.judge(&[], &start, &SensorKind::ALL, &FAR)?;
         trace(&format!("none again: {:.1} {:?}", none.log_evidence, none.noise));
     }
-    let most = if scene.swings.is_some() { MOST.0 } else { MOST.1 };
     linear = Linearisation::new(scene, candidates, &fit, &none.noise, None)?;
     trace("shapes");
     let mut at = Solution { best: none.clone(), none, fit, linear };
@@ -80,7 +68,7 @@ pub fn search<'s>(
     let mut seen = vec![Vec::new()];
     loop {
         at = at.settled()?;
-        let Some(Step { to, found_in }) = improved(&at, most)? else { break };
+        let Some(Step { to, found_in }) = improved(&at)? else { break };
         // Two sets may each be better than the other with the noise that the other leaves; a set may be better once in
         // shapes of another place.
         let visits = if found_in.is_some() { 2 } else { 1 };
@@ -103,17 +91,17 @@ pub fn search<'s>(
         }
     }
     // What a move promises by linear algebra the fit through the simulator need not keep.
-    Some(likeliest.filter(|most| most.is_likelier(&at)).unwrap_or(at))
+    Ok(likeliest.filter(|most| most.is_likelier(&at)).unwrap_or(at))
 }
 
 impl<'s> Solution<'s> {
     /// With the noise that suits its set.
-    fn settled(mut self) -> Option<Self> {
+    fn settled(mut self) -> Result<Self, DiagnosisError> {
         self.best = self.linear.judge(&self.best.set, &self.best.noise, &SensorKind::ALL, &FAR)?;
         if self.best.set.is_empty() {
             self.none = self.best.clone();
         }
-        Some(self)
+        Ok(self)
     }
 
     fn is_likelier(&self, other: &Self) -> bool {
@@ -122,7 +110,7 @@ impl<'s> Solution<'s> {
 
     /// Fits a set, found in a problem that may have other shapes than the own, through the simulator, and looks at all
     /// candidates from there.
-    fn advanced(&self, found_in: &Linearisation<'s>, mut next: Scored) -> Option<Self> {
+    fn advanced(&self, found_in: &Linearisation<'s>, mut next: Scored) -> Result<Self, DiagnosisError> {
         let Linearisation { scene, candidates, .. } = *found_in;
         // An effect whose shape that problem has changed begins anew.
         let kept = |effect: &'static Effect| {
@@ -141,7 +129,7 @@ impl<'s> Solution<'s> {
         let fit = refit(scene, doses, Some(&next.noise))?;
         next.noise = with_white(&next.noise, &found_in.weighing.white(&fit.residual));
         let linear = Linearisation::new(scene, candidates, &fit, &next.noise, Some(&self.linear))?;
-        Some(Self { best: next, none: self.none.clone(), fit, linear })
+        Ok(Self { best: next, none: self.none.clone(), fit, linear })
     }
 }
 
@@ -152,16 +140,16 @@ fn refined(
     doses: &[Dose],
     rest: &[&'static Effect],
     noise: &Noise,
-) -> Option<Vec<f64>> {
+) -> Result<Vec<f64>, DiagnosisError> {
     let (scene, values) = (linear.scene, linear.shape_of(effect));
     if !effect.is_shaped() {
-        return Some(values);
+        return Ok(values);
     }
     let fitted = linear.fitted(rest);
     let precisions = linear.precisions(noise);
     let backdrop = Backdrop::new(scene, &linear.design, &fitted, &precisions);
     let reference = Reference::new(scene, doses.to_vec(), &scene.fine)?;
-    Some(nonlinear::refine(effect, &values, &reference, &backdrop).map_or(values, |(refined, _)| refined))
+    Ok(nonlinear::refine(effect, &values, &reference, &backdrop).map_or(values, |(refined, _)| refined))
 }
 
 /// A likelier set, and the problem in which it was found where that is not the one it was sought from.
@@ -177,21 +165,23 @@ impl Step<'_> {
 }
 
 /// The cheapest step that gains.
-fn improved<'s>(at: &Solution<'s>, most: usize) -> Option<Option<Step<'s>>> {
+fn improved<'s>(at: &Solution<'s>) -> Result<Option<Step<'s>>, DiagnosisError> {
     let Solution { linear, fit, best, .. } = at;
     let gains = |judged: &Scored, least: f64| judged.log_evidence > best.log_evidence + least;
-    let gain = if best.set.is_empty() { GAIN.0 } else { GAIN.1 };
-    let change = |judged: &Scored| if judged.set.len() < best.set.len() { 0.0 } else { CHANGE };
-    let room = most.saturating_sub(best.set.len());
+    let by = &linear.scene.settings.search;
+    let gain = if best.set.is_empty() { by.first_gain } else { by.further_gain };
+    // What the data would rather be without is not asserted: fewer effects need not gain.
+    let change = |judged: &Scored| if judged.set.len() < best.set.len() { 0.0 } else { by.change_gain };
+    let room = by.most.saturating_sub(best.set.len());
     if room > 0
         && let Some(next) = linear.added(best, &|_| true)?.filter(|next| gains(next, gain))
     {
-        return Some(Some(Step::to(next)));
+        return Ok(Some(Step::to(next)));
     }
     if !best.set.is_empty()
         && let Some(next) = linear.changed(best)?.filter(|next| gains(next, change(next)))
     {
-        return Some(Some(Step::to(next)));
+        return Ok(Some(Step::to(next)));
     }
     // A step or a sway that stands in the drift is not where that drift would have it.
     let quiet = if room > 0 { linear.reshaped(fit, &best.noise.quieter(), &[]) } else { None };
@@ -203,16 +193,16 @@ fn improved<'s>(at: &Solution<'s>, most: usize) -> Option<Option<Step<'s>>> {
         None => None,
     };
     if let Some(to) = from_quiet {
-        return Some(Some(Step { to, found_in: quiet }));
+        return Ok(Some(Step { to, found_in: quiet }));
     }
     if room > 1
         && let paired = quiet.as_ref().unwrap_or(linear).paired(best)?
-        && let Some(to) = paired.filter(|next| gains(next, gain + GAIN.1))
+        && let Some(to) = paired.filter(|next| gains(next, gain + by.further_gain))
     {
-        return Some(Some(Step { to, found_in: quiet }));
+        return Ok(Some(Step { to, found_in: quiet }));
     }
-    let anew = linear.changed_anew(fit, best)?.filter(|(_, next)| gains(next, CHANGE));
-    Some(anew.map(|(anew, to)| Step { to, found_in: Some(anew) }))
+    let anew = linear.changed_anew(fit, best)?.filter(|(_, next)| gains(next, by.change_gain));
+    Ok(anew.map(|(anew, to)| Step { to, found_in: Some(anew) }))
 }
 
 /// A set, whatever the order of its effects.

@@ -11,18 +11,17 @@ use super::{
 };
 use crate::{
     diagnosis::{
+        error::DiagnosisError,
         finding::{self, Cause, Diagnosis, Place, Verdict},
         location::{covariate::Covariate, covariates, score_test, score_test::Following},
-        reference::movement,
+        reference::{model::Model, movement},
         screening::preparation::Preparation,
-        search::stepwise::Solution,
+        search::{linearisation::Linearisation, stepwise::Solution},
+        settings::{LocationSettings, VerdictSettings},
     },
     effect::Effect,
     recording::Recording,
 };
-
-/// A driver is followed when noise alone would do as much less often than this, all tests counted.
-const FOLLOWED: f64 = 0.01;
 
 /// A diagnosis that could not be made, and why.
 pub fn untestable(recording: &Recording, why: String) -> Diagnosis {
@@ -55,96 +54,145 @@ struct Tested {
 }
 
 impl Tested {
-    fn of(Solution { linear, best, .. }: &Solution<'_>, progress: &dyn Fn(&str)) -> Option<Self> {
+    fn of(
+        Solution { linear, best, .. }: &Solution<'_>,
+        progress: &dyn Fn(&str),
+    ) -> Result<Self, DiagnosisError> {
         let drivers = covariates::drivers(linear.scene, &linear.weighing.given);
         let after = score_test::score_tests_refitted(linear, &best.set, &best.noise, &drivers)?;
         progress("drivers tested");
-        let remainder = most_followed(&after).map_or(0.0, |following| following.size);
+        let remainder =
+            most_followed(&after, &linear.scene.settings.location).map_or(0.0, |following| following.size);
         let closed = shares::closed(linear, &best.set, &best.noise, remainder)?;
         progress("held out");
         let standing = |cause: &&'static Effect| credible::standing(linear, best, cause);
-        let standings = best.set.par_iter().map(standing).collect::<Option<_>>()?;
+        let standings = best.set.par_iter().map(standing).collect::<Result<_, _>>()?;
         progress("alternatives judged");
-        Some(Self { drivers, after, closed, standings })
+        Ok(Self { drivers, after, closed, standings })
     }
 
-    fn left(&self) -> Option<&Following> {
-        most_followed(&self.after)
+    fn left(&self, by: &LocationSettings) -> Option<&Following> {
+        most_followed(&self.after, by)
     }
 }
 
-/// The diagnosis of a recording; `None` where a matrix of the fit is singular.
+/// The causes that are asserted, and what is said of the others.
+struct Asserted {
+    causes: Vec<Cause>,
+    credible_set: Vec<String>,
+    remarks: Vec<String>,
+    /// Held-out data have refuted a cause of the search.
+    refuted: bool,
+}
+
+impl Asserted {
+    fn of(explained: &Solution<'_>, tested: &Tested) -> Result<Self, DiagnosisError> {
+        let mut causes = causes(explained, tested)?;
+        let remarks = refuted(&mut causes, explained)?;
+        causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        let mut credible_set = credible_set(explained, tested)?;
+        let refuted = !remarks.is_empty();
+        if refuted {
+            credible_set.retain(|id| {
+                causes.iter().any(|cause| cause.effect == *id || cause.equivalents.contains(id))
+            });
+        }
+        Ok(Self { causes, credible_set, remarks, refuted })
+    }
+
+    /// Takes out the causes that are no more than errors of the given model.
+    fn take_out_errors(&mut self, model: &Model, by: &VerdictSettings) {
+        let is_within = |cause: &mut Cause| model_error::errs_as_much(model, cause, by.detectable);
+        let credible_set = &mut self.credible_set;
+        let remark = |cause: Cause| {
+            credible_set.retain(|id| *id != cause.effect && !cause.equivalents.contains(id));
+            format!("not asserted: {} is within the model's own standard errors", cause.effect)
+        };
+        self.remarks.extend(self.causes.extract_if(.., is_within).map(remark));
+    }
+
+    /// Puts a cause before all others.
+    fn put_first(&mut self, cause: Cause) {
+        self.credible_set.insert(0, cause.effect.clone());
+        self.causes.insert(0, cause);
+    }
+
+    /// A part of the diagnosis, or a remark on why it is left out.
+    fn part<T: Default>(&mut self, name: &str, part: Result<T, DiagnosisError>) -> T {
+        part.unwrap_or_else(|why| {
+            self.remarks.push(format!("{name} is left out: {why}"));
+            T::default()
+        })
+    }
+}
+
+/// The diagnosis of a recording.
+///
+/// # Errors
+///
+/// The stage that failed; a table or a next experiment that cannot be computed is left out with a remark.
 pub fn answer(
     recording: &Recording,
     preparation: &Preparation,
     explained: &Solution<'_>,
     progress: &dyn Fn(&str),
-) -> Option<Diagnosis> {
+) -> Result<Diagnosis, DiagnosisError> {
     let tested = Tested::of(explained, progress)?;
-    let mut causes = causes(explained, &tested)?;
-    let mut remarks = refuted(&mut causes, explained)?;
-    causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    let settings = explained.linear.scene.settings;
+    let left = tested.left(&settings.location);
+    let mut asserted = Asserted::of(explained, &tested)?;
+    let found = asserted.causes.clone();
     let apart = reference_clock::candidates(explained.linear.candidates);
-    let remainder = tested.left().map_or(0.0, |left| left.size);
+    let remainder = left.map_or(0.0, |left| left.size);
     let clock = match &apart {
         Some(apart) => reference_clock::clock(explained, apart, preparation.moved, remainder)?,
         None => None,
     };
     let closed = clock.as_ref().map_or(&tested.closed, |clock| &clock.closed);
-    let (mut gap, places) = located(explained, &tested, clock.as_ref(), causes.is_empty())?;
-    let mut credible_set = credible_set(explained, &tested)?;
-    let is_refuted = !remarks.is_empty();
-    if is_refuted {
-        credible_set
-            .retain(|id| causes.iter().any(|cause| cause.effect == *id || cause.equivalents.contains(id)));
-    }
-    let found = causes.clone();
-    remarks.extend(within_model(&mut causes, &mut credible_set, preparation));
+    let places = located(explained, &tested, clock.as_ref(), found.is_empty())?;
+    let mut gap = asserted.part("the table of the gap", table(explained, clock.as_ref()));
+    asserted.take_out_errors(&preparation.model, &settings.verdict);
     let evidence = Evidence {
         causes: &found,
         clock: clock.as_ref().map(|clock| &clock.cause),
         closed: if found.is_empty() { closed } else { &tested.closed },
-        left: tested.left(),
-        refuted: is_refuted,
-        within_model: causes.len() < found.len() && causes.is_empty() && clock.is_none(),
+        left,
+        refuted: asserted.refuted,
+        within_model: !found.is_empty() && asserted.causes.is_empty() && clock.is_none(),
         faulty: !preparation.findings.is_empty(),
     };
     let is_closed = (!found.is_empty() || clock.is_some()) && !evidence.within_model;
     let mut total = is_closed.then_some(closed.total);
     if let Some(clock) = &clock {
-        put_first(clock, &mut causes, &mut credible_set);
+        share_with(clock, &mut asserted.causes);
+        asserted.put_first(clock.cause.clone());
     }
-    for finding in preparation.findings.iter().rev() {
-        causes.insert(0, fault::cause(finding));
-        credible_set.insert(0, finding.effect.id.clone());
-    }
+    preparation.findings.iter().rev().for_each(|finding| asserted.put_first(fault::cause(finding)));
     let faults = fault::faults(recording, &preparation.findings, explained);
-    fault::add(&faults, closed.explainable, &mut causes, &mut gap, &mut total);
-    remarks.extend(preparation.remarks.iter().cloned());
-    // Neither is worth the diagnosis where it cannot be computed.
-    let next_experiment = next_experiment(recording, explained, &tested).unwrap_or_default();
-    let (absent, not_testable) =
-        detectability::testable(&explained.linear, &explained.best.set, &explained.best.noise)
-            .unwrap_or_default();
-    Some(Diagnosis {
-        verdict: evidence.verdict(),
-        remarks,
+    fault::add(&faults, closed.explainable, &mut asserted.causes, &mut gap, &mut total);
+    asserted.remarks.extend(preparation.remarks.iter().cloned());
+    let (linear, best) = (&explained.linear, &explained.best);
+    let testable = detectability::testable(linear, &best.set, &best.noise);
+    let (absent, not_testable) = asserted.part("what is absent or not testable", testable);
+    Ok(Diagnosis {
+        verdict: evidence.verdict(&settings.verdict),
+        remarks: asserted.remarks,
         gap,
         places,
-        causes,
-        credible_set,
+        causes: asserted.causes,
+        credible_set: asserted.credible_set,
         gap_closed_total: total.map(|share| share.value),
         gap_closed_total_ci95: total.map(|share| share.interval),
         held_out: true,
         absent,
         not_testable,
-        next_experiment,
+        next_experiment: next_experiment(recording, explained, &tested).unwrap_or_default(),
         ..untestable(recording, String::new())
     })
 }
 
 /// The effects of the best set with their estimates and what each closes of the gap.
-fn causes(explained: &Solution<'_>, tested: &Tested) -> Option<Vec<Cause>> {
+fn causes(explained: &Solution<'_>, tested: &Tested) -> Result<Vec<Cause>, DiagnosisError> {
     let set = explained.best.set.iter().zip(estimates::amounts(explained)?);
     let mut causes = Vec::new();
     for (((effect, amounts), standing), share) in set.zip(&tested.standings).zip(&tested.closed.each) {
@@ -158,55 +206,62 @@ fn causes(explained: &Solution<'_>, tested: &Tested) -> Option<Vec<Cause>> {
             gap_closed_ci95: Some(share.interval),
         });
     }
-    Some(causes)
+    Ok(causes)
 }
 
-/// Takes out the causes that held-out data do not confirm, where no rig guides the sensor; remarks on them.
-fn refuted(causes: &mut Vec<Cause>, Solution { linear, best, .. }: &Solution<'_>) -> Option<Vec<String>> {
-    if linear.scene.swings.is_some() {
-        return Some(Vec::new());
+/// Takes out the causes that held-out data do not confirm, where these are asked; remarks on them.
+fn refuted(
+    causes: &mut Vec<Cause>,
+    Solution { linear, best, .. }: &Solution<'_>,
+) -> Result<Vec<String>, DiagnosisError> {
+    let by = &linear.scene.settings.verdict;
+    if !by.confirms_held_out {
+        return Ok(Vec::new());
     }
     let mut remarks = cross_validation::leave_out(causes, linear, &best.set, &best.noise)?;
-    remarks.extend(confounded_episode::leave_out(causes, &linear.scene.blocks));
-    Some(remarks)
+    remarks.extend(confounded_episode::leave_out(causes, &linear.scene.blocks, by.carried));
+    Ok(remarks)
 }
 
-/// Takes out the causes that are no more than errors of the given model; remarks on them.
-fn within_model(
-    causes: &mut Vec<Cause>,
-    credible_set: &mut Vec<String>,
-    preparation: &Preparation,
-) -> Vec<String> {
-    let is_within = |cause: &mut Cause| model_error::errs_as_much(&preparation.model, cause);
-    let remark = |cause: Cause| {
-        credible_set.retain(|id| *id != cause.effect && !cause.equivalents.contains(id));
-        format!("not asserted: {} is within the model's own standard errors", cause.effect)
-    };
-    causes.extract_if(.., is_within).map(remark).collect()
+/// The table of the gap.
+fn table(explained: &Solution<'_>, clock: Option<&Clock<'_>>) -> Result<Vec<finding::Gap>, DiagnosisError> {
+    let (linear, set) = seen_from(explained, clock);
+    shares::table(linear, set, &explained.best.noise)
 }
 
-/// The table of the gap, and the covariates that it depends on: before the causes are added, or where there is none, still.
+/// The covariates that the gap depends on: before the causes are added, or where there is none, still.
 fn located(
     explained: &Solution<'_>,
     tested: &Tested,
     clock: Option<&Clock<'_>>,
     none_found: bool,
-) -> Option<(Vec<finding::Gap>, Vec<Place>)> {
-    let (linear, set) = match clock {
-        Some(clock) => (&clock.linear, &clock.set),
-        None => (&explained.linear, &explained.best.set),
-    };
+) -> Result<Vec<Place>, DiagnosisError> {
+    let (linear, set) = seen_from(explained, clock);
     let noise = &explained.best.noise;
     let before = if clock.is_none() && (none_found || explained.best.set.is_empty()) {
         tested.after.clone()
     } else {
         score_test::following(linear, &[], noise, &tested.drivers)?
     };
-    Some((shares::table(linear, set, noise)?, places(&before, shares::size(linear, set, noise)?)))
+    Ok(places(&before, shares::size(linear, set, noise)?, &linear.scene.settings.location))
+}
+
+/// The problem and the set that the gap is seen from: with the offset of a clock among the effects, where it is one.
+fn seen_from<'e>(
+    explained: &'e Solution<'e>,
+    clock: Option<&'e Clock<'e>>,
+) -> (&'e Linearisation<'e>, &'e [&'static Effect]) {
+    match clock {
+        Some(clock) => (&clock.linear, &clock.set),
+        None => (&explained.linear, &explained.best.set),
+    }
 }
 
 /// Ids of the effects that the data leave possible, each once.
-fn credible_set(Solution { linear, best, .. }: &Solution<'_>, tested: &Tested) -> Option<Vec<String>> {
+fn credible_set(
+    Solution { linear, best, .. }: &Solution<'_>,
+    tested: &Tested,
+) -> Result<Vec<String>, DiagnosisError> {
     let suspects = if best.set.is_empty() { credible::suspects(linear, best)? } else { Vec::new() };
     let mut ids: Vec<String> = Vec::new();
     for effect in tested.standings.iter().flat_map(|standing| &standing.set).chain(&suspects) {
@@ -214,19 +269,17 @@ fn credible_set(Solution { linear, best, .. }: &Solution<'_>, tested: &Tested) -
             ids.push(effect.id.clone());
         }
     }
-    Some(ids)
+    Ok(ids)
 }
 
-/// Names the offset of a reference's clock first: the other causes were judged with it in the baseline, and what they
-/// close is now a share of the gap that it is a part of.
-fn put_first(clock: &Clock<'_>, causes: &mut Vec<Cause>, credible_set: &mut Vec<String>) {
-    for cause in causes.iter_mut() {
+/// The causes were judged with the clock's offset in the baseline: what they close is now a share of the gap that it is a
+/// part of.
+fn share_with(clock: &Clock<'_>, causes: &mut [Cause]) {
+    for cause in causes {
         let mut shares = clock.set.iter().zip(&clock.closed.each);
         let share = shares.find(|(effect, _)| effect.id == cause.effect).map(|(_, share)| *share);
         (cause.gap_closed, cause.gap_closed_ci95) = (share.map(|s| s.value), share.map(|s| s.interval));
     }
-    causes.insert(0, clock.cause.clone());
-    credible_set.insert(0, clock.cause.effect.clone());
 }
 
 /// What to record next to part a cause from those that could stand in its place, on a rig.
@@ -243,16 +296,16 @@ fn next_experiment(
     experiment::next(explained, axes, &pairs)
 }
 
-fn is_followed(following: &Following, tests: usize) -> bool {
-    following.p_value * tests as f64 <= FOLLOWED
+fn is_followed(following: &Following, tests: usize, by: &LocationSettings) -> bool {
+    following.p_value * tests as f64 <= by.p_value
 }
 
-fn most_followed(all: &[Following]) -> Option<&Following> {
-    all.iter().find(|following| is_followed(following, all.len()))
+fn most_followed<'f>(all: &'f [Following], by: &LocationSettings) -> Option<&'f Following> {
+    all.iter().find(|following| is_followed(following, all.len(), by))
 }
 
 /// Covariates that are followed; `explained` is the size of what the causes explain.
-fn places(following: &[Following], explained: f64) -> Vec<Place> {
+fn places(following: &[Following], explained: f64, by: &LocationSettings) -> Vec<Place> {
     let explainable = following.iter().map(|f| f.size).fold(explained.max(f64::MIN_POSITIVE), f64::max);
     let place = |f: &Following| Place {
         sensor: f.kind.prefix().to_owned(),
@@ -262,7 +315,7 @@ fn places(following: &[Following], explained: f64) -> Vec<Place> {
         detail: f.detail.clone(),
     };
     let mut places: Vec<Place> =
-        following.iter().filter(|f| is_followed(f, following.len())).map(place).collect();
+        following.iter().filter(|f| is_followed(f, following.len(), by)).map(place).collect();
     places.sort_by(|a, b| b.share.total_cmp(&a.share));
     places
 }

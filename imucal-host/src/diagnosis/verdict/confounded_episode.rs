@@ -5,11 +5,8 @@
 
 use crate::diagnosis::{finding::Cause, residual::block::Block};
 
-/// An episode begins and ends with the movement where it does so within this time of it, s.
-const NEAR: f64 = 3.0;
-
-/// Takes out of `causes` what lasts as long as the movement, and says so.
-pub fn leave_out(causes: &mut Vec<Cause>, blocks: &[Block]) -> Vec<String> {
+/// Takes out of `causes` what begins and ends within `near` of the movement, s, and says so.
+pub fn leave_out(causes: &mut Vec<Cause>, blocks: &[Block], near: f64) -> Vec<String> {
     let mut moving = blocks.iter().filter(|block| block.rest.is_none()).map(|block| block.time);
     let Some(first) = moving.next() else { return Vec::new() };
     let last = moving.next_back().unwrap_or(first);
@@ -18,7 +15,7 @@ pub fn leave_out(causes: &mut Vec<Cause>, blocks: &[Block]) -> Vec<String> {
     };
     let lasts = |cause: &mut Cause| {
         let ends = time(cause, "t_start").zip(time(cause, "t_end"));
-        ends.is_some_and(|(start, end)| (start - first).abs() < NEAR && (end - last).abs() < NEAR)
+        ends.is_some_and(|(start, end)| (start - first).abs() < near && (end - last).abs() < near)
     };
     let remark = |cause: Cause| {
         format!(
@@ -33,7 +30,7 @@ pub fn leave_out(causes: &mut Vec<Cause>, blocks: &[Block]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::{finding::Amount, residual::block::cut};
+    use crate::diagnosis::{finding::Amount, residual::block::cut, settings::Settings};
 
     fn episode(start: f64, end: Option<f64>) -> Cause {
         let amount =
@@ -53,9 +50,9 @@ mod tests {
     fn an_episode_as_long_as_the_movement_is_left_out_and_one_within_it_is_not() {
         let time: Vec<f64> = (0..10_000).map(|k| 0.01 * f64::from(k)).collect();
         let moves: Vec<bool> = time.iter().map(|t| (30.0..80.0).contains(t)).collect();
-        let blocks = cut(&time, &moves, 0.01);
+        let blocks = cut(&time, &moves, 0.01, &Settings::default().residual);
         let mut causes = vec![episode(29.0, Some(81.5)), episode(28.0, Some(60.0)), episode(30.0, None)];
-        let remarks = leave_out(&mut causes, &blocks);
+        let remarks = leave_out(&mut causes, &blocks, 3.0);
         assert_eq!((causes.len(), remarks.len()), (2, 1));
         assert!(remarks[0].contains("mag.bias_step from 30 to 80 s"), "{}", remarks[0]);
     }

@@ -4,20 +4,17 @@ use rayon::prelude::*;
 
 use crate::{
     diagnosis::{
+        error::DiagnosisError,
         mixed_model::noise::NEAR,
         search::{hypothesis::Scored, linearisation::Linearisation},
     },
     effect::Effect,
 };
 
-/// Alternatives judged with a noise of their own.
-const JUDGED: usize = 5;
 /// Alternatives further below in ln of probability are not judged.
 const FAR: f64 = 25.0;
 /// Likewise, where each has a noise of its own.
 const BEHIND: f64 = 10.0;
-/// Probability that a credible set holds.
-const CREDIBLE: f64 = 0.95;
 
 /// A cause among those that could stand in its place.
 #[derive(Clone, Debug)]
@@ -32,33 +29,41 @@ pub struct Standing {
 
 /// Effects that were not asserted where nothing was, and cannot be excluded: beside none at all, each has more than what a
 /// credible set leaves out. Likeliest first.
-pub fn suspects(linear: &Linearisation<'_>, none: &Scored) -> Option<Vec<&'static Effect>> {
+pub fn suspects(linear: &Linearisation<'_>, none: &Scored) -> Result<Vec<&'static Effect>, DiagnosisError> {
     let (own, ranked) = linear.ranked(&none.set, &none.noise)?;
     let odds = |value: f64| (value - own).exp();
-    let likely = ranked.into_iter().take_while(|(value, _)| odds(*value) > 1.0 - CREDIBLE);
-    Some(likely.map(|(_, effect)| effect).collect())
+    let likely = ranked
+        .into_iter()
+        .take_while(|(value, _)| odds(*value) > 1.0 - linear.scene.settings.verdict.credible);
+    Ok(likely.map(|(_, effect)| effect).collect())
 }
 
 /// The standing of one cause of a set.
-pub fn standing(linear: &Linearisation<'_>, best: &Scored, cause: &'static Effect) -> Option<Standing> {
+pub fn standing(
+    linear: &Linearisation<'_>,
+    best: &Scored,
+    cause: &'static Effect,
+) -> Result<Standing, DiagnosisError> {
     let rest: Vec<&'static Effect> = best.set.iter().copied().filter(|effect| *effect != cause).collect();
     let (_, ranked) = linear.ranked(&rest, &best.noise)?;
-    let own = ranked.iter().find(|(_, effect)| *effect == cause)?.0;
+    let own = ranked.iter().find(|(_, effect)| *effect == cause);
+    let own = own.ok_or(DiagnosisError::Alternatives { effect: &cause.id })?.0;
     let standard = linear.screen(&best.set, &best.noise, &[], &NEAR)?;
     let none = linear.judge(&rest, &best.noise, linear.scene.reach(cause), &NEAR)?;
     let mut judged: Vec<(f64, Option<&'static Effect>)> =
         vec![(best.log_evidence, Some(cause)), (none.log_evidence, None)];
     let others = ranked.iter().filter(|(value, effect)| *effect != cause && *value > own - FAR);
-    let others: Vec<&'static Effect> = others.take(JUDGED).map(|(_, effect)| *effect).collect();
+    let others: Vec<&'static Effect> =
+        others.take(linear.scene.settings.verdict.alternatives).map(|(_, effect)| *effect).collect();
     let offsets = linear.offsets(&best.noise);
     let instead = |effect: &&'static Effect| {
         let set: Vec<&'static Effect> = rest.iter().copied().chain([*effect]).collect();
         let anew: Vec<_> =
             linear.scene.reach(cause).iter().chain(linear.scene.reach(effect)).copied().collect();
-        let sifted = linear.screen(&set, &best.noise, &anew, &NEAR);
+        let sifted = linear.screen(&set, &best.noise, &anew, &NEAR).ok();
         // What falls behind axis by axis is not judged any further.
         let sifted = sifted.filter(|sifted| sifted.value > standard.value - BEHIND)?;
-        Some((linear.scored_jointly(sifted, &offsets)?.log_evidence, Some(*effect)))
+        Some((linear.scored_jointly(sifted, &offsets).ok()?.log_evidence, Some(*effect)))
     };
     let instead: Vec<Option<_>> = others.par_iter().map(instead).collect();
     judged.extend(instead.into_iter().flatten());
@@ -69,7 +74,7 @@ pub fn standing(linear: &Linearisation<'_>, best: &Scored, cause: &'static Effec
     let mut set = Vec::new();
     let mut held = 0.0;
     for (value, effect) in &judged {
-        if held < CREDIBLE {
+        if held < linear.scene.settings.verdict.credible {
             set.extend(*effect);
         }
         held += probability(*value);
@@ -77,7 +82,7 @@ pub fn standing(linear: &Linearisation<'_>, best: &Scored, cause: &'static Effec
     if !set.contains(&cause) {
         set.push(cause);
     }
-    Some(Standing {
+    Ok(Standing {
         probability: probability(best.log_evidence),
         equivalents: set.iter().copied().filter(|effect| *effect != cause).collect(),
         set,

@@ -8,14 +8,12 @@
 
 use super::{estimates, shares, shares::Share};
 use crate::{
-    diagnosis::{finding::Cause, mixed_model::noise::Noise, search::linearisation::Linearisation},
+    diagnosis::{
+        error::DiagnosisError, finding::Cause, mixed_model::noise::Noise,
+        search::linearisation::Linearisation, settings::VerdictSettings,
+    },
     effect::Effect,
 };
-
-/// A cause closes at least this share of what its own sensors show.
-const LEAST: f64 = 0.05;
-/// One of its amplitudes at least is so many standard errors from zero: of one that is not, nobody could take out anything.
-const ERRORS: f64 = 2.0;
 
 /// Takes out the causes of a set that no held-out block bears out, that are too small to matter or of no known size, and
 /// says so; `causes` are those of `set`, in its order. `None` where nothing can be fitted.
@@ -24,15 +22,17 @@ pub fn leave_out(
     linear: &Linearisation<'_>,
     set: &[&'static Effect],
     noise: &Noise,
-) -> Option<Vec<String>> {
+) -> Result<Vec<String>, DiagnosisError> {
+    let by = &linear.scene.settings.verdict;
     let mut kept = set.to_vec();
     let mut out = Vec::new();
     loop {
         let shares = shares::closed_of_own(linear, &kept, noise)?;
         let fails = |at: &usize| {
             let (share, cause) = (&shares[*at], &causes[*at]);
-            let matters = cause.material && estimates::is_sized(kept[*at], &cause.parameters, ERRORS);
-            !matters || !is_borne(share)
+            let matters =
+                cause.material && estimates::is_sized(kept[*at], &cause.parameters, by.amplitude_errors);
+            !matters || !is_borne(share, by)
         };
         let failing = (0..kept.len()).filter(fails);
         let Some(worst) = failing.min_by(|a, b| shares[*a].value.total_cmp(&shares[*b].value)) else { break };
@@ -46,7 +46,7 @@ pub fn leave_out(
         }
     }
     let names = out.join(", ");
-    Some(match out.is_empty() {
+    Ok(match out.is_empty() {
         true => Vec::new(),
         false => vec![format!(
             "not asserted, since held-out data do not bear them out or no size of theirs is told from zero: {names}"
@@ -54,8 +54,8 @@ pub fn leave_out(
     })
 }
 
-fn is_borne(share: &Share) -> bool {
-    share.value > LEAST && share.interval[0] > 0.0
+fn is_borne(share: &Share, by: &VerdictSettings) -> bool {
+    share.value > by.least_share && share.interval[0] > 0.0
 }
 
 /// Whether held-out blocks bear out a cause of a set with the terms of its triads free, where these are given.
@@ -64,13 +64,14 @@ fn is_borne_beside_terms(
     set: &[&'static Effect],
     linear: &Linearisation<'_>,
     noise: &Noise,
-) -> Option<bool> {
+) -> Result<bool, DiagnosisError> {
     let is_other = |term: &&'static Effect| !set.contains(term);
     let terms: Vec<&'static Effect> =
         linear.candidates.given_beside(set[at]).into_iter().filter(is_other).collect();
     if terms.is_empty() {
-        return Some(true);
+        return Ok(true);
     }
     let all: Vec<&'static Effect> = set.iter().copied().chain(terms).collect();
-    shares::closed_of_own(linear, &all, noise)?.get(at).map(is_borne)
+    let shares = shares::closed_of_own(linear, &all, noise)?;
+    Ok(is_borne(&shares[at], &linear.scene.settings.verdict))
 }

@@ -4,12 +4,8 @@ use super::shares::Closed;
 use crate::diagnosis::{
     finding::{Cause, Verdict},
     location::score_test::Following,
+    settings::VerdictSettings,
 };
-
-/// A remainder below this share of the explainable gap does not matter.
-const REMAINDER: f64 = 0.05;
-/// Causes that close less than this share of it explain nothing.
-const EXPLAINS: f64 = 0.2;
 
 /// What was found.
 #[derive(Debug)]
@@ -32,12 +28,12 @@ pub struct Evidence<'a> {
 
 impl Evidence<'_> {
     /// The verdict.
-    pub fn verdict(&self) -> Verdict {
+    pub fn verdict(&self, by: &VerdictSettings) -> Verdict {
         let of_search = match (self.refuted, self.causes, self.clock) {
             (true, [], None) => Verdict::Unknown,
             (true, ..) => Verdict::Partly,
-            (false, [], Some(clock)) => self.judged(std::slice::from_ref(clock)),
-            (false, causes, _) => self.judged(causes),
+            (false, [], Some(clock)) => self.judged(std::slice::from_ref(clock), by),
+            (false, causes, _) => self.judged(causes, by),
         };
         let beyond_model = match of_search {
             Verdict::Explained | Verdict::Ambiguous if self.within_model => Verdict::None,
@@ -50,13 +46,13 @@ impl Evidence<'_> {
         }
     }
 
-    fn judged(&self, causes: &[Cause]) -> Verdict {
+    fn judged(&self, causes: &[Cause], by: &VerdictSettings) -> Verdict {
         let remainder = self.left.map_or(0.0, |left| left.size) / self.closed.explainable;
         match (causes, self.left) {
             ([], None) => Verdict::None,
             ([], Some(_)) => Verdict::Unknown,
-            (_, Some(_)) if self.closed.total.value < EXPLAINS => Verdict::Unknown,
-            (_, Some(_)) if remainder > REMAINDER => Verdict::Partly,
+            (_, Some(_)) if self.closed.total.value < by.explains => Verdict::Unknown,
+            (_, Some(_)) if remainder > by.remainder => Verdict::Partly,
             _ if causes.iter().any(|cause| !cause.equivalents.is_empty()) => Verdict::Ambiguous,
             _ => Verdict::Explained,
         }

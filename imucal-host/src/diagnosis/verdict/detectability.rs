@@ -2,8 +2,9 @@
 
 use crate::{
     diagnosis::{
+        error::DiagnosisError,
         finding::{Absent, NotTestable},
-        library::evidence::{Projected, SEEN},
+        library::evidence::Projected,
         location::score_test::{RETAINED, score_test},
         mixed_model::noise::Noise,
         search::linearisation::Linearisation,
@@ -16,10 +17,11 @@ pub fn testable(
     linear: &Linearisation<'_>,
     set: &[&'static Effect],
     noise: &Noise,
-) -> Option<(Vec<Absent>, Vec<NotTestable>)> {
+) -> Result<(Vec<Absent>, Vec<NotTestable>), DiagnosisError> {
     let fitted = linear.fitted(set);
     let others: Vec<usize> = (0..linear.design.columns.len()).filter(|id| !fitted.contains(id)).collect();
     let projected = Projected::new(&linear.normal(noise), &fitted, &others)?;
+    let seen = linear.scene.settings.verdict.detectable;
     let mut absent = Vec::new();
     let told = |(effect, why): &(&'static Effect, &str)| NotTestable {
         effect: effect.id.clone(),
@@ -36,7 +38,7 @@ pub fn testable(
         let detectable = |place: &usize| {
             let information = projected.information[(*place, *place)];
             let kept = information > RETAINED * projected.before[*place];
-            if kept { (SEEN / information).sqrt() * parameter(place).prior_scale } else { f64::INFINITY }
+            if kept { (seen / information).sqrt() * parameter(place).prior_scale } else { f64::INFINITY }
         };
         let plausible = |place: &usize| detectable(place) < parameter(place).range.1;
         if !places.iter().any(plausible) {
@@ -46,12 +48,11 @@ pub fn testable(
             });
             continue;
         }
-        let worst = places.iter().max_by(|a, b| {
-            let relative = |place: &usize| detectable(place) / parameter(place).material;
-            relative(a).total_cmp(&relative(b))
-        })?;
+        let relative = |place: &usize| detectable(place) / parameter(place).material;
+        let worst = places.iter().max_by(|a, b| relative(a).total_cmp(&relative(b)));
+        let Some(worst) = worst else { continue };
         let (statistic, dimensions) = score_test(&projected, &places);
-        if detectable(worst) < parameter(worst).material && statistic < dimensions as f64 + SEEN {
+        if detectable(worst) < parameter(worst).material && statistic < dimensions as f64 + seen {
             absent.push(Absent {
                 effect: effect.id.clone(),
                 minimum_detectable: detectable(worst),
@@ -59,7 +60,7 @@ pub fn testable(
             });
         }
     }
-    Some((absent, untold))
+    Ok((absent, untold))
 }
 
 fn because(effect: &Effect, projected: &Projected, places: &[usize]) -> String {

@@ -4,9 +4,10 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{
     diagnosis::{
+        error::DiagnosisError,
         finding::Amount,
-        mixed_model::design::Column,
-        residual::{base_run::Reference, block::Means},
+        mixed_model::design::{Column, Signature},
+        residual::base_run::Reference,
         search::stepwise::Solution,
     },
     effect::{Effect, Role},
@@ -19,12 +20,15 @@ const LOOSE: f64 = 1e3;
 const SCANNED: f64 = 5.0;
 
 /// Parameters of each effect of the best set, shapes among them.
-pub fn amounts(explained: &Solution<'_>) -> Option<Vec<Vec<Amount>>> {
+pub fn amounts(explained: &Solution<'_>) -> Result<Vec<Vec<Amount>>, DiagnosisError> {
     amounts_of(explained, &explained.best.set)
 }
 
 /// Parameters of some effects of the fit, likewise.
-pub fn amounts_of(explained: &Solution<'_>, asked: &[&'static Effect]) -> Option<Vec<Vec<Amount>>> {
+pub fn amounts_of(
+    explained: &Solution<'_>,
+    asked: &[&'static Effect],
+) -> Result<Vec<Vec<Amount>>, DiagnosisError> {
     let (linear, set) = (&explained.linear, &explained.best.set);
     let reference = Reference::new(linear.scene, explained.fit.doses.clone(), &linear.scene.fine)?;
     let dose = |effect: &Effect| explained.fit.doses.iter().find(|dose| dose.effect == effect);
@@ -33,14 +37,14 @@ pub fn amounts_of(explained: &Solution<'_>, asked: &[&'static Effect]) -> Option
         effect.shapes_at(&dose.values).map(|parameter| Column { effect, parameter }).collect()
     };
     let shape_columns: Vec<Column> = set.iter().filter_map(|effect| dose(effect)).flat_map(shaped).collect();
-    let means: Vec<Means> = shape_columns
+    let signatures: Vec<Signature> = shape_columns
         .iter()
-        .map(|column| reference.signature(column.effect, column.parameter, &[]))
-        .collect::<Option<_>>()?;
+        .map(|column| Ok(Signature::from(reference.signature(column.effect, column.parameter, &[])?)))
+        .collect::<Result<_, DiagnosisError>>()?;
     let fitted = linear.fitted(set);
     let columns: Vec<Column> =
         fitted.iter().map(|id| linear.design.columns[*id]).chain(shape_columns.iter().copied()).collect();
-    let design = linear.design.extended(&fitted, columns.clone(), &means);
+    let design = linear.design.extended(&fitted, columns.clone(), &signatures);
     let every: Vec<usize> = (0..design.size).collect();
     let normal = design.normal(&linear.precisions(&explained.best.noise), &every);
     let precision = |column: &Column| {
@@ -52,24 +56,25 @@ pub fn amounts_of(explained: &Solution<'_>, asked: &[&'static Effect]) -> Option
     };
     let prior = DVector::from_iterator(columns.len(), columns.iter().map(precision));
     let information = normal.information + DMatrix::from_diagonal(&prior);
-    let covariance = information.cholesky()?.inverse();
+    let covariance =
+        information.cholesky().ok_or(DiagnosisError::Estimates { columns: columns.len() })?.inverse();
     let error = |effect: &Effect, parameter: usize| {
         let at = columns.iter().position(|c| c.is_of(effect) && c.parameter == parameter)?;
         Some(covariance[(at, at)].sqrt() * effect.parameters[parameter].prior_scale)
     };
-    asked
+    Ok(asked
         .iter()
         .map(|effect| {
-            let values = &dose(effect)?.values;
+            let values = dose(effect).map_or(&[][..], |dose| &dose.values);
             let amount = |(at, value): (usize, &f64)| Amount {
                 name: effect.parameters[at].name.clone(),
                 value: value.is_finite().then_some(*value),
                 std_error: error(effect, at),
                 unit: effect.parameters[at].unit.clone(),
             };
-            Some(values.iter().enumerate().map(amount).collect())
+            values.iter().enumerate().map(amount).collect()
         })
-        .collect()
+        .collect())
 }
 
 /// An effect is large enough to matter: one of its amplitudes is.

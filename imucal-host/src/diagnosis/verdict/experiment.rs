@@ -20,6 +20,7 @@ use crate::{
         },
         residual::{base_run::Reference, forward_model::ForwardModel},
         search::{refit::signatures, stepwise::Solution},
+        settings::Settings,
     },
     effect::Effect,
     recording::{SensorKind, manifest::Axis},
@@ -28,8 +29,6 @@ use crate::{
 
 /// Rate of the simulated segments, Hz.
 const RATE: f64 = 50.0;
-/// Two effects this far apart are told in four of five recordings.
-const PARTED: f64 = 25.0;
 
 /// A segment there may be.
 struct Segment {
@@ -61,6 +60,7 @@ pub fn next(
         return Some(Vec::new());
     }
     let linear = &explained.linear;
+    let parted = linear.scene.settings.verdict.detectable;
     let noise = &explained.best.noise;
     let every: Vec<usize> = (0..linear.design.columns.len()).collect();
     let here = linear.design.normal(&linear.precisions(noise), &every);
@@ -75,12 +75,12 @@ pub fn next(
             both.information += &more.information;
             let to = distance(explained, &both, cause, other)?;
             // More for the same time counts; a segment that parts them is enough.
-            let worth = to.min(PARTED) / duration;
+            let worth = to.min(parted) / duration;
             if best.is_none_or(|(most, ..)| worth > most) {
                 best = Some((worth, segment, to));
             }
         }
-        let advice = |to: f64, segment: &Segment| match to >= PARTED {
+        let advice = |to: f64, segment: &Segment| match to >= parted {
             true => format!("{} (programme {})", segment.instruction, segment.programme.name()),
             // No movement of the rig does it; the catalogue knows what would.
             false => parted_by(cause, other).unwrap_or(segment.instruction).to_owned(),
@@ -124,12 +124,13 @@ fn information<'m>(
     let place = simulation.schedule().ok()?.place();
     let temperature = recording.temperature.clone()?;
     let replay = Replay::new(&recording.time, recording.gimbal.as_deref()?, temperature, axes, place)?;
+    let settings = Settings::default();
     let usable = SensorKind::ALL.map(|_| vec![true; recording.rows()]);
-    let scene = ForwardModel::new(&recording, usable, &replay, linear.scene.triads);
-    let reference = Reference::new(&scene, explained.fit.doses.clone(), &scene.fine)?;
+    let scene = ForwardModel::new(&recording, usable, &replay, linear.scene.triads, &settings);
+    let reference = Reference::new(&scene, explained.fit.doses.clone(), &scene.fine).ok()?;
     let columns = linear.design.columns.clone();
-    let means = signatures(&reference, &columns, &|effect| linear.shape_of(effect))?;
-    let design = Design::new(&scene, columns, &means, &Default::default());
+    let signatures = signatures(&reference, &columns, &|effect| linear.shape_of(effect)).ok()?;
+    let design = Design::new(&scene, columns, &signatures, &Default::default());
     let weighing = Weighing::new(&scene, SensorKind::ALL.map(|kind| reference.output(kind)));
     let every: Vec<usize> = (0..design.size).collect();
     let normal = design.normal(&weighing.precisions(&design, noise), &every);
@@ -152,6 +153,6 @@ fn distance(explained: &Solution<'_>, normal: &Normal, cause: &Effect, other: &E
             dose.values[parameter] / cause.parameters[parameter].prior_scale
         }),
     );
-    let projected = Projected::new(normal, &fitted, &own)?;
+    let projected = Projected::new(normal, &fitted, &own).ok()?;
     Some(size.dot(&(&projected.information * &size)).max(0.0))
 }

@@ -47,6 +47,8 @@ pub struct Fault {
     cost: f64,
     /// Number of rows that no fault has spoilt.
     sound: f64,
+    /// Whitened squared size of an effect that the search may miss.
+    unseen: f64,
 }
 
 /// The spoilt rows of a block.
@@ -63,10 +65,10 @@ pub fn faults(recording: &Recording, findings: &[Finding], explained: &Solution<
     let scene = explained.linear.scene;
     let spoils = |finding: &&Finding| matches!(finding.dose(), Some(dose) if is_modelled(dose.effect));
     let findings: Vec<&Finding> = findings.iter().filter(spoils).collect();
-    if findings.is_empty() || scene.is_viewed() {
+    if findings.is_empty() || !scene.settings.verdict.counts_faults {
         return Vec::new();
     }
-    let Some(simulated) = scene.simulated(&explained.fit.doses) else { return Vec::new() };
+    let Ok(simulated) = scene.simulated(&explained.fit.doses) else { return Vec::new() };
     let of = |finding: &&Finding| {
         let kind = *finding.effect.sensors.first()?;
         let (_, output) = simulated.iter().find(|(own, _)| *own == kind)?;
@@ -114,7 +116,8 @@ impl Fault {
         }
         let sound = usable.iter().filter(|usable| **usable).count() as f64;
         let floor = floor / blocks.max(1.0);
-        let mut fault = Self { effect: finding.effect, kind, pieces, white, floor, cost: 0.0, sound };
+        let unseen = scene.settings.verdict.unseen;
+        let mut fault = Self { effect: finding.effect, kind, pieces, white, floor, cost: 0.0, sound, unseen };
         fault.cost = fault.errors(explained)?;
         Some(fault)
     }
@@ -172,7 +175,7 @@ impl Fault {
         let ratio = |[explainable, closed]: [f64; 2]| closed / explainable.max(f64::MIN_POSITIVE);
         let left = folds.map(|fold| ratio([all[0] - fold[0], all[1] - fold[1]]));
         let further = (self.chance().powi(2) + self.cost.powi(2)) / all[0].powi(2);
-        Share::new(ratio(all), &left, further, all[0])
+        Share::new(ratio(all), &left, further, all[0], self.unseen)
     }
 }
 

@@ -1,9 +1,9 @@
 //! Whether a cause is no more than an error of the given model.
 
-use crate::diagnosis::{finding::Cause, library::evidence::SEEN, reference::model::Model};
+use crate::diagnosis::{finding::Cause, reference::model::Model};
 
 /// A cause is no more than what the model itself does not know of a term, given its errors.
-pub fn errs_as_much(model: &Model, cause: &Cause) -> bool {
+pub fn errs_as_much(model: &Model, cause: &Cause, detectable: f64) -> bool {
     let Some((prefix, term)) = cause.effect.split_once('.') else { return false };
     let Some(kind) = model.calibrated.iter().find(|kind| kind.prefix() == prefix) else { return false };
     let (gain, bias) = &model.errors[*kind as usize];
@@ -20,5 +20,5 @@ pub fn errs_as_much(model: &Model, cause: &Cause) -> bool {
         let (value, error) = (amount.value?, amount.std_error?);
         Some(value * value / (error * error + own * own).max(f64::MIN_POSITIVE))
     });
-    squares.sum::<f64>() < SEEN + own.len() as f64
+    squares.sum::<f64>() < detectable + own.len() as f64
 }

@@ -7,15 +7,13 @@
 use super::{estimates, shares, shares::Closed};
 use crate::{
     diagnosis::{
+        error::DiagnosisError,
         finding::{Amount, Cause},
         library::candidates::Candidates,
         search::{linearisation::Linearisation, stepwise::Solution},
     },
     effect::{Effect, Part},
 };
-
-/// An offset that is named is so many standard errors from zero at least.
-const ERRORS: f64 = 5.0;
 
 /// The offset as a cause, and what all causes close beside it.
 pub struct Clock<'s> {
@@ -46,19 +44,21 @@ pub fn clock<'s>(
     (offset, candidates): &'s (&'static Effect, Candidates),
     moved: f64,
     remainder: f64,
-) -> Option<Option<Clock<'s>>> {
+) -> Result<Option<Clock<'s>>, DiagnosisError> {
     let Solution { linear, best, fit, .. } = explained;
-    let Some(mut parameters) = estimates::amounts_of(explained, &[offset])?.pop() else { return Some(None) };
+    let Some(mut parameters) = estimates::amounts_of(explained, &[offset])?.pop() else { return Ok(None) };
     parameters.iter_mut().for_each(|amount| amount.value = amount.value.map(|value| value + moved));
-    if !estimates::is_material(offset, &parameters) || !estimates::is_sized(offset, &parameters, ERRORS) {
-        return Some(None);
+    if !estimates::is_material(offset, &parameters)
+        || !estimates::is_sized(offset, &parameters, linear.scene.settings.verdict.clock_errors)
+    {
+        return Ok(None);
     }
     let set: Vec<&'static Effect> = best.set.iter().copied().chain([*offset]).collect();
     let values = parameters.iter().map(|amount| amount.value.unwrap_or_default()).collect();
     let linear = linear.with_effect(candidates, fit, offset, values);
     let closed = shares::closed(&linear, &set, &best.noise, remainder)?;
     let Some(share) = closed.each.last().copied().filter(|share| share.interval[0] > 0.0) else {
-        return Some(None);
+        return Ok(None);
     };
     let cause = Cause {
         effect: offset.id.clone(),
@@ -69,7 +69,7 @@ pub fn clock<'s>(
         gap_closed: Some(share.value),
         gap_closed_ci95: Some(share.interval),
     };
-    Some(Some(Clock { cause, closed, set, linear }))
+    Ok(Some(Clock { cause, closed, set, linear }))
 }
 
 /// Probability that an offset of zero would be estimated as far from zero.

@@ -18,6 +18,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{
     diagnosis::{
+        error::DiagnosisError,
         finding::Gap,
         library::evidence::Projected,
         mixed_model::{
@@ -31,16 +32,12 @@ use crate::{
 
 /// Folds.
 pub const FOLDS: usize = 8;
-/// Stretches dealt to folds, s.
-const STRETCH: f64 = 3.0;
 /// Standard deviation of an effect's prior, in usual sizes: what few blocks tell of it must not run away on the others.
 const LARGE: f64 = 30.0;
 /// Standard deviation of a driver's statistic where there is nothing to follow: √(2·18).
 const SCATTER: f64 = 6.0;
 /// What a driver follows tells what is left within this share of it: it is another function than the one that is there.
 const VAGUE: f64 = 0.15;
-/// Whitened squared size of an effect that the search may miss.
-const UNSEEN: f64 = 50.0;
 
 /// A share of the explainable gap.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,15 +49,15 @@ pub struct Share {
 }
 
 impl Share {
-    /// With the values that are `left` when one fold is left out, a further variance, and the whitened squared size of
-    /// the gap.
-    pub fn new(value: f64, left: &[f64], further: f64, whole: f64) -> Self {
+    /// With the values that are `left` when one fold is left out, a further variance, and the whitened squared sizes of the
+    /// gap and of an effect that the search may miss.
+    pub fn new(value: f64, left: &[f64], further: f64, whole: f64, unseen: f64) -> Self {
         let n = left.len() as f64;
         let mean = left.iter().sum::<f64>() / n;
         let variance = (n - 1.0) / n * left.iter().map(|l| (l - mean).powi(2)).sum::<f64>();
         let wide = 1.96 * (variance + further).sqrt();
         let bound = |x: f64| x.clamp(0.0, 1.0);
-        let least = bound(value - wide) * whole / (whole + UNSEEN);
+        let least = bound(value - wide) * whole / (whole + unseen);
         Self { value: bound(value), interval: [least, bound(value + wide)] }
     }
 }
@@ -82,7 +79,7 @@ pub fn closed(
     set: &[&'static Effect],
     noise: &Noise,
     remainder: f64,
-) -> Option<Closed> {
+) -> Result<Closed, DiagnosisError> {
     closed_in(linear, &linear.design, set, noise, remainder)
 }
 
@@ -91,11 +88,11 @@ pub fn closed_of_own(
     linear: &Linearisation<'_>,
     set: &[&'static Effect],
     noise: &Noise,
-) -> Option<Vec<Share>> {
+) -> Result<Vec<Share>, DiagnosisError> {
     let of = |(k, effect): (usize, &&'static Effect)| {
         let mut design = linear.design.clone();
         design.channels.retain(|channel| linear.scene.reach(effect).contains(&channel.kind));
-        closed_in(linear, &design, set, noise, 0.0)?.each.get(k).copied()
+        Ok(closed_in(linear, &design, set, noise, 0.0)?.each[k])
     };
     set.iter().enumerate().map(of).collect()
 }
@@ -106,11 +103,12 @@ fn closed_in(
     set: &[&'static Effect],
     noise: &Noise,
     remainder: f64,
-) -> Option<Closed> {
+) -> Result<Closed, DiagnosisError> {
+    let by = &linear.scene.settings.verdict;
     let fitted = linear.fitted(set);
     let folds: Vec<Normal> = (0..FOLDS)
         .map(|fold| {
-            let time = |block: usize| linear.scene.blocks[block].time / STRETCH;
+            let time = |block: usize| linear.scene.blocks[block].time / by.fold_stretch;
             // A row that holds no samples is a convention, and belongs to every fold.
             let empty = |block: usize| linear.scene.blocks[block].rows.is_empty();
             let inside = |block: usize| empty(block) || time(block) as usize % FOLDS == fold;
@@ -147,7 +145,7 @@ fn closed_in(
             })
             .collect();
         let vague = VAGUE * remainder / explainable;
-        Share::new(value, &left, (SCATTER / whole).powi(2) + vague * vague, whole)
+        Share::new(value, &left, (SCATTER / whole).powi(2) + vague * vague, whole, by.unseen)
     };
     let total = share(&closed);
     let mut each = Vec::new();
@@ -157,18 +155,22 @@ fn closed_in(
             rest.iter().zip(&after).map(|(rest, after)| rest.energy - after.energy).collect();
         each.push(share(&gains));
     }
-    Some(Closed { total, each, explainable })
+    Ok(Closed { total, each, explainable })
 }
 
 /// Whitened squared size of what a set explains beyond the baseline, less what noise alone would give.
-pub fn size(linear: &Linearisation<'_>, set: &[&'static Effect], noise: &Noise) -> Option<f64> {
+pub fn size(
+    linear: &Linearisation<'_>,
+    set: &[&'static Effect],
+    noise: &Noise,
+) -> Result<f64, DiagnosisError> {
     let fitted = linear.fitted(set);
     let normal = linear.design.normal(&linear.precisions(noise), &fitted);
     let every: Vec<usize> = (0..fitted.len()).collect();
     let (baseline, own) = every.split_at(linear.baseline.len());
     let projected = Projected::new(&normal, baseline, own)?;
     let places: Vec<usize> = (0..own.len()).collect();
-    Some((projected.explained(&places) - own.len() as f64).max(0.0))
+    Ok((projected.explained(&places) - own.len() as f64).max(0.0))
 }
 
 /// A fold that was not fitted.
@@ -180,7 +182,7 @@ struct Fold {
 }
 
 /// Each fold's residual after a fit of columns to the others; the first `baseline` columns are the baseline's.
-fn held_out(folds: &[Normal], places: &[usize], baseline: usize) -> Option<Vec<Fold>> {
+fn held_out(folds: &[Normal], places: &[usize], baseline: usize) -> Result<Vec<Fold>, DiagnosisError> {
     let part = |normal: &Normal| {
         let n = places.len();
         let g = DMatrix::from_fn(n, n, |i, j| normal.information[(places[i], places[j])]);
@@ -200,10 +202,11 @@ fn held_out(folds: &[Normal], places: &[usize], baseline: usize) -> Option<Vec<F
                 information += g;
                 score += z;
             }
-            let factor = information.cholesky()?;
+            let factor =
+                information.cholesky().ok_or(DiagnosisError::CrossValidation { fold, columns: n })?;
             let fitted = factor.solve(&score);
             let (g, z) = &parts[fold];
-            Some(Fold {
+            Ok(Fold {
                 energy: normal.energy - 2.0 * fitted.dot(z) + fitted.dot(&(g * &fitted)),
                 cost: factor.solve(g).trace(),
             })
@@ -212,9 +215,16 @@ fn held_out(folds: &[Normal], places: &[usize], baseline: usize) -> Option<Vec<F
 }
 
 /// Root mean squares of each channel's block means, before and after, and what noise alone would leave.
-pub fn table(linear: &Linearisation<'_>, set: &[&'static Effect], noise: &Noise) -> Option<Vec<Gap>> {
+pub fn table(
+    linear: &Linearisation<'_>,
+    set: &[&'static Effect],
+    noise: &Noise,
+) -> Result<Vec<Gap>, DiagnosisError> {
     let precisions = linear.precisions(noise);
-    let solve = |fitted: &[usize]| linear.design.normal(&precisions, fitted).amounts();
+    let solve = |fitted: &[usize]| {
+        let amounts = linear.design.normal(&precisions, fitted).amounts();
+        amounts.ok_or(DiagnosisError::Score { columns: fitted.len() })
+    };
     let all = linear.fitted(set);
     let (before, after) = (solve(&linear.baseline)?, solve(&all)?);
     let gaps = linear.design.channels.iter().map(|channel| {
@@ -235,7 +245,7 @@ pub fn table(linear: &Linearisation<'_>, set: &[&'static Effect], noise: &Noise)
             noise_floor: weighted(counts, |block| linear.weighing.variance(channel, noise, block)),
         }
     });
-    Some(gaps.collect())
+    Ok(gaps.collect())
 }
 
 fn weighted(counts: &[usize], square: impl Fn(usize) -> f64) -> f64 {

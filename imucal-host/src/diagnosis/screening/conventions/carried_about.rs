@@ -34,9 +34,6 @@ pub(crate) fn check(
     truth: &[Truth],
     pairs: &[Option<Pairs>; 3],
 ) -> Option<String> {
-    if recording.reference.is_none() || recording.gimbal.is_some() {
-        return None;
-    }
     let share = |kind: SensorKind| Some(pairs[kind as usize].as_ref()?.trusted().moments().unexplained());
     let (of_acc, of_gyr) = (share(SensorKind::Acc)?, share(SensorKind::Gyr)?);
     if of_acc <= FOLLOWS || of_gyr > FOLLOWS {

@@ -1,5 +1,6 @@
 use super::*;
 use crate::{
+    diagnosis::settings::Settings,
     recording::{Triple, check::integrity, manifest::Axis},
     simulator::{Place, Programme, Replay, Simulation, UnitKind},
 };
@@ -12,7 +13,7 @@ fn replay(recording: &Recording) -> Replay {
 }
 
 fn checked(recording: &Recording) -> Conventions {
-    check(recording, &integrity::inspect(recording), &replay(recording))
+    check(recording, &integrity::inspect(recording), &replay(recording), Settings::default().source)
 }
 
 fn simulation(unit: UnitKind, programme: Programme, seed: u64) -> Simulation {

@@ -1,0 +1,365 @@
+//! All that a diagnosis weighs and compares, with what a larger value does.
+//!
+//! [`Settings::default`] is the preset of a rig with encoders; [`Settings::preset`] gives that of any source of the movement.
+//! What differs between the sources stands in the presets alone: no other file asks which of them there is. Values were
+//! chosen on simulated recordings (`imucal blind`), none on labelled ones.
+//!
+//! Not here: constants of an algorithm that change no answer, such as the steps of a solver, and shares of distributions.
+
+use crate::recording::{Recording, SensorKind};
+
+/// Where the movement of a recording comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// Encoders of a rig's gimbals.
+    Rig,
+    /// A reference attitude, as of an optical tracker.
+    Reference,
+    /// The sensor's own rests: a hand, or a turntable without a readout.
+    Rests,
+}
+
+impl Source {
+    /// That of a recording.
+    pub fn of(recording: &Recording) -> Self {
+        match (&recording.gimbal, &recording.reference) {
+            (Some(_), _) => Self::Rig,
+            (None, Some(_)) => Self::Reference,
+            (None, None) => Self::Rests,
+        }
+    }
+}
+
+/// Settings of a diagnosis, stage by stage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// What the source of the movement provides.
+    pub source: Provided,
+    /// How residuals are averaged and simulated.
+    pub residual: ResidualSettings,
+    /// How noise is estimated.
+    pub noise: NoiseSettings,
+    /// Where nonlinear parameters are looked for.
+    pub library: LibrarySettings,
+    /// The stepwise search for a set of effects.
+    pub search: SearchSettings,
+    /// Score tests against covariates.
+    pub location: LocationSettings,
+    /// What is asserted.
+    pub verdict: VerdictSettings,
+}
+
+/// What the source of a movement provides; an effect's needs are compared with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Provided {
+    /// Angles of three gimbals.
+    pub gimbals: bool,
+    /// Something outside of the sensor turns with it, whose own errors can be told from the sensor's.
+    pub table: bool,
+    /// A clock of its own, whose offset from the sensor's is always fitted.
+    pub clock: bool,
+    /// A place: the sensor is not moved to and fro, or its acceleration would be known.
+    pub position: bool,
+    /// The heading against north.
+    pub heading: bool,
+    /// An attitude without noise or a filter of its own.
+    pub exact_attitude: bool,
+}
+
+/// How residuals are averaged and simulated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ResidualSettings {
+    /// Longest block while the sensor moves, s. Larger: less to compute, and brisk motion is averaged away.
+    pub moving_block: f64,
+    /// Longest block at rest, s. Larger: less to compute, and onsets are known less closely.
+    pub resting_block: f64,
+    /// Most blocks: those of a longer recording are longer, so that memory is bounded. Larger: more memory and time.
+    pub most_blocks: usize,
+    /// Longest rest whose blocks share one pointing error, s. Larger: creep of the table looks like drift.
+    pub longest_rest: f64,
+    /// Distance of the points at which derivatives are simulated in motion, s. Larger: faster, less exact.
+    pub moving_points: f64,
+    /// Likewise at rest, s.
+    pub resting_points: f64,
+    /// Points lie in gaps of the source too, since it is bridged closely enough for a derivative.
+    pub points_in_gaps: bool,
+    /// Blocks in which something is brought near a sensor are left out: a rig's own movement brings nothing near.
+    pub leaves_out_passages: bool,
+    /// At rest samples of a passage scatter by so many times the usual. Larger: fewer blocks are left out.
+    pub passage_scatter: f64,
+    /// In a passage the residual changes by so many times the usual. Larger: fewer blocks are left out.
+    pub passage_change: f64,
+    /// A sensor without a usable row stays: its samples may be in another unit.
+    pub keeps_sensors_without_rows: bool,
+    /// Sensors that one effect may alter by way of a movement that is reconstructed from them; those of the effect
+    /// otherwise.
+    pub coupled: Option<&'static [SensorKind]>,
+}
+
+/// How noise is estimated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NoiseSettings {
+    /// Smallest pointing error that is looked for, rad; the largest is 10⁴ of it.
+    pub least_scatter: f64,
+    /// A movement's pointing error is another one after this time, s.
+    pub longest_stretch: f64,
+    /// Lengths of the groups of blocks whose second differences count as white noise where the source trembles; empty where
+    /// neighbouring blocks alone do. Longer: more of a slow sway is white noise.
+    pub sway: &'static [usize],
+    /// Groups are compared only where all their blocks hold as many rows: on a rig, one with fewer has just left a rest.
+    pub whole_blocks: bool,
+}
+
+/// Where nonlinear parameters are looked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LibrarySettings {
+    /// Distance of instants on the grid, s, and as a share of the recording where that is more. Larger: faster; short
+    /// episodes are missed.
+    pub grid: (f64, f64),
+    /// Instants of episodes are placed in a quieter noise, which is alike at rest and in motion: what a hand adds hides
+    /// them.
+    pub places_in_quiet_noise: bool,
+}
+
+/// The stepwise search for a set of effects.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SearchSettings {
+    /// Most effects in a set.
+    pub most: usize,
+    /// ln of the evidence that the first effect must add beyond its prior. Larger: fewer false alarms, fewer finds.
+    pub first_gain: f64,
+    /// Likewise for each further effect.
+    pub further_gain: f64,
+    /// Likewise for a change to as many effects.
+    pub change_gain: f64,
+    /// Sensors are fitted one after the other before they are fitted together: what a reference does not give is shared
+    /// among them.
+    pub staged_start: bool,
+    /// Fits of the baseline, each with the noise that the last one left.
+    pub settling: usize,
+    /// Sets scored with a noise of their own at each step. Larger: slower, more thorough.
+    pub screened: usize,
+    /// Likewise for each sensor, of those that a quieter noise favours.
+    pub screened_quiet: usize,
+    /// Of the screened sets, those scored with all sensors jointly.
+    pub scored: usize,
+    /// A set whose screened ln of evidence is so far behind the present one is not scored.
+    pub behind: f64,
+    /// Effects tried in the place of another.
+    pub replaced: usize,
+    /// Effects of a sensor tried in pairs.
+    pub paired: usize,
+}
+
+/// Score tests against covariates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LocationSettings {
+    /// A covariate is followed below this p-value, all tests counted. Larger: more places, more false ones.
+    pub p_value: f64,
+    /// A χ² statistic is divided by this, since white noise is known to a few per cent.
+    pub caution: f64,
+    /// Below this p-value in a quieter noise a covariate is tested again with a noise of its own.
+    pub suspect: f64,
+    /// So many suspects as slow as drift are tested again.
+    pub slow_suspects: usize,
+    /// And so many others.
+    pub other_suspects: usize,
+    /// ln of the evidence that half-waves of the time must add beyond other covariates: drift is no sum of two processes.
+    pub time_gain: f64,
+    /// Shortest period that is looked for, s.
+    pub shortest_period: f64,
+    /// A period stands out by this factor over the median of its neighbours.
+    pub peak: f64,
+}
+
+/// What is asserted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VerdictSettings {
+    /// Held-out blocks must confirm a cause, and its amplitude: evidence alone is overconfident where the source trembles.
+    pub confirms_held_out: bool,
+    /// Share of its own sensors' gap that a confirmed cause closes at least.
+    pub least_share: f64,
+    /// Standard errors from zero of a confirmed cause's largest amplitude.
+    pub amplitude_errors: f64,
+    /// Standard errors from zero of a reference's clock offset that is named.
+    pub clock_errors: f64,
+    /// An episode that begins and ends with the movement within this time is not asserted, s.
+    pub carried: f64,
+    /// Whitened squared size of a signature that is found in four of five recordings.
+    pub detectable: f64,
+    /// Length of the stretches that are dealt to folds, s.
+    pub fold_stretch: f64,
+    /// Whitened squared size of an effect that the search may miss: the interval of a share closed is widened by it.
+    pub unseen: f64,
+    /// A remainder below this share of the gap does not matter.
+    pub remainder: f64,
+    /// Causes that close less than this share of the gap explain nothing.
+    pub explains: f64,
+    /// Probability that a credible set holds.
+    pub credible: f64,
+    /// Alternatives of a cause that are scored with a noise of their own.
+    pub alternatives: usize,
+    /// Rows that a fault has spoilt add to the gap; not where the movement is reconstructed from them.
+    pub counts_faults: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self::preset(Source::Rig)
+    }
+}
+
+impl Settings {
+    /// Those for a source of the movement.
+    pub fn preset(source: Source) -> Self {
+        match source {
+            Source::Rig => Self::rig(),
+            Source::Reference => Self::reference(),
+            Source::Rests => Self::rests(),
+        }
+    }
+
+    /// A rig: its encoders are exact but for errors that the catalogue holds and for pointing errors at each rest.
+    fn rig() -> Self {
+        Self {
+            source: Provided {
+                gimbals: true,
+                table: true,
+                clock: false,
+                position: true,
+                heading: true,
+                exact_attitude: true,
+            },
+            residual: ResidualSettings {
+                moving_block: 0.1,
+                resting_block: 0.5,
+                most_blocks: 40_000,
+                longest_rest: 10.0,
+                moving_points: 0.045,
+                resting_points: 0.25,
+                points_in_gaps: true,
+                leaves_out_passages: false,
+                passage_scatter: 5.0,
+                passage_change: 8.0,
+                keeps_sensors_without_rows: true,
+                coupled: None,
+            },
+            noise: NoiseSettings {
+                least_scatter: 1e-7,
+                longest_stretch: 20.0,
+                sway: &[],
+                whole_blocks: true,
+            },
+            library: LibrarySettings { grid: (5.0, 1.0 / 60.0), places_in_quiet_noise: false },
+            search: SearchSettings {
+                most: 3,
+                first_gain: 0.5,
+                further_gain: 0.0,
+                change_gain: 0.5,
+                staged_start: false,
+                settling: 0,
+                screened: 8,
+                screened_quiet: 4,
+                scored: 3,
+                behind: 25.0,
+                replaced: 5,
+                paired: 8,
+            },
+            location: LocationSettings {
+                p_value: 0.01,
+                caution: 1.1,
+                suspect: 1e-9,
+                slow_suspects: 2,
+                other_suspects: 4,
+                time_gain: 12.0,
+                shortest_period: 4.0,
+                peak: 12.0,
+            },
+            verdict: VerdictSettings {
+                confirms_held_out: false,
+                least_share: 0.05,
+                amplitude_errors: 2.0,
+                clock_errors: 5.0,
+                carried: 3.0,
+                detectable: 25.0,
+                fold_stretch: 3.0,
+                unseen: 50.0,
+                remainder: 0.05,
+                explains: 0.2,
+                credible: 0.95,
+                alternatives: 5,
+                counts_faults: true,
+            },
+        }
+    }
+
+    /// A reference attitude: a hand moves the sensor briskly, and the reference has noise, a filter and a clock of its own.
+    fn reference() -> Self {
+        let rig = Self::rig();
+        Self {
+            source: Provided {
+                gimbals: false,
+                table: true,
+                clock: true,
+                position: false,
+                heading: true,
+                exact_attitude: false,
+            },
+            residual: ResidualSettings {
+                moving_points: 0.0175,
+                resting_points: 0.0175,
+                points_in_gaps: false,
+                leaves_out_passages: true,
+                keeps_sensors_without_rows: false,
+                ..rig.residual
+            },
+            noise: NoiseSettings {
+                least_scatter: 1e-5,
+                sway: &[1, 2, 4, 8, 16, 32],
+                whole_blocks: false,
+                ..rig.noise
+            },
+            library: LibrarySettings { places_in_quiet_noise: true, ..rig.library },
+            search: SearchSettings { most: 5, staged_start: true, settling: 2, ..rig.search },
+            verdict: VerdictSettings { confirms_held_out: true, ..rig.verdict },
+            location: rig.location,
+        }
+    }
+
+    /// The sensor's own rests: gravity gives their attitude, and nothing the heading.
+    fn rests() -> Self {
+        let reference = Self::reference();
+        Self {
+            source: Provided {
+                gimbals: false,
+                table: false,
+                clock: false,
+                position: true,
+                heading: false,
+                exact_attitude: true,
+            },
+            residual: ResidualSettings {
+                leaves_out_passages: false,
+                coupled: Some(&SensorKind::ALL),
+                ..reference.residual
+            },
+            verdict: VerdictSettings { counts_faults: false, ..reference.verdict },
+            ..reference
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_source_has_a_preset_and_the_default_is_a_rig_s() {
+        let [rig, reference, rests] = [Source::Rig, Source::Reference, Source::Rests].map(Settings::preset);
+        assert_eq!(Settings::default(), rig);
+        assert!(rig.source.gimbals && !reference.source.gimbals && !rests.source.heading);
+        // Evidence alone decides where the noise model is right: on a rig.
+        let confirmed = |settings: &Settings| settings.verdict.confirms_held_out;
+        assert_eq!([confirmed(&rig), confirmed(&reference), confirmed(&rests)], [false, true, true]);
+    }
+}
