@@ -1,5 +1,5 @@
 //! What the core's parts take on a device: instructions counted by QEMU, flash and RAM by section, stack by paint and
-//! by analysis. Prints the README's table: `cargo test -p imucal-tests --test device_cost -- --nocapture`.
+//! by analysis. Prints the table of `imucal-host/docs/devices.md`: `cargo test -p imucal-tests --test device_cost -- --nocapture`.
 
 use std::collections::HashMap;
 

@@ -1,6 +1,6 @@
 //! A small set of sealed trials: no figure is further from the contract's than chance would bring it.
 //!
-//! The full set, which tells the figures, takes an hour: README, "Diagnosis".
+//! The full set, which gives the published figures, takes an hour: `imucal-host/docs/diagnosis.md`.
 
 use imucal_host::{
     blind::{

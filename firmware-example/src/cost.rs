@@ -1,6 +1,6 @@
 //! What the core's parts cost on a device: instructions, by a timer under QEMU's `-icount`, and stack, by paint.
 //!
-//! The image `cost` prints a line a part; `tests/device_cost.rs` reads them and makes the README's table of them.
+//! The image `cost` prints a line a part; `tests/device_cost.rs` reads them and makes the table of `imucal-host/docs/devices.md` of them.
 
 use core::{fmt::Write, hint::black_box};
 

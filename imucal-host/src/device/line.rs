@@ -48,7 +48,7 @@ impl Line {
                     .map_err(|cause| {
                         unreachable(
                             cause,
-                            "build the image (see README, On the co-processor) and install qemu-system-arm",
+                            "build the image (see imucal-host/docs/devices.md) and install qemu-system-arm",
                         )
                     })
             }
