@@ -2,6 +2,16 @@
 //! floating-point reference.
 //!
 //! Modules stand in the order of the flow; each uses what stands above it and nothing below.
+//!
+//! # Features
+//!
+//! | feature | what it adds |
+//! | --- | --- |
+//! | `cli`, by default | the program `imucal` and the module `cli` |
+//! | `serial`, by default | devices at a serial port; without it [`device`] reaches those behind TCP and QEMU |
+//! | `parquet` | recordings in Parquet |
+//!
+//! A program that uses the library takes it with `default-features = false`.
 
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -37,4 +47,5 @@ pub mod report;
 
 pub mod study;
 
+#[cfg(feature = "cli")]
 pub mod cli;

@@ -15,8 +15,16 @@ use super::{
 /// A read gives up after this, so that whoever waits can look at the clock.
 const READ_PATIENCE: Duration = Duration::from_millis(50);
 
+/// What to do about a serial port that cannot be opened.
+const SERIAL_ADVICE: &str = if cfg!(feature = "serial") {
+    "check the port's name and who else has it open"
+} else {
+    "build with `--features serial`, or give a `tcp:` address"
+};
+
 /// An open line.
 pub(super) enum Line {
+    #[cfg(feature = "serial")]
     Serial(Box<dyn serialport::SerialPort>),
     /// With the QEMU at its other end, which lives as long.
     Tcp(TcpStream, #[expect(dead_code, reason = "held for its end")] Option<Qemu>),
@@ -32,9 +40,7 @@ impl Line {
         };
         match address {
             Address::Serial(path, baud) => {
-                serialport::new(path, *baud).timeout(READ_PATIENCE).open().map(Self::Serial).map_err(
-                    |cause| unreachable(cause.into(), "check the port's name and who else has it open"),
-                )
+                Self::serial(path, *baud).map_err(|cause| unreachable(cause, SERIAL_ADVICE))
             }
             Address::Tcp(place) => TcpStream::connect(place)
                 .and_then(prepare)
@@ -55,9 +61,20 @@ impl Line {
         }
     }
 
+    #[cfg(feature = "serial")]
+    fn serial(path: &str, baud: u32) -> io::Result<Self> {
+        Ok(Self::Serial(serialport::new(path, baud).timeout(READ_PATIENCE).open()?))
+    }
+
+    #[cfg(not(feature = "serial"))]
+    fn serial(_: &str, _: u32) -> io::Result<Self> {
+        Err(io::Error::new(io::ErrorKind::Unsupported, "this build is without serial ports"))
+    }
+
     /// What has come, if anything has; nothing after a while.
     pub(super) fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let read = match self {
+            #[cfg(feature = "serial")]
             Self::Serial(port) => port.read(bytes),
             Self::Tcp(stream, _) => match stream.read(bytes) {
                 Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
@@ -74,6 +91,7 @@ impl Line {
 
     pub(super) fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self {
+            #[cfg(feature = "serial")]
             Self::Serial(port) => port.write_all(bytes).and_then(|()| port.flush()),
             Self::Tcp(stream, _) => stream.write_all(bytes),
         }
