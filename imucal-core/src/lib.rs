@@ -76,3 +76,8 @@ pub mod corrector;
 
 #[cfg(feature = "link")]
 pub mod link;
+
+/// The code in the README compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -49,3 +49,8 @@ pub mod study;
 
 #[cfg(feature = "cli")]
 pub mod cli;
+
+/// The code in the README compiles and holds.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
