@@ -1,7 +1,38 @@
 //! Calibrate IMU recordings through `imucal-core`, the code that runs beside the sensor, and compare it with a
 //! floating-point reference.
 //!
+//! # Architecture
+//!
 //! Modules stand in the order of the flow; each uses what stands above it and nothing below.
+//!
+//! ```text
+//!  recording ──┬─► effect ──► simulator ─────────────┐
+//!  file        │   catalogue   replays a movement    │
+//!  samples,    │                                     ▼
+//!  manifest    │                                 diagnosis ──────────► blind
+//!              │                                 reference → screening → residual → mixed_model →
+//!              │                                 library → search → location → verdict
+//!              ├─► observe ─► calibrate ─► store ─┬─► apply ─► device
+//!              │   rests,      acc, gyr, mag      │   corrects   the same on a
+//!              │   motions     fit, examination   │              microcontroller
+//!              │   noise, ellipsoid               └─► equivalence: f32 through the core against f64
+//!              └──────────────────────────────────────────────────────► report, study ─► cli
+//! ```
+//!
+//! | stage | goes in | comes out |
+//! | --- | --- | --- |
+//! | [`recording`] | a CSV or Parquet file and its manifest | samples in SI, warnings, which rows can be used |
+//! | [`effect`] | – | the only list of what a simulator may lack |
+//! | [`simulator`] | a movement, effects | what ideal or afflicted sensors put out |
+//! | [`noise`], [`observe`], [`ellipsoid`] | samples | rests, motions, turns, and the noise of their means |
+//! | [`calibrate`] | observations | triads with standard errors; accepted, suspect or refused |
+//! | [`store`], [`apply`], [`device`] | triads | records, corrected recordings, answers of a device |
+//! | [`equivalence`] | a calibration | how far the core in `f32` is from a reference in `f64` |
+//! | [`diagnosis`] | a recording, effects | where the gap lies, its causes, what to record next |
+//! | [`blind`], [`study`] | simulated recordings | how often answers and standard errors are right |
+//! | [`report`], `cli` | any of these | text, JSON, exit status |
+//!
+//! A calibration of the core itself is described in [`imucal_core`].
 //!
 //! # Features
 //!
