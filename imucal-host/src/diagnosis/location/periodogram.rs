@@ -63,9 +63,8 @@ pub fn beat(
 /// P at successive multiples of a frequency, `half_wave` in rad/s. Each wave is the one before turned by a half-wave's
 /// angle, which is cheaper than a sine and exact for a run.
 fn powers(weighed: &[DVector<f64>], times: &[f64], half_wave: f64, multiples: Range<usize>) -> Vec<f64> {
-    let turned = |by: f64| times.iter().map(|time| libm::sincos(by * time)).collect();
-    let (mut waves, steps): (Vec<(f64, f64)>, Vec<(f64, f64)>) =
-        (turned(half_wave * multiples.start as f64), turned(half_wave));
+    let turned = |by: f64| -> Vec<(f64, f64)> { times.iter().map(|time| libm::sincos(by * time)).collect() };
+    let (mut waves, steps) = (turned(half_wave * multiples.start as f64), turned(half_wave));
     let next = |_: usize| {
         let of = |w: &DVector<f64>| {
             let along = |(c, s), (w, (sin, cos)): (&f64, &(f64, f64))| (c + w * cos, s + w * sin);

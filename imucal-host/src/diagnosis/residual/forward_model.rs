@@ -22,6 +22,9 @@ use crate::{
     simulator::{Dose, Recorded, chain::Chain},
 };
 
+/// What sensors put out, row by row.
+type Outputs = Vec<(SensorKind, Vec<Vector3<f64>>)>;
+
 /// What is simulated beside a recording.
 pub struct ForwardModel<'a> {
     /// Settings of the diagnosis.
@@ -186,7 +189,7 @@ impl<'a> ForwardModel<'a> {
     }
 
     /// What the simulator puts out at each row, by sensor. `None` where a triad is singular.
-    pub fn simulated(&self, doses: &[Dose]) -> Result<Vec<(SensorKind, Vec<Vector3<f64>>)>, DiagnosisError> {
+    pub fn simulated(&self, doses: &[Dose]) -> Result<Outputs, DiagnosisError> {
         let chain = Chain::new(doses);
         let input = chain.inputs(self.motion, &self.recording.time);
         let of = |kind: &SensorKind| Ok((*kind, self.output(&chain, *kind, &input)?));

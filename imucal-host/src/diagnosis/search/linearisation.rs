@@ -55,6 +55,9 @@ pub struct Linearisation<'s> {
     projected: Memo<Noise, Result<(Projected, Vec<usize>), DiagnosisError>>,
 }
 
+/// Effects with what each adds, the likeliest first.
+type Ranked = Vec<(f64, &'static Effect)>;
+
 /// White noise of each sensor at rest and in motion, by axis.
 type White = [[[f64; 3]; 2]; 3];
 
@@ -349,11 +352,7 @@ impl<'s> Linearisation<'s> {
     }
 
     /// Candidates by ln BF of a set with each of them added, best first; the set itself has the value returned beside.
-    pub fn ranked(
-        &self,
-        set: &[&'static Effect],
-        noise: &Noise,
-    ) -> Result<(f64, Vec<(f64, &'static Effect)>), DiagnosisError> {
+    pub fn ranked(&self, set: &[&'static Effect], noise: &Noise) -> Result<(f64, Ranked), DiagnosisError> {
         // Two of a class explain each other's noise and not the gap.
         let is_new = |effect: &&'static Effect| !set.iter().any(|own| class(&own.id) == class(&effect.id));
         let others: Vec<[&'static Effect; 1]> =
