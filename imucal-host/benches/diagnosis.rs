@@ -1,44 +1,80 @@
-//! How long `imucal diagnose` takes over 650 s of nine channels at 100 Hz, reading included, and how much memory it holds:
-//! with no effect and with one to three. Fails above 5 s or 1 GiB, so that it wants a machine with nothing else to do.
+//! How long `imucal diagnose` takes over nine channels at 100 Hz, reading included, and how much memory it holds: 650 s with no
+//! effect and with one to three, an hour, and four hours. Fails above its limits, so that it needs a machine with nothing
+//! else to do. `IMUCAL_BEFORE=PROGRAM` runs an older program on the same recordings and prints the ratio.
 
 use std::{
+    env,
+    ffi::{OsStr, OsString},
     path::Path,
     process::{Child, Command, ExitCode, Stdio},
     thread,
     time::{Duration, Instant},
 };
 
-/// Most that a diagnosis may take, s.
-const LONGEST: f64 = 5.0;
-/// Most that it may hold, MiB.
-const LARGEST: f64 = 1024.0;
 /// Effects, each with those before it, in usual sizes.
 const EFFECTS: [&str; 3] = ["acc.scale_quadratic=3", "mag.gimbal_hard_iron_outer=3", "gyr.temp_bias=3"];
+/// Length of a usual recording, s, and of longer ones.
+const USUAL: u32 = 650;
+const LONGER: [u32; 2] = [3600, 14_400];
+/// Most that the diagnosis of a usual recording may take, s, and hold, MiB.
+const LIMITS: (f64, f64) = (5.0, 1024.0);
+/// An hour may take so many times as long.
+const HOUR: f64 = 7.0;
+/// Most that any may hold, MiB.
+const LARGEST: f64 = 2048.0;
 
 fn main() -> ExitCode {
     let folder = tempfile::tempdir().expect("a folder");
+    let before = env::var_os("IMUCAL_BEFORE");
     let threads = thread::available_parallelism().map_or(1, usize::from);
-    println!("650 s at 100 Hz, nine channels, {threads} threads");
+    println!("nine channels at 100 Hz, {threads} threads");
     let mut within = true;
+    let mut usual = f64::INFINITY;
     for count in 0..=EFFECTS.len() {
-        let recording = folder.path().join(format!("{count}.csv.gz"));
-        simulate(&recording, &EFFECTS[..count]);
-        let (seconds, mebibytes) = diagnose(&recording);
-        println!("{count} effects  {seconds:.1} s  {mebibytes:.0} MiB");
-        within &= seconds <= LONGEST && mebibytes <= LARGEST;
+        let (seconds, mebibytes) = measured(folder.path(), USUAL, count, before.as_deref());
+        within &= seconds <= LIMITS.0 && mebibytes <= LIMITS.1;
+        if count == 1 {
+            usual = seconds;
+        }
+    }
+    for length in LONGER {
+        // An engine whose memory grows with the square of the length is not asked for four hours.
+        let before = before.as_deref().filter(|_| length < LONGER[1]);
+        let (seconds, mebibytes) = measured(folder.path(), length, 1, before);
+        println!("        {:.1} times as long as {USUAL} s", seconds / usual);
+        within &= mebibytes <= LARGEST && (length > LONGER[0] || seconds <= HOUR * usual);
     }
     if within { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-fn imucal() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_imucal"));
+/// Seconds and mebibytes of a recording of this length with so many effects, which are printed.
+fn measured(folder: &Path, length: u32, effects: usize, before: Option<&OsStr>) -> (f64, f64) {
+    let recording = folder.join(format!("{length}-{effects}.csv.gz"));
+    simulate(&recording, length, &EFFECTS[..effects]);
+    let (seconds, mebibytes) = diagnose(&this(), &recording);
+    print!("{length:>6} s, {effects} effects  {seconds:.1} s  {mebibytes:.0} MiB");
+    if let Some(before) = before {
+        let (other, held) = diagnose(before, &recording);
+        print!("  before: {other:.1} s  {held:.0} MiB, ratio {:.2}", seconds / other);
+    }
+    println!();
+    (seconds, mebibytes)
+}
+
+fn this() -> OsString {
+    env!("CARGO_BIN_EXE_imucal").into()
+}
+
+fn imucal(program: &OsStr) -> Command {
+    let mut command = Command::new(program);
     command.stdout(Stdio::null()).stderr(Stdio::null());
     command
 }
 
-fn simulate(recording: &Path, effects: &[&str]) {
-    let mut command = imucal();
-    command.args(["simulate", "--programme", "mixed", "--duration", "650", "--out"]).arg(recording);
+fn simulate(recording: &Path, length: u32, effects: &[&str]) {
+    let mut command = imucal(&this());
+    command.args(["simulate", "--programme", "mixed", "--duration"]).arg(length.to_string());
+    command.arg("--out").arg(recording);
     effects.iter().for_each(|effect| {
         command.args(["--effect", effect]);
     });
@@ -46,9 +82,9 @@ fn simulate(recording: &Path, effects: &[&str]) {
 }
 
 /// Seconds and mebibytes.
-fn diagnose(recording: &Path) -> (f64, f64) {
+fn diagnose(program: &OsStr, recording: &Path) -> (f64, f64) {
     let start = Instant::now();
-    let mut child = imucal().arg("diagnose").arg(recording).spawn().expect("it runs");
+    let mut child = imucal(program).arg("diagnose").arg(recording).spawn().expect("it runs");
     let mut most = 0.0;
     loop {
         most = held(&child).unwrap_or(most);
@@ -60,7 +96,7 @@ fn diagnose(recording: &Path) -> (f64, f64) {
     }
 }
 
-/// The most memory that a program has held so far, MiB, where the system tells.
+/// The most memory that a program has held so far, MiB, where the system says it.
 fn held(child: &Child) -> Option<f64> {
     let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;

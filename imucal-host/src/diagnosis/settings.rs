@@ -203,6 +203,97 @@ pub struct VerdictSettings {
     pub counts_faults: bool,
 }
 
+impl Default for ResidualSettings {
+    /// That of a rig.
+    fn default() -> Self {
+        Self {
+            moving_block: 0.1,
+            resting_block: 0.5,
+            most_blocks: 40_000,
+            longest_rest: 10.0,
+            moving_points: 0.045,
+            resting_points: 0.25,
+            points_in_gaps: true,
+            leaves_out_passages: false,
+            passage_scatter: 5.0,
+            passage_change: 8.0,
+            keeps_sensors_without_rows: true,
+            coupled: None,
+        }
+    }
+}
+
+impl Default for NoiseSettings {
+    /// That of a rig.
+    fn default() -> Self {
+        Self { least_scatter: 1e-7, longest_stretch: 20.0, sway: &[], whole_blocks: true }
+    }
+}
+
+impl Default for LibrarySettings {
+    /// That of a rig.
+    fn default() -> Self {
+        Self { grid: (5.0, 1.0 / 60.0), places_in_quiet_noise: false }
+    }
+}
+
+impl Default for SearchSettings {
+    /// That of a rig.
+    fn default() -> Self {
+        Self {
+            most: 3,
+            first_gain: 0.5,
+            further_gain: 0.0,
+            change_gain: 0.5,
+            staged_start: false,
+            settling: 0,
+            screened: 8,
+            screened_quiet: 4,
+            scored: 3,
+            behind: 25.0,
+            replaced: 5,
+            paired: 8,
+        }
+    }
+}
+
+impl Default for LocationSettings {
+    /// That of a rig.
+    fn default() -> Self {
+        Self {
+            p_value: 0.01,
+            caution: 1.1,
+            suspect: 1e-9,
+            slow_suspects: 2,
+            other_suspects: 4,
+            time_gain: 12.0,
+            shortest_period: 4.0,
+            peak: 12.0,
+        }
+    }
+}
+
+impl Default for VerdictSettings {
+    /// That of a rig.
+    fn default() -> Self {
+        Self {
+            confirms_held_out: false,
+            least_share: 0.05,
+            amplitude_errors: 2.0,
+            clock_errors: 5.0,
+            carried: 3.0,
+            detectable: 25.0,
+            fold_stretch: 3.0,
+            unseen: 50.0,
+            remainder: 0.05,
+            explains: 0.2,
+            credible: 0.95,
+            alternatives: 5,
+            counts_faults: true,
+        }
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self::preset(Source::Rig)
@@ -230,66 +321,12 @@ impl Settings {
                 heading: true,
                 exact_attitude: true,
             },
-            residual: ResidualSettings {
-                moving_block: 0.1,
-                resting_block: 0.5,
-                most_blocks: 40_000,
-                longest_rest: 10.0,
-                moving_points: 0.045,
-                resting_points: 0.25,
-                points_in_gaps: true,
-                leaves_out_passages: false,
-                passage_scatter: 5.0,
-                passage_change: 8.0,
-                keeps_sensors_without_rows: true,
-                coupled: None,
-            },
-            noise: NoiseSettings {
-                least_scatter: 1e-7,
-                longest_stretch: 20.0,
-                sway: &[],
-                whole_blocks: true,
-            },
-            library: LibrarySettings { grid: (5.0, 1.0 / 60.0), places_in_quiet_noise: false },
-            search: SearchSettings {
-                most: 3,
-                first_gain: 0.5,
-                further_gain: 0.0,
-                change_gain: 0.5,
-                staged_start: false,
-                settling: 0,
-                screened: 8,
-                screened_quiet: 4,
-                scored: 3,
-                behind: 25.0,
-                replaced: 5,
-                paired: 8,
-            },
-            location: LocationSettings {
-                p_value: 0.01,
-                caution: 1.1,
-                suspect: 1e-9,
-                slow_suspects: 2,
-                other_suspects: 4,
-                time_gain: 12.0,
-                shortest_period: 4.0,
-                peak: 12.0,
-            },
-            verdict: VerdictSettings {
-                confirms_held_out: false,
-                least_share: 0.05,
-                amplitude_errors: 2.0,
-                clock_errors: 5.0,
-                carried: 3.0,
-                detectable: 25.0,
-                fold_stretch: 3.0,
-                unseen: 50.0,
-                remainder: 0.05,
-                explains: 0.2,
-                credible: 0.95,
-                alternatives: 5,
-                counts_faults: true,
-            },
+            residual: ResidualSettings::default(),
+            noise: NoiseSettings::default(),
+            library: LibrarySettings::default(),
+            search: SearchSettings::default(),
+            location: LocationSettings::default(),
+            verdict: VerdictSettings::default(),
         }
     }
 

@@ -40,6 +40,8 @@ const CREEP: f64 = 3e-3;
 const NOISES: f64 = 8.0;
 /// Two rates further apart than this, rad/s, and than their noise are those of a jerk.
 const JERK: f64 = 1e-3;
+/// Poses of so many rows are remembered, half a kilobyte each.
+const REMEMBERED: usize = 500_000;
 /// At least this many readings to each side.
 const FEWEST: usize = 2;
 
@@ -104,10 +106,11 @@ impl Replay {
         Machine { gimbals, ..Machine::exact(self.axes.map(direction)) }
     }
 
-    /// Poses of an exact rig on a level base, row by row.
+    /// Poses of an exact rig on a level base, row by row; none of a long recording, which are computed as they are needed.
     fn poses(&self) -> &[Pose] {
         let of = |row: usize| pose(&self.machine(row, 0.0), Matrix3::identity());
-        self.poses.get_or_init(|| (0..self.time.len()).into_par_iter().map(of).collect())
+        let rows = if self.time.len() > REMEMBERED { 0 } else { self.time.len() };
+        self.poses.get_or_init(|| (0..rows).into_par_iter().map(of).collect())
     }
 }
 

@@ -81,15 +81,6 @@ impl<'s> Grid<'s> {
                 None => Ok(GridPosterior::alone(effect.neutral(scene.duration()))),
             }
         };
-        // Of an episode the signatures of all instants are held at once: one after the other.
-        let effects = &self.candidates.effects;
-        let alone = |at: &usize| effects[*at].is_shaped() && nonlinear::is_episode(effects[*at]);
-        let (episodes, others): (Vec<usize>, Vec<usize>) = (0..effects.len()).partition(alone);
-        let placed = |at: &usize| Ok((*at, shape((*at, &effects[*at]))?));
-        let mut shapes: Vec<(usize, GridPosterior)> =
-            others.par_iter().map(placed).collect::<Result<_, DiagnosisError>>()?;
-        shapes.extend(episodes.iter().map(placed).collect::<Result<Vec<_>, DiagnosisError>>()?);
-        shapes.sort_by_key(|(at, _)| *at);
-        Ok(shapes.into_iter().map(|(_, shape)| shape).collect())
+        self.candidates.effects.par_iter().enumerate().map(shape).collect()
     }
 }

@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn a_likelihood_sharper_than_the_menu_counts_as_the_share_of_a_cell_that_it_fills() {
+    fn a_likelihood_sharper_than_the_grid_counts_its_share_of_a_cell() {
         // N(0.3, 0.02²) in cells of one, and from 32 shapes to a cell.
         let bell = |x: f64| -0.5 * ((x - 0.3) / 0.02).powi(2);
         let whole = scanned(&(0..9).map(|k| bell(f64::from(k - 4))).collect::<Vec<_>>());

@@ -278,17 +278,21 @@ fn pairs(
         times.iter().map(|time| placed(effect, backdrop.scene.duration(), *time, f64::INFINITY)).collect();
     let (projected, each) = project(effect, &shapes, reference, backdrop)?;
     let own: Vec<usize> = (0..each).collect();
-    let mut scanned = Scanned { shapes: Vec::new(), values: Vec::new(), priors: Vec::new() };
-    for (i, start) in times.iter().enumerate().filter(|(_, time)| starts.contains(time)) {
+    let mut asked: Vec<(usize, Option<usize>)> = Vec::new();
+    for (i, _) in times.iter().enumerate().filter(|(_, time)| starts.contains(time)) {
         let later = (i + 1..times.len()).filter(|j| ends.contains(&times[*j]));
-        for j in later.map(Some).chain([None]) {
-            let pair = projected.combined(&places(i, each), j.map(|j| places(j, each)).as_deref());
-            scanned.values.push(pair.log_bayes_factor(&[&own]));
-            scanned.priors.push(0.0);
-            scanned.shapes.push((*start, j.map_or(f64::INFINITY, |j| times[j])));
-        }
+        asked.extend(later.map(Some).chain([None]).map(|j| (i, j)));
     }
-    Ok(scanned)
+    let value = |(i, j): &(usize, Option<usize>)| {
+        let end = j.map(|j| places(j, each));
+        projected.combined(&places(*i, each), end.as_deref()).log_bayes_factor(&[&own])
+    };
+    let shape = |(i, j): &(usize, Option<usize>)| (times[*i], j.map_or(f64::INFINITY, |j| times[j]));
+    Ok(Scanned {
+        shapes: asked.iter().map(shape).collect(),
+        values: asked.par_iter().map(value).collect(),
+        priors: vec![0.0; asked.len()],
+    })
 }
 
 /// Improves a shape by steps that are halved, and tells how far each parameter may move before the evidence falls by a

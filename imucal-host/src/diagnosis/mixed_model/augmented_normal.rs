@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use super::{
     design::{Channel, Design, Normal, Signature, places, reaching},
     precision::Precision,
-    random_effects::Columns,
+    random_effects::{Columns, in_parts},
 };
 
 /// What is fitted in any case, and the residual.
@@ -34,8 +34,8 @@ pub struct AugmentedNormal<'a> {
 struct Fitted<'a> {
     channel: &'a Channel,
     precision: &'a Precision,
-    /// X.
-    columns: Columns<'a>,
+    /// X, in parts.
+    columns: Vec<DMatrix<f64>>,
     /// Y_Xᵀ: a row a column.
     eliminated: DMatrix<f64>,
     normal: Normal,
@@ -50,6 +50,7 @@ impl<'a> AugmentedNormal<'a> {
             let own: Vec<usize> = from.iter().map(|at| channel.ids[*at]).collect();
             let columns = channel.columns(&own);
             let products = precision.effects().cross_products(std::slice::from_ref(&columns));
+            let columns = in_parts(&columns, channel.y.len());
             let eliminated = precision.eliminated(&products);
             let normal = Normal::within(&precision.less(&products, &eliminated), precision.log_determinant);
             Fitted { channel, precision, columns, eliminated, normal, ids }

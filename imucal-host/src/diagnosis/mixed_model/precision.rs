@@ -24,6 +24,9 @@ use super::{
     symmetric_product,
 };
 
+/// States that are multiplied at a time.
+const PART: usize = 2048;
+
 /// Σ⁻¹ of the channels of some random effects.
 #[derive(Clone, Debug)]
 pub struct Precision {
@@ -67,7 +70,12 @@ impl Precision {
 
     /// Xᵀ Σ⁻¹ X, given Yᵀ.
     pub fn less(&self, x: &CrossProducts, eliminated: &DMatrix<f64>) -> DMatrix<f64> {
-        symmetric_product::with_product(x.plain.clone(), -1.0, eliminated, &eliminated.transpose())
+        let mut products = x.plain.clone();
+        for from in (0..eliminated.ncols()).step_by(PART) {
+            let part = eliminated.columns(from, PART.min(eliminated.ncols() - from)).into_owned();
+            symmetric_product::add_product(&mut products, -1.0, &part, &part.transpose());
+        }
+        products
     }
 
     /// Yᵀ: a row a column of X.

@@ -132,17 +132,18 @@ impl RandomEffects {
         products
     }
 
-    /// Of some columns of a single channel, and F D⁻¹ Xᵀ of these with others.
+    /// Of some columns of a single channel, and Fᵀ D⁻¹ X of these with others, which are given in parts.
     pub fn cross_products_with(
         self: &Arc<Self>,
         columns: &Columns<'_>,
-        others: &Columns<'_>,
+        others: &[DMatrix<f64>],
     ) -> (CrossProducts, DMatrix<f64>) {
         let mut products = CrossProducts::zeros(self, columns.len());
-        let mut across = DMatrix::zeros(columns.len(), others.len());
+        let mut across = DMatrix::zeros(columns.len(), others.first().map_or(0, DMatrix::ncols));
         for rows in &self.channels {
+            let mut others = others.iter();
             rows.for_each_part(columns, |part, weighted, x| {
-                across.gemm(1.0, weighted, &gathered(others, part.clone()), 1.0);
+                others.next().into_iter().for_each(|other| across.gemm(1.0, weighted, other, 1.0));
                 products.add(rows, part, weighted, x);
             });
         }
@@ -179,6 +180,11 @@ impl Rows {
     }
 }
 
+/// Columns in parts, for [`RandomEffects::cross_products_with`].
+pub fn in_parts(columns: &Columns<'_>, blocks: usize) -> Vec<DMatrix<f64>> {
+    (0..blocks).step_by(PART).map(|from| gathered(columns, from..(from + PART).min(blocks))).collect()
+}
+
 /// Some blocks of columns.
 fn gathered(columns: &Columns<'_>, part: Range<usize>) -> DMatrix<f64> {
     let mut x = DMatrix::zeros(part.len(), columns.len());
@@ -199,9 +205,12 @@ impl CrossProducts {
 
     /// Adds some blocks of a channel.
     fn add(&mut self, rows: &Rows, part: Range<usize>, weighted: &DMatrix<f64>, x: &DMatrix<f64>) {
-        for (block, row) in part.zip(weighted.column_iter()) {
+        let count = x.ncols();
+        let states = self.states.as_mut_slice();
+        for (block, row) in part.zip(weighted.as_slice().chunks_exact(count.max(1))) {
             for (state, z) in rows.z.row(block) {
-                self.states.column_mut(*state).axpy(*z, &row, 1.0);
+                let own = &mut states[state * count..(state + 1) * count];
+                own.iter_mut().zip(row).for_each(|(own, value)| *own += z * value);
             }
         }
         symmetric_product::add_product(&mut self.plain, 1.0, weighted, x);

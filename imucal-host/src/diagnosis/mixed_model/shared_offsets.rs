@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn the_greatest_value_is_found_up_and_down_and_no_further_than_it_may_be_looked_for() {
+    fn the_greatest_value_is_found_up_and_down_within_the_steps() {
         let peak_at = |peak: i32| likeliest(&|step| Some(-f64::from((step - peak).pow(2))));
         for peak in -STEPS..=STEPS {
             assert_eq!(peak_at(peak), Some(0.0), "{peak}");

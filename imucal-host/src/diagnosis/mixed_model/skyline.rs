@@ -7,6 +7,9 @@
 //! A. George, J. Liu, Computer Solution of Large Sparse Positive Definite Systems (1981), ch. 4. nalgebra's sparse
 //! factor lacks the envelope, and a dense one would be zeros for the most part.
 
+/// Rows that are taken from another at a time, so that it is read and written less often.
+const ROWS: usize = 4;
+
 /// A symmetric matrix of which each row is kept from its first entry to the diagonal.
 #[derive(Clone, Debug)]
 pub struct Skyline {
@@ -111,7 +114,17 @@ impl Factor {
             let (left, diagonal) = self.skyline.row(i);
             let (above, below) = x.split_at_mut(i * width);
             let own = &mut below[..width];
-            for (a, other) in left.iter().zip(above[from * width..].chunks_exact(width.max(1))) {
+            let above = &above[from * width..];
+            let whole = left.len() - left.len() % ROWS;
+            for (at, a) in left.chunks_exact(ROWS).enumerate() {
+                let rows = &above[at * ROWS * width..(at + 1) * ROWS * width];
+                let (first, second) = rows.split_at(2 * width);
+                let ((p, q), (r, s)) = (first.split_at(width), second.split_at(width));
+                for (own, ((p, q), (r, s))) in own.iter_mut().zip(p.iter().zip(q).zip(r.iter().zip(s))) {
+                    *own -= (a[0] * p + a[1] * q) + (a[2] * r + a[3] * s);
+                }
+            }
+            for (a, other) in left[whole..].iter().zip(above[whole * width..].chunks_exact(width.max(1))) {
                 own.iter_mut().zip(other).for_each(|(own, other)| *own -= a * other);
             }
             own.iter_mut().for_each(|own| *own /= diagonal);

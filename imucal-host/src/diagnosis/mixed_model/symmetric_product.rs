@@ -5,12 +5,6 @@ use nalgebra::DMatrix;
 /// Columns that are multiplied at a time: far more than a kernel's, far fewer than a menu of shapes has.
 const WIDTH: usize = 96;
 
-/// C + α A B, where both C and A B are symmetric.
-pub fn with_product(mut c: DMatrix<f64>, alpha: f64, a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    add_product(&mut c, alpha, a, b);
-    c
-}
-
 /// Adds α A B to C, where both are symmetric.
 pub fn add_product(c: &mut DMatrix<f64>, alpha: f64, a: &DMatrix<f64>, b: &DMatrix<f64>) {
     let n = c.ncols();
@@ -33,7 +27,8 @@ mod tests {
             let a = DMatrix::from_fn(n, 30, |i, j| ((i * 31 + j * 7) as f64).sin());
             let c = DMatrix::from_fn(n, n, |i, j| ((i + j) as f64).cos());
             let expected = &c - &a * a.transpose() * 0.5;
-            let found = with_product(c, -0.5, &a, &a.transpose());
+            let mut found = c;
+            add_product(&mut found, -0.5, &a, &a.transpose());
             assert!((&found - &expected).amax() < 1e-12 && found == found.transpose(), "{n}");
         }
     }

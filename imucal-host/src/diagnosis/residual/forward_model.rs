@@ -198,12 +198,14 @@ impl<'a> ForwardModel<'a> {
 
     /// Recorded less simulated, block by block. `None` where a triad is singular.
     pub fn residual(&self, doses: &[Dose]) -> Result<Means, DiagnosisError> {
-        let simulated = self.simulated(doses)?;
-        let of = |(kind, output): &(SensorKind, Vec<_>)| (*kind, self.difference(*kind, output));
+        let chain = Chain::new(doses);
+        let input = chain.inputs(self.motion, &self.recording.time);
+        // A sensor's output is let go before the next one's is made: it is as long as the recording.
+        let of =
+            |kind: &SensorKind| Ok((*kind, self.difference(*kind, &self.output(&chain, *kind, &input)?)));
+        let differences: Vec<_> = self.kinds.par_iter().map(of).collect::<Result<_, DiagnosisError>>()?;
         let mut means: Means = Default::default();
-        for (kind, difference) in simulated.par_iter().map(of).collect::<Vec<_>>() {
-            means[kind as usize] = difference;
-        }
+        differences.into_iter().for_each(|(kind, difference)| means[kind as usize] = difference);
         Ok(self.seen(means))
     }
 

@@ -94,7 +94,7 @@ mod tests {
     use crate::diagnosis::settings::Settings;
 
     #[test]
-    fn a_passage_is_left_out_with_the_moment_at_which_the_hand_stops_and_nothing_far_from_it_is() {
+    fn a_passage_is_left_out_with_its_stop_and_nothing_far_from_it() {
         let time = |k: usize| 0.1 * k as f64;
         let blocks: Vec<Block> =
             (0..400).map(|k| Block { rows: 3 * k..3 * k + 3, time: time(k), rest: None }).collect();
