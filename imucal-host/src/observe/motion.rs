@@ -12,7 +12,7 @@ use imucal_core::{
 };
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
-use super::turn::TurnGap;
+use super::turn::{TurnGap, held, jump};
 use crate::{noise::Span, recording::Recording};
 
 /// A block lasts about this long, s: five samples at 100 Hz.
@@ -214,8 +214,8 @@ impl MotionInput<'_> {
         if let Some(row) = rows.clone().find(|k| !self.usable[*k]) {
             return Err(TurnGap::Unusable { row });
         }
-        let gap = GAP * self.interval;
-        if let Some(row) = rows.clone().skip(1).find(|k| self.time[*k] - self.time[k - 1] > gap) {
+        let every: Vec<usize> = rows.clone().collect();
+        if let Some(row) = jump(self.time, &every, GAP * self.interval) {
             return Err(TurnGap::Jump { row });
         }
         let [start, end] = ends.map(quaternion);
@@ -234,10 +234,8 @@ impl MotionInput<'_> {
         };
         let mut builder = BlockBuilder::default();
         let mut first = rows.start;
-        for k in rows.clone() {
-            let from = if k == rows.start { self.time[k] } else { self.time[k - 1] };
-            let to = if k + 1 == rows.end { self.time[k] } else { self.time[k + 1] };
-            let (rate, held) = (self.rates[k] - wander(self.time[k]), 0.5 * (to - from));
+        for (k, held) in held(self.time, &every) {
+            let rate = self.rates[k] - wander(self.time[k]);
             builder.push(&rate, held);
             data.samples.push((rate, held, data.blocks.len()));
             if builder.count() < size && k + 1 < rows.end {
@@ -272,7 +270,7 @@ mod tests {
     };
 
     #[test]
-    fn a_perfect_gyroscope_arrives_where_the_encoders_do_with_earth_s_rotation_taken_out() {
+    fn a_perfect_gyroscope_arrives_where_the_encoders_do() {
         let time: Vec<f64> = (0..301).map(|k| f64::from(k) * 0.01).collect();
         let earth_p = Vector3::new(5e-3, 0.0, -5e-3);
         let attitudes: Attitudes = time.iter().map(|t| Some(exp(&(Vector3::z() * 0.5 * *t)))).collect();

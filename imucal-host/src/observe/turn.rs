@@ -100,6 +100,21 @@ fn turn_rows(time: &[f64], before: &Range<usize>, after: &Range<usize>) -> Range
     first..last
 }
 
+/// Rows with the time for which each one's sample is held, s: from half-way to the row before it to half-way to the one
+/// after (the trapezoidal rule).
+pub(super) fn held<'a>(time: &'a [f64], rows: &'a [usize]) -> impl Iterator<Item = (usize, f64)> + 'a {
+    rows.iter().enumerate().map(|(at, row)| {
+        let from = time[rows[at.saturating_sub(1)]];
+        let to = time[rows[(at + 1).min(rows.len() - 1)]];
+        (*row, 0.5 * (to - from))
+    })
+}
+
+/// The first row that comes later than this after the row before it, s.
+pub(super) fn jump(time: &[f64], rows: &[usize], gap: f64) -> Option<usize> {
+    rows.windows(2).find(|pair| time[pair[1]] - time[pair[0]] > gap).map(|pair| pair[1])
+}
+
 /// Compresses the motion between two rests; see [`compress_rows`].
 ///
 /// # Errors
@@ -124,8 +139,7 @@ pub fn compress(
     )
 }
 
-/// Compresses the rows of a turn between two rests, by their indices. Rates are taken less the bias path, and each is
-/// held from half-way to the sample before it to half-way to the one after (the trapezoidal rule).
+/// Compresses the rows of a turn between two rests, by their indices. Rates are taken less the bias path.
 ///
 /// # Errors
 /// [`TurnGap`], with the row, where the motion was not wholly recorded.
@@ -146,8 +160,8 @@ pub fn compress_rows(
     if measured.len() < 2 {
         return Err(TurnGap::Unusable { row: rows.start });
     }
-    if let Some(pair) = measured.windows(2).find(|pair| time[pair[1]] - time[pair[0]] > GAP * interval) {
-        return Err(TurnGap::Jump { row: pair[1] });
+    if let Some(row) = jump(time, &measured, GAP * interval) {
+        return Err(TurnGap::Jump { row });
     }
     let count = rows.len() / usize::from(BLOCK) + 1;
     let (mut blocks, mut durations) = (Vec::with_capacity(count), Vec::with_capacity(count));
@@ -157,10 +171,8 @@ pub fn compress_rows(
         blocks.push(block);
         durations.push(duration);
     };
-    for (index, k) in measured.iter().copied().enumerate() {
-        let from = if index == 0 { time[k] } else { time[measured[index - 1]] };
-        let to = measured.get(index + 1).map_or(time[k], |next| time[*next]);
-        builder.push(&(gyr[k] - bias.at(time[k])), 0.5 * (to - from));
+    for (k, held) in held(time, &measured) {
+        builder.push(&(gyr[k] - bias.at(time[k])), held);
         if builder.count() == BLOCK {
             keep(&mut builder);
         }
