@@ -112,7 +112,7 @@ fn pass(device: TcpStream, mut host: TcpStream, mut change: impl FnMut(&mut Repl
 }
 
 #[test]
-fn verify_replays_a_recording_through_the_device_and_finds_every_bit_the_same() {
+fn verify_replays_through_the_device_and_finds_every_bit_the_same() {
     if !ready() {
         return;
     }
@@ -129,7 +129,7 @@ fn verify_replays_a_recording_through_the_device_and_finds_every_bit_the_same() 
 }
 
 #[test]
-fn verify_reports_a_device_that_is_one_ulp_off_in_one_sample_or_one_parameter() {
+fn verify_reports_a_device_one_ulp_off_in_a_sample_or_parameter() {
     if !ready() {
         return;
     }
@@ -178,7 +178,7 @@ fn a_device_that_is_not_there_is_an_error_that_says_what_to_do() {
 
 #[cfg(unix)]
 #[test]
-fn over_a_serial_port_a_record_is_put_got_and_used_by_one_program_after_another() {
+fn over_a_serial_port_a_record_is_put_got_and_used() {
     if !ready() {
         return;
     }

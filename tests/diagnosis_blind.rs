@@ -53,7 +53,7 @@ fn a_figure_of_any_number_of_trials_can_be_refused() {
 }
 
 #[test]
-fn a_small_set_of_sealed_trials_is_answered_no_worse_than_the_contract_allows() {
+fn a_small_set_of_sealed_trials_is_answered_as_the_contract_asks() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = Folder::open(folder.path(), Nonce::parse(NONCE)).expect("a new set");
     let jobs = std::thread::available_parallelism().map_or(1, usize::from);
@@ -102,7 +102,7 @@ fn two_slow_effects_of_one_sensor_are_found_together() {
 const OTHERS: &str = "7494c662eba6467320cfb2ae08c9e715ee7cde2a152f6e89b6d72aa03c575631";
 
 #[test]
-fn a_lone_episode_is_placed_where_it_began_and_ended_whatever_the_drift_made_of_it() {
+fn a_lone_episode_is_placed_where_it_began_and_ended_despite_drift() {
     let (drawn, diagnosis) = drawn(OTHERS, 77);
     assert_eq!(named(&diagnosis), ["mag.bias_step"]);
     for (name, true_value) in

@@ -99,15 +99,22 @@ fn a_term_taken_out_of_the_baseline_is_named() {
     }
 }
 
+/// Those that are diagnosed here, of the twelve.
+const ASKED: usize = 3;
+
 #[test]
-fn every_recording_without_a_label_has_an_answer_of_its_own() {
+fn recordings_without_a_label_are_answered_as_they_were() {
     let Some(folder) = data::folder() else { return };
     let answers: Value = serde_json::from_str(include_str!("sealed-answers.json")).expect("JSON");
     let answers = answers.as_object().expect("a map");
     assert_eq!(answers.len(), 12);
-    for (name, answer) in answers {
-        assert!(folder.join("blind").join(format!("{name}.csv.gz")).exists(), "{name}");
-        assert_eq!(answer["format"], "imucal-diagnosis/1", "{name}");
-        assert_eq!(answer["recording"], format!("{name}.csv.gz"));
+    for (name, answer) in answers.iter().step_by(answers.len() / ASKED) {
+        let path = folder.join("blind").join(format!("{name}.csv.gz"));
+        let recording = Recording::read(&path).expect("a good recording");
+        let diagnosis = diagnose(&recording, &Options::default(), &|_| ());
+        let causes = answer["causes"].as_array().expect("causes");
+        let expected: Vec<&str> = causes.iter().filter_map(|cause| cause["effect"].as_str()).collect();
+        assert_eq!(names(&diagnosis), expected, "{name}");
+        assert_eq!(serde_json::to_value(diagnosis.verdict).expect("JSON"), answer["verdict"], "{name}");
     }
 }

@@ -98,7 +98,7 @@ const SHOWING: [(&str, &[SensorKind]); 4] = [
 ];
 
 #[test]
-fn terms_taken_out_of_the_baseline_of_a_real_recording_are_named_with_their_size() {
+fn terms_removed_from_a_real_baseline_are_named_with_their_size() {
     let (mut named, mut sized, mut all) = (0, 0, 0);
     let every = SHOWING.iter().flat_map(|(name, kinds)| kinds.iter().map(move |kind| (*name, *kind)));
     for (name, kind) in every {
@@ -252,7 +252,7 @@ fn added(recording: &Recording, calm: impl Fn(f64) -> bool, during: impl Fn(f64)
 }
 
 #[test]
-fn a_magnet_that_came_near_for_a_while_is_named_with_its_field_and_its_times() {
+fn a_magnet_that_came_near_is_named_with_its_field_and_its_times() {
     let Some(calm) = read("broad-01-undisturbed") else { return };
     let Some(disturbed) = read("broad-32-magnet-1cm") else { return };
     let diagnosis = against(&disturbed, &model(&calm));

@@ -103,7 +103,7 @@ fn standard_errors_are_those_of_a_jackknife_within_a_factor_of_two() {
 }
 
 #[test]
-fn a_known_mounting_is_recovered_within_three_standard_errors_from_noisy_directions() {
+fn a_known_mounting_is_recovered_from_noisy_directions() {
     let mut scores = Vec::new();
     for seed in 0..20 {
         let mut draw = Draw::new(seed);
@@ -135,7 +135,7 @@ fn a_known_mounting_is_recovered_within_three_standard_errors_from_noisy_directi
 }
 
 #[test]
-fn a_simulated_magnetometer_mounted_upside_down_is_recovered_through_the_whole_calibration() {
+fn a_magnetometer_mounted_upside_down_is_recovered() {
     let scores: Vec<f64> = (0..20u64).into_par_iter().flat_map_iter(mounted_upside_down).collect();
     let (mean, std) = moments(&scores);
     println!("through the calibration: mean {mean:.3}, standard deviation {std:.3} of {}", scores.len());

@@ -16,7 +16,7 @@ const STACK_BUDGET: u32 = 8 * 1024;
 const INSTRUCTIONS_A_SAMPLE: usize = 40;
 
 #[test]
-fn every_image_links_without_panic_or_allocator_and_finds_its_answer_right() {
+fn every_image_links_without_panic_or_allocator_and_runs() {
     if !ready() {
         return;
     }
@@ -127,7 +127,7 @@ fn the_fits_of_the_image_find_their_sensors() {
 }
 
 #[test]
-fn device_and_host_fit_search_and_pack_to_the_same_bits_and_the_stack_suffices() {
+fn device_and_host_fit_search_and_pack_to_the_same_bits() {
     if !ready() {
         return;
     }

@@ -67,7 +67,7 @@ fn offsets_at_mid_scale_and_beyond_and_a_fifth_of_the_scale_need_no_swarm() {
 }
 
 #[test]
-fn where_the_scale_is_off_by_half_a_swarm_finds_what_levenberg_marquardt_alone_does_not() {
+fn a_swarm_finds_a_scale_off_by_half_where_lm_alone_does_not() {
     let Some(calibration) = calibrated(8.0, 0.51) else { return };
     let (fit, search) = found(&calibration);
     let swarm = search.swarm.unwrap_or_else(|| panic!("{search:?}"));
@@ -82,7 +82,7 @@ fn where_the_scale_is_off_by_half_a_swarm_finds_what_levenberg_marquardt_alone_d
 }
 
 #[test]
-fn a_truth_beyond_the_swarm_s_bounds_is_said_to_be_so_and_refused_with_its_figures() {
+fn a_truth_beyond_the_swarm_s_bounds_is_refused_with_its_figures() {
     let Some(calibration) = calibrated(0.0, 0.4) else { return };
     let (fit, search) = found(&calibration);
     let swarm = search.swarm.unwrap_or_else(|| panic!("{search:?}"));
@@ -98,7 +98,7 @@ fn a_truth_beyond_the_swarm_s_bounds_is_said_to_be_so_and_refused_with_its_figur
 }
 
 #[test]
-fn without_the_bias_of_the_rests_a_swarm_finds_an_offset_that_levenberg_marquardt_does_not() {
+fn without_a_rest_bias_a_swarm_finds_an_offset_that_lm_does_not() {
     let Some(calibration) = calibrated(0.0, 1.0) else { return };
     let evidence = calibration.sensor(SensorKind::Gyr).and_then(|s| s.evidence.as_ref());
     let Some(Evidence::Turns(known)) = evidence else { panic!("accepted") };

@@ -57,7 +57,7 @@ fn along(axis: Axis) -> usize {
 }
 
 #[test]
-fn sources_on_the_gimbals_are_large_in_twelve_parameters_and_gone_in_eighteen() {
+fn gimbal_sources_are_large_in_twelve_parameters_and_gone_in_eighteen() {
     let (mut without, mut with, mut worst) = (0.0, 0.0, 0.0f64);
     for (seed, axes) in (0..10).zip(AXES.into_iter().cycle()) {
         let mut draw = Draw::new(seed);
@@ -110,7 +110,7 @@ fn with_a_known_field_sixteen_of_eighteen_are_told_whatever_the_axes() {
 }
 
 #[test]
-fn with_an_unknown_field_seventeen_of_twenty_one_are_told_and_two_of_the_held_are_the_field_s() {
+fn with_an_unknown_field_seventeen_of_twenty_one_are_observable() {
     for axes in AXES {
         let mut draw = Draw::new(50);
         let truth = on_gimbals(&mut draw);
@@ -125,7 +125,7 @@ fn with_an_unknown_field_seventeen_of_twenty_one_are_told_and_two_of_the_held_ar
 }
 
 #[test]
-fn without_noise_the_fit_predicts_what_the_truth_does_and_the_sources_are_the_truth_s_up_to_the_gauge() {
+fn without_noise_the_sources_are_the_truth_s_up_to_the_gauge() {
     for (seed, axes) in (0..12).zip(AXES.into_iter().cycle()) {
         let mut draw = Draw::new(70 + seed);
         let truth = on_gimbals(&mut draw);

@@ -64,7 +64,7 @@ fn length_spread(triad: &Triad<f64>, unseen: &[ReferencePose<f64>]) -> f64 {
 }
 
 #[test]
-fn on_the_half_not_seen_vectors_predict_directions_better_than_an_ellipsoid_does() {
+fn on_held_out_data_vectors_predict_better_than_an_ellipsoid() {
     let Some(path) = data::real("broad-01-undisturbed.csv.gz") else { return };
     let recording = Recording::read(&path).expect("a good recording");
     let mag = recording.mag.as_ref().expect("recorded");
@@ -132,7 +132,7 @@ fn tracked(rows: usize) -> Recording {
 }
 
 #[test]
-fn mounting_and_direction_of_the_field_are_found_whatever_they_are_and_errors_are_as_large_as_said() {
+fn mounting_and_field_are_found_and_errors_are_as_large_as_stated() {
     for rows in [0, 1] {
         let recording = tracked(rows);
         let calibration = calibrate(&recording, &Options::default(), &|_| {});
@@ -182,7 +182,7 @@ fn a_body_turned_about_one_axis_alone_is_refused() {
 }
 
 #[test]
-fn a_reference_that_holds_no_attitude_is_said_once_and_the_field_forms_are_used() {
+fn an_empty_reference_is_reported_once_and_field_forms_are_used() {
     let mut recording = simulated::small();
     recording.reference = Some(vec![[f64::NAN; 4]; recording.rows()]);
     let calibration = calibrate(&recording, &Options::default(), &|_| {});

@@ -95,7 +95,7 @@ fn the_accelerometer_s_nine_parameters_are_scipy_s() {
 }
 
 #[test]
-fn in_single_precision_the_accelerometer_ends_within_a_hundredth_of_its_standard_errors() {
+fn in_f32_the_accelerometer_ends_within_a_hundredth_of_its_errors() {
     for name in INERTIAL {
         let golden = golden(&format!("acc_t9_{name}"));
         let Some((points, _)) = rest_means(name, &golden) else { return };
@@ -346,7 +346,7 @@ fn a_gyroscope_from_blocks_of_five_is_scipy_s_from_samples() {
 }
 
 #[test]
-fn our_own_ends_of_turns_move_the_gyroscope_by_a_small_part_of_a_standard_error() {
+fn own_ends_of_turns_move_the_gyroscope_by_little_of_its_error() {
     for name in INERTIAL {
         let golden = golden(&format!("gyr_turns_{name}"));
         let Some((worst, ..)) = gyroscope(name, &golden, false) else { return };

@@ -81,7 +81,7 @@ fn an_xsens_gyroscope_is_the_peers() {
 }
 
 #[test]
-fn thresholds_of_the_rest_test_move_a_gyroscope_s_gain_by_less_than_0_3_percent() {
+fn rest_thresholds_move_a_gyroscope_s_gain_by_less_than_0_3_percent() {
     for file in ["mpu9150-0.csv.gz", "mpu9150-1.csv.gz"] {
         let Some(calibration) = calibrated(file, &Options::default()) else { return };
         let fit = accepted(&calibration, SensorKind::Gyr);
@@ -292,7 +292,7 @@ fn assert_bootstrap(file: &str, every: usize, resamples: u64, factor: f64) {
 }
 
 #[test]
-fn standard_errors_of_a_hand_turned_cloud_agree_with_a_moving_block_bootstrap() {
+fn standard_errors_of_a_cloud_agree_with_a_moving_block_bootstrap() {
     // Both sides are estimated from the fifteen blocks that know nothing of each other: each to 18 %.
     assert_bootstrap("px4-mag.csv", 1, 200, 1.5);
 }

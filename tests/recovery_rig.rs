@@ -41,22 +41,21 @@ fn assert_right(scores: &Scores, group: usize) {
 }
 
 #[test]
-fn on_a_base_as_it_stands_errors_with_the_field_s_direction_estimated_are_as_large_as_their_standard_errors()
-{
+fn with_the_field_s_direction_estimated_errors_match_their_std_errors() {
     let scores = pooled(Noise::All, Base::Drawn);
     assert_right_in_all(&scores);
     (0..GROUPS.len()).for_each(|group| assert_right(&scores, group));
 }
 
 #[test]
-fn on_a_base_that_points_north_errors_with_a_known_field_are_as_large_as_their_standard_errors() {
+fn on_a_base_that_points_north_errors_match_their_standard_errors() {
     let scores = pooled(Noise::All, Base::Exact);
     assert_right_in_all(&scores);
     (0..GROUPS.len()).for_each(|group| assert_right(&scores, group));
 }
 
 #[test]
-fn without_drift_errors_are_as_large_as_their_standard_errors_and_those_of_biases_no_larger() {
+fn without_drift_errors_match_their_standard_errors() {
     let scores = pooled(Noise::White, Base::Drawn);
     assert_right_in_all(&scores);
     for group in 0..GROUPS.len() {

@@ -44,7 +44,7 @@ fn turns_about_one_axis_only_are_poor_coverage() {
 }
 
 #[test]
-fn rests_in_one_plane_are_poor_coverage_though_the_sensor_turns_about_two_axes() {
+fn rests_in_one_plane_are_poor_coverage_despite_turns_about_two_axes() {
     let attitudes =
         (0..16).map(|k| about(Vector3::z(), 1.7 * angle(k)) * about(Vector3::x(), angle(k))).collect();
     let calibration = calibrated(attitudes, USUAL);

@@ -48,7 +48,7 @@ fn labelled(label: &Value, effect: &str) -> Vector3<f64> {
 }
 
 #[test]
-fn a_level_base_without_effects_keeps_the_accelerometer_at_its_floor_and_the_ladder_unclimbed() {
+fn without_effects_the_ladder_is_not_climbed_on_a_level_base() {
     let Some((calibration, _)) = open(1) else { return };
     let acc = ladder(&calibration, SensorKind::Acc);
     assert_eq!(acc.chosen, "T12", "{}", acc.why);
@@ -68,7 +68,7 @@ fn a_level_base_without_effects_keeps_the_accelerometer_at_its_floor_and_the_lad
 }
 
 #[test]
-fn sources_on_the_gimbals_close_the_gap_that_twelve_parameters_leave_and_are_the_label_s() {
+fn gimbal_sources_close_what_twelve_parameters_leave() {
     // Of a large source twelve parameters leave forty times the floor, of a small one twice.
     for (number, gap) in [(2, 30.0), (3, 1.8)] {
         let Some((calibration, label)) = open(number) else { return };
@@ -173,7 +173,7 @@ fn recordings_without_an_effect_of_the_ladder_s_are_not_driven_up_it() {
 }
 
 #[test]
-fn an_encoder_that_errs_with_its_angle_stays_far_above_the_floor_whatever_the_rung() {
+fn an_encoder_error_stays_above_the_floor_on_every_rung() {
     let Some((calibration, _)) = open(10) else { return };
     let Some((sound, _)) = open(1) else { return };
     // Terms of the ladders take a part of it, significantly, and none brings it near what the recording without it

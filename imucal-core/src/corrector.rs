@@ -135,7 +135,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_compensator_has_the_bits_of_its_corrector_however_the_temperature_goes(
+        fn a_compensator_has_the_bits_of_its_corrector_at_any_temperature(
             samples in prop::collection::vec((uniform3(-4e4f32..4e4), 0usize..7), 1..60),
             bias_slope in uniform3(-9f32..9.0), scale_slope in uniform3(-0.01f32..0.01), with in any::<bool>(),
         ) {

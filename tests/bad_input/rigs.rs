@@ -71,7 +71,7 @@ fn encoders_in_degrees_are_said_to_be_so_and_the_field_forms_are_used() {
 }
 
 #[test]
-fn encoders_missing_for_a_stretch_cost_what_was_recorded_there_and_no_more() {
+fn encoders_missing_for_a_stretch_cost_that_stretch_alone() {
     let mut bad = on_rig();
     let clean = calibrated(&bad);
     let columns = encoders(&bad);
@@ -88,7 +88,7 @@ fn encoders_missing_for_a_stretch_cost_what_was_recorded_there_and_no_more() {
 }
 
 #[test]
-fn encoders_that_are_never_there_are_said_to_be_missing_and_the_field_forms_are_used() {
+fn without_encoders_the_field_forms_are_used_with_a_warning() {
     let mut bad = on_rig();
     let columns = encoders(&bad);
     for row in &mut bad.rows[1..] {
@@ -116,7 +116,7 @@ fn poses_in_gimbal_lock_are_refused_and_the_lock_is_named() {
 }
 
 #[test]
-fn a_reference_attitude_that_is_never_there_is_said_and_the_field_forms_are_used() {
+fn without_a_reference_attitude_the_field_forms_are_used() {
     let mut recording = simulated::small();
     recording.reference = Some(vec![[f64::NAN; 4]; recording.rows()]);
     let bad = Bad::of(&recording);

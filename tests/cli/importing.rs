@@ -38,7 +38,7 @@ fn two_files_of_imu_tk_become_a_recording_that_calibrates_as_the_original() {
 }
 
 #[test]
-fn an_import_says_which_file_is_missing_and_does_not_replace_what_it_reads() {
+fn an_import_names_a_missing_file_and_keeps_what_it_reads() {
     let folder = Folder::with_recording();
     let [acc, manifest, out] =
         ["small.csv", "small.toml", "new.csv"].map(|name| folder.path(name).display().to_string());

@@ -40,7 +40,7 @@ fn cut(recording: &mut Recording, from: usize, to: usize) {
 }
 
 #[test]
-fn without_rig_and_reference_a_motion_is_not_testable_and_says_what_is_missing() {
+fn without_rig_and_reference_a_motion_is_not_testable() {
     let folder = Folder::with(&rates(4), |recording| {
         recording.gimbal = None;
         recording.manifest.rig = None;
@@ -81,7 +81,7 @@ fn without_revisits_the_cost_is_said() {
 }
 
 #[test]
-fn at_constant_temperature_effects_of_temperature_are_not_testable_and_never_absent() {
+fn at_constant_temperature_its_effects_are_not_testable() {
     let folder = Folder::with(&rates(4), |recording| {
         recording.temperature.iter_mut().flatten().for_each(|degrees| *degrees = 25.0);
     });

@@ -60,7 +60,7 @@ fn request<'a>(rng: &mut ChaCha8Rng, records: &'a [Vec<u8>]) -> Request<'a> {
 }
 
 #[test]
-fn a_hundred_thousand_frames_over_a_bad_link_store_no_wrong_record_and_hang_nothing() {
+fn frames_over_a_bad_link_store_no_wrong_record_and_hang_nothing() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let records = records(20);
     let mut memory = BenchMemory::new();

@@ -157,7 +157,7 @@ const FITS: [(FitModel, usize); 4] =
     [(FitModel::T9, 40), (FitModel::I14, 40), (FitModel::E9, 200), (FitModel::K12, 20)];
 
 #[test]
-fn no_sample_of_the_board_s_own_sensor_is_lost_while_a_fit_takes_slices_of_two_samples_and_a_half() {
+fn no_sample_of_the_board_s_sensor_is_lost_during_a_fit() {
     for (model, count) in FITS {
         let mut memory = Memory::new();
         let mut stand = Stand::new(&mut memory);
@@ -181,7 +181,7 @@ fn no_sample_of_the_board_s_own_sensor_is_lost_while_a_fit_takes_slices_of_two_s
 }
 
 #[test]
-fn every_sample_that_comes_over_the_link_is_answered_while_a_fit_runs_and_the_uart_s_buffer_suffices() {
+fn every_sample_over_the_link_is_answered_while_a_fit_runs() {
     for (model, count) in FITS {
         let mut memory = Memory::new();
         let mut stand = Stand::new(&mut memory);

@@ -80,7 +80,7 @@ fn a_record_is_stored_used_given_back_and_there_after_a_power_cycle() {
 }
 
 #[test]
-fn a_record_of_another_sensor_a_newer_format_or_with_damage_is_refused_and_changes_nothing() {
+fn a_foreign_newer_or_damaged_record_is_refused_and_changes_nothing() {
     let mut memory = BenchMemory::new();
     let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
     assert_eq!(bench.ask(&put(RECORD), fault), None);
@@ -96,7 +96,7 @@ fn a_record_of_another_sensor_a_newer_format_or_with_damage_is_refused_and_chang
 }
 
 #[test]
-fn a_stored_record_of_another_sensor_is_kept_unused_until_it_is_to_be_replaced() {
+fn a_stored_record_of_another_sensor_is_kept_unused() {
     let mut memory = BenchMemory::new();
     let mut bench = Bench::new(Nor::new(2), "00300018", Counting::default(), &mut memory);
     assert_eq!(bench.ask(&put(&of_another()), fault), None);
@@ -126,7 +126,7 @@ fn get(bench: &mut Bench<'_>) -> Vec<u8> {
 }
 
 #[test]
-fn a_record_that_no_sensor_can_have_is_refused_with_its_figure_and_changes_nothing() {
+fn an_implausible_record_is_refused_with_its_figure() {
     let mut memory = BenchMemory::new();
     let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
     assert_eq!(bench.ask(&put(RECORD), fault), None);
@@ -184,7 +184,7 @@ fn a_fit_that_no_sensor_can_have_is_not_adopted_and_the_calibration_stays() {
 }
 
 #[test]
-fn a_fit_of_one_triad_leaves_serial_date_and_temperature_terms_of_the_others() {
+fn a_fit_of_one_triad_leaves_the_terms_of_the_others() {
     let mut memory = BenchMemory::new();
     let unknown = with(|record| record.sensor.serial.clear());
     let mut buffer = [0; record::MAX_LEN];
@@ -224,7 +224,7 @@ fn nothing_is_stored_where_nothing_is_in_use() {
 }
 
 #[test]
-fn a_record_that_has_lost_bits_is_reported_whether_one_before_it_is_there_or_not() {
+fn a_damaged_record_is_reported_with_or_without_an_older_one() {
     let mut memory = BenchMemory::new();
     let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
     assert_eq!(bench.ask(&put(RECORD), fault), None);

@@ -59,7 +59,7 @@ fn first_layout(pages: usize, records: &[Vec<u8>]) -> Nor {
 }
 
 #[test]
-fn a_cut_at_any_operation_and_inside_any_word_leaves_the_old_record_or_the_new() {
+fn a_power_cut_at_any_word_leaves_the_old_record_or_the_new() {
     let mut cuts = 0u32;
     for seed in 0..200 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

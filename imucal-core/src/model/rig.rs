@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vector_along_the_inner_axis_looks_the_same_from_middle_gimbal_and_table() {
+    fn along_the_inner_axis_middle_gimbal_and_table_look_the_same() {
         let pose = GimbalPose::new(Vector3::zeros(), &Vector3::new(0.4, -1.1, 2.3));
         let r = pose.rotations(&RigAxes([Axis::Z, Axis::Y, Axis::X]));
         assert!((r.c_m_t * Vector3::x() - Vector3::x()).norm() < 1e-15);

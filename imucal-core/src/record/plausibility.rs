@@ -240,7 +240,7 @@ mod tests {
     ];
 
     #[test]
-    fn gains_that_are_accepted_pass_in_every_unit_and_those_of_another_unit_do_not() {
+    fn accepted_gains_pass_in_every_unit_and_wrong_units_do_not() {
         for (sensor, units) in UNITS {
             for (unit, size) in units {
                 let of = |gain: f64| triad(*unit, units[0].0, gain as f32).check(sensor);

@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn with_an_unknown_field_four_of_twenty_one_are_held_two_of_them_of_the_field() {
+    fn with_an_unknown_field_four_of_twenty_one_are_fixed() {
         for axes in RIGS {
             let found = held(axes, ALL);
             assert_eq!(found.count_ones(), 4, "{axes:?}: {found:b}");

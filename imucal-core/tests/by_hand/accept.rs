@@ -245,7 +245,7 @@ fn a_straight_cost_departs_by_nothing_and_no_residual_by_none() {
 }
 
 #[test]
-fn without_redundancy_or_with_a_flat_direction_the_departure_is_the_largest() {
+fn without_redundancy_the_departure_is_the_largest() {
     let one = Rows { rows: vec![(1.0, [1.0])] };
     let flat = Rows { rows: vec![(1.0, [0.0]), (2.0, [0.0])] };
     for model in [one, flat] {

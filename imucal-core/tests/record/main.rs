@@ -182,7 +182,7 @@ fn figures_that_no_sensor_has_are_refused_both_ways() {
 }
 
 #[test]
-fn a_triad_that_stays_keeps_a_provenance_that_differs_in_date_or_serial_alone() {
+fn a_kept_triad_keeps_its_provenance_but_for_date_and_serial() {
     let original = golden_record();
     let (unit, date) = (original.sensor.clone(), original.date);
     let gyr = original.acc.clone().unwrap();

@@ -175,7 +175,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn the_truth_closes_all_half_of_it_three_quarters_and_its_opposite_makes_things_worse() {
+    fn the_truth_closes_all_half_of_it_three_quarters() {
         let drawn = draw(&Nonce::parse("5").unwrap(), Case::Afflicted(0)).unwrap();
         let [present] = &drawn.label.effects[..] else { panic!("{:?}", drawn.label) };
         let effect = effect::find(&present.effect).unwrap();

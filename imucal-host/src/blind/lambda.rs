@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_source_is_explained_by_another_that_differs_by_what_the_baseline_takes_up() {
+    fn a_source_equals_another_up_to_what_the_baseline_takes_up() {
         let simulation = quiet_drift(Programme::Mixed);
         let lambda = Lambda::new(&simulation).unwrap();
         let run = |d: [f64; 3]| lambda.run(&[dose("mag.gimbal_hard_iron_middle", &d)]).unwrap();

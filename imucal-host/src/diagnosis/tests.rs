@@ -117,7 +117,7 @@ fn a_drift_that_forgets_nothing_is_told_from_one_that_does() {
 }
 
 #[test]
-fn gimbals_that_turn_all_sensors_at_once_are_one_chance_and_no_harmonic_of_the_encoders() {
+fn pointing_errors_of_all_sensors_are_one_chance_and_no_harmonic() {
     let mut simulation = simulation(3);
     simulation.conditions.scatter = 0.02f64.to_radians();
     let recording = simulation.record("scattered").unwrap();
@@ -280,7 +280,7 @@ fn a_projection_is_what_is_left_of_a_column_after_least_squares() {
 }
 
 #[test]
-fn the_evidence_of_one_amplitude_is_the_mean_of_the_closed_form_over_its_scales() {
+fn the_evidence_of_one_amplitude_is_the_mean_over_its_scales() {
     let (score, information) = (30.0, 16.0);
     let projected = Projected {
         score: DVector::from_vec(vec![score]),

@@ -43,7 +43,7 @@ mod tests {
     }
 
     #[test]
-    fn on_a_part_of_the_sphere_noise_shifts_the_centre_by_the_frame_it_is_done_in() {
+    fn on_a_part_of_the_sphere_the_shift_of_the_centre_depends_on_the_frame() {
         let points = cap(0.3, 20_000, 2.0);
         let own = start(&points, 475.0).unwrap();
         let frame = Frame { middle: nalgebra::Vector3::zeros(), extent: 1.0 };

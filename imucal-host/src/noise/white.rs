@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn the_density_is_that_of_long_means_whether_or_not_the_samples_are_alike_or_drift() {
+    fn the_density_is_that_of_long_means_despite_correlation_and_drift() {
         for (memory, drift) in [(0.0, 0.0), (0.8, 0.0), (0.0, 0.02)] {
             for (axis, sigma) in [1.0f64, 2.0, 3.0].into_iter().enumerate() {
                 let ratio = found(memory, drift)[axis] / (0.01 * sigma * sigma);

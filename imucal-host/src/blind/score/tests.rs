@@ -143,7 +143,7 @@ fn every_figure_can_be_missed_alone_or_with_those_that_follow_from_it() {
 }
 
 #[test]
-fn a_weak_outside_effect_is_no_part_of_the_figure_at_200_but_of_that_below() {
+fn a_weak_outside_effect_counts_below_the_figure_at_200() {
     let weak = judged(&[("outside.gyr.ripple", 150.0)], naming(Verdict::None, &[]), None);
     let score = score(&[weak]);
     let of = |name: &str| score.shares.iter().chain(&score.beside).find(|share| share.name == name).unwrap();

@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_model_of_few_residuals_is_less_sure_of_its_errors_and_one_of_two_knows_nothing() {
+    fn a_model_of_few_residuals_is_less_sure_of_its_errors() {
         let of = |observations: u32, kind| {
             let stored = StoredTriad { observations, bias_std: [0.5, 0.0, 0.2], ..stored() };
             errors(kind, &stored, Nominal { offset: 0.0, per_unit: 1.0 }).1

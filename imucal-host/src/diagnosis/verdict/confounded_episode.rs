@@ -47,7 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn an_episode_as_long_as_the_movement_is_left_out_and_one_within_it_is_not() {
+    fn an_episode_as_long_as_the_movement_is_left_out() {
         let time: Vec<f64> = (0..10_000).map(|k| 0.01 * f64::from(k)).collect();
         let moves: Vec<bool> = time.iter().map(|t| (30.0..80.0).contains(t)).collect();
         let blocks = cut(&time, &moves, 0.01, &Settings::default().residual);

@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_close_the_gap_of_the_rows_they_have_spoilt_and_widen_no_other_sensor_s() {
+    fn faults_close_the_gap_of_their_own_rows_and_sensor() {
         let faults = [("gyr.saturation", 0.4), ("mag.stuck_samples", 3.0)];
         let diagnosis = diagnosed(&faults);
         assert_eq!((diagnosis.verdict, diagnosis.causes.len()), (Verdict::Explained, 2));

@@ -200,7 +200,7 @@ mod tests {
 
     /// A small selection of the study, whose figures are printed by `imucal study trust`.
     #[test]
-    fn intervals_of_twenty_healthy_recordings_hold_and_no_error_is_beyond_five() {
+    fn intervals_of_twenty_healthy_recordings_hold() {
         let cells = Cell::grid();
         let trials: Vec<Trial> = (0..20)
             .map(|k| (cells[3 * k], 77 + k as u64))

@@ -37,7 +37,7 @@ fn spread(scores: &[f64]) -> f64 {
 }
 
 #[test]
-fn the_gains_of_a_simulated_gyroscope_are_found_and_their_errors_are_as_large_as_said() {
+fn gains_of_a_simulated_gyroscope_match_their_standard_errors() {
     let mut pooled = Vec::new();
     for seed in 1..=24 {
         let (recording, gain, _) = simulated(Programme::Gyroscope, seed);
@@ -50,7 +50,7 @@ fn the_gains_of_a_simulated_gyroscope_are_found_and_their_errors_are_as_large_as
 }
 
 #[test]
-fn a_full_programme_tells_the_gains_within_four_standard_errors_with_g_sensitivity_too() {
+fn a_full_programme_has_gains_and_g_sensitivity_within_four_errors() {
     for seed in [1, 2, 3] {
         let (recording, gain, _) = simulated(Programme::Full, seed);
         for model in [G12, G21] {
@@ -67,7 +67,7 @@ fn a_full_programme_tells_the_gains_within_four_standard_errors_with_g_sensitivi
 }
 
 #[test]
-fn encoders_in_degrees_and_missing_axes_are_said_and_the_field_form_is_used() {
+fn encoders_in_degrees_and_missing_axes_are_reported() {
     let (mut degrees, ..) = simulated(Programme::Gyroscope, 1);
     let mut nameless = degrees.clone();
     degrees.gimbal.iter_mut().flatten().flatten().for_each(|angle| *angle = angle.to_degrees());
@@ -80,7 +80,7 @@ fn encoders_in_degrees_and_missing_axes_are_said_and_the_field_form_is_used() {
 }
 
 #[test]
-fn without_a_latitude_earth_s_rotation_is_left_in_the_bias_and_that_is_said() {
+fn without_a_latitude_earth_s_rotation_stays_in_the_bias() {
     let (mut recording, ..) = simulated(Programme::Gyroscope, 1);
     recording.manifest.site.latitude_deg = None;
     let calibration = calibrated(&recording, &Options::default());
@@ -137,7 +137,7 @@ fn a_reference_whose_clock_is_early_is_found_so_and_costs_nothing() {
 }
 
 #[test]
-fn a_comparison_finds_that_the_gain_matters_and_climbs_no_further_without_cause() {
+fn a_comparison_stops_at_the_gain_without_further_cause() {
     let (recording, ..) = simulated(Programme::Full, 6);
     let options = Options { compare: true, multipliers: vec![4.0], ..Options::default() };
     let calibration = calibrate(&recording, &options, &|_| ());
@@ -155,7 +155,7 @@ fn a_comparison_finds_that_the_gain_matters_and_climbs_no_further_without_cause(
 }
 
 #[test]
-fn a_start_far_off_is_left_to_the_swarm_which_ends_where_the_static_bias_does() {
+fn from_a_start_far_off_the_swarm_ends_where_the_static_bias_does() {
     let (recording, ..) = simulated(Programme::Gyroscope, 7);
     let sensor = recording.gyr.as_ref().unwrap();
     let usable = integrity::inspect(&recording).sensor(SensorKind::Gyr).unwrap().usable.clone();
