@@ -90,6 +90,37 @@ impl CallGraph {
     }
 }
 
+impl Function {
+    /// Takes up an instruction of two bytes at an address; `numbers` are those that lie in registers.
+    fn read_half(&mut self, first: u32, here: u64, (start, code): (u64, &[u8]), numbers: &mut [u32; 16]) {
+        match first {
+            // push
+            _ if first & 0xFE00 == 0xB400 => self.frame += 4 * (first & 0x1FF).count_ones(),
+            // sub sp, #n
+            _ if first & 0xFF80 == 0xB080 => self.frame += 4 * (first & 0x7F),
+            // add sp, rm
+            _ if first & 0xFF87 == 0x4485 => {
+                let number = numbers[(first >> 3 & 15) as usize] as i32;
+                self.frame += number.min(0).unsigned_abs();
+            }
+            // ldr rt, [pc, #n]
+            _ if first & 0xF800 == 0x4800 => {
+                let place = ((here + 4) & !3) - start + u64::from(4 * (first & 0xFF));
+                let number = code.get(place as usize..).and_then(|rest| rest.first_chunk::<4>());
+                numbers[(first >> 8 & 7) as usize] = number.map_or(0, |bytes| u32::from_le_bytes(*bytes));
+            }
+            // blx rm
+            _ if first & 0xFF87 == 0x4780 => self.indirect += 1,
+            // b
+            _ if first & 0xF800 == 0xE000 => {
+                let offset = ((first & 0x7FF) << 21) as i32 >> 20;
+                self.calls.push((here + 4).wrapping_add_signed(offset.into()));
+            }
+            _ => {}
+        }
+    }
+}
+
 /// Frame and calls of the code at an address.
 fn read(start: u64, code: &[u8]) -> Function {
     let half = |at: usize| code.get(at..at + 2).map(|b| u32::from(u16::from_le_bytes([b[0], b[1]])));
@@ -101,31 +132,7 @@ fn read(start: u64, code: &[u8]) -> Function {
         let here = start + at as u64;
         if first >> 11 < 0b11101 {
             at += 2;
-            match first {
-                // push
-                _ if first & 0xFE00 == 0xB400 => function.frame += 4 * (first & 0x1FF).count_ones(),
-                // sub sp, #n
-                _ if first & 0xFF80 == 0xB080 => function.frame += 4 * (first & 0x7F),
-                // add sp, rm
-                _ if first & 0xFF87 == 0x4485 => {
-                    let number = numbers[(first >> 3 & 15) as usize] as i32;
-                    function.frame += number.min(0).unsigned_abs();
-                }
-                // ldr rt, [pc, #n]
-                _ if first & 0xF800 == 0x4800 => {
-                    let place = ((here + 4) & !3) - start + u64::from(4 * (first & 0xFF));
-                    let number = code.get(place as usize..).and_then(|rest| rest.first_chunk::<4>());
-                    numbers[(first >> 8 & 7) as usize] = number.map_or(0, |bytes| u32::from_le_bytes(*bytes));
-                }
-                // blx rm
-                _ if first & 0xFF87 == 0x4780 => function.indirect += 1,
-                // b
-                _ if first & 0xF800 == 0xE000 => {
-                    let offset = ((first & 0x7FF) << 21) as i32 >> 20;
-                    function.calls.push((here + 4).wrapping_add_signed(offset.into()));
-                }
-                _ => {}
-            }
+            function.read_half(first, here, (start, code), &mut numbers);
             continue;
         }
         let Some(second) = half(at + 2) else { break };

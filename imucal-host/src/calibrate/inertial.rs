@@ -14,7 +14,7 @@ use super::{
         rest_noise::{AtRest, RestNoise},
     },
     gyr, known_attitudes,
-    outcome::{self, Calibration, FitSummary, SegmentationReport, SensorOutcome},
+    outcome::{self, Calibration, FitSummary, SegmentationReport, SensorOutcome, ThresholdTrial},
     segmentation::{self, Cut},
     usable,
 };
@@ -94,15 +94,26 @@ pub(crate) fn calibrate(
     }
     calibration.sensors.extend(gyr_outcome);
     let spreads = calibration.sensors.iter().filter_map(|s| s.fit.as_ref()?.gain_spread);
-    calibration.segmentation = Some(SegmentationReport {
+    let gain_spread = spreads.fold(0.0, f64::max);
+    calibration.segmentation = Some(segmentation_report(chosen, detector.noise().1, gain_spread, trials));
+    directions
+}
+
+/// What is reported of the rests.
+fn segmentation_report(
+    chosen: &Cut,
+    from_initial_rest: bool,
+    gain_spread: f64,
+    trials: Vec<ThresholdTrial>,
+) -> SegmentationReport {
+    SegmentationReport {
         rests: chosen.rows.clone(),
         multiplier: chosen.multiplier,
         threshold: chosen.threshold,
-        from_initial_rest: detector.noise().1,
-        gain_spread: spreads.fold(0.0, f64::max),
+        from_initial_rest,
+        gain_spread,
         trials,
-    });
-    directions
+    }
 }
 
 /// The site's gravity, m/s².
@@ -265,7 +276,7 @@ impl GyrShared<'_> {
         cuts: &[Cut],
         acc: &Triad<f64>,
         used: &[usize],
-        trials: &mut [outcome::ThresholdTrial],
+        trials: &mut [ThresholdTrial],
     ) -> SensorOutcome {
         let input =
             gyr::turns::GyrInput { directions: self.directions, ..self.input(gyr, chosen, acc, used) };

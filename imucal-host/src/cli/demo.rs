@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
+use imucal_core::record::CalibrationRecord;
 
 use super::{
     Ending,
@@ -20,13 +21,13 @@ use crate::{
         FitEquivalence, SampleEquivalence, fits,
         samples::{self, Samples},
     },
-    recording::SensorKind,
+    recording::{Recording, SensorKind},
     report::{self, table::words},
     simulator::{Programme, Simulation},
     store::StoredCalibration,
 };
 
-/// The effect that nothing downstream is told of, and its size in multiples of its usual one.
+/// The effect that the calibration does not model, and its size in multiples of its usual one.
 const WITHHELD: (&str, f64) = ("acc.scale_cubic", 3.0);
 
 /// What the demo writes, all of it at its end.
@@ -88,18 +89,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
 
     say!("\n4. Apply the record through the f32 core and compare with the f64 reference.\n");
     let device = stored.to_record(out)?;
-    let mut equal = true;
-    for kind in SensorKind::ALL {
-        let compared = Samples::of(&recording, kind).zip(stored.triad(kind)).zip(device.triad(kind.into()));
-        let result = compared.map(|((samples, stored), record)| samples::compare(samples, stored, record));
-        result.iter().try_for_each(print_samples)?;
-        equal &= result.is_some_and(|samples| samples.passes());
-    }
-    for outcome in &calibration.sensors {
-        let fit = fits::compare(&recording, outcome);
-        fit.iter().try_for_each(print_fit)?;
-        equal &= fit.is_some_and(|fit| fit.passes());
-    }
+    let equal = is_equal(&recording, &calibration, &stored, &device)?;
     apply(&recording, &stored, &device).write_into(&out.join("rig-calibrated.csv.gz"), &mut files)?;
 
     say!("\n5. Diagnose: which effect was withheld, and how far does the gap close with it?\n");
@@ -123,6 +113,28 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         say!("  {file:<24} {what}");
     }
     Ok(if found && equal && named { Ending::Done } else { Ending::Refused })
+}
+
+/// Whether samples and fits through the f32 core are those of the reference; both are printed.
+fn is_equal(
+    recording: &Recording,
+    calibration: &Calibration,
+    stored: &StoredCalibration,
+    device: &CalibrationRecord,
+) -> anyhow::Result<bool> {
+    let mut equal = true;
+    for kind in SensorKind::ALL {
+        let compared = Samples::of(recording, kind).zip(stored.triad(kind)).zip(device.triad(kind.into()));
+        let result = compared.map(|((samples, stored), record)| samples::compare(samples, stored, record));
+        result.iter().try_for_each(print_samples)?;
+        equal &= result.is_some_and(|samples| samples.passes());
+    }
+    for outcome in &calibration.sensors {
+        let fit = fits::compare(recording, outcome);
+        fit.iter().try_for_each(print_fit)?;
+        equal &= fit.is_some_and(|fit| fit.passes());
+    }
+    Ok(equal)
 }
 
 /// Largest error in standard errors, sensor by sensor, and what was withheld; whether all were accepted.

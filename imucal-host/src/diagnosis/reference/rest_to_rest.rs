@@ -22,7 +22,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use super::model::Model;
 use crate::{
     calibrate,
-    calibrate::{SensorOutcome, fit::outlier::outliers},
+    calibrate::{Calibration, SensorOutcome, fit::outlier::outliers},
     effect::{Machine, Truth},
     recording::{
         Recording, SensorKind,
@@ -72,17 +72,7 @@ impl RestToRest {
         let acc = recording.acc.as_ref().ok_or_else(|| NO_REST.to_owned())?;
         let options = calibrate::Options { skip: vec![SensorKind::Mag], ..Default::default() };
         let calibration = calibrate::calibrate(recording, &options, &|_| ());
-        let own = |kind: SensorKind| -> Result<Triad<f64>, String> {
-            if model.calibrated.contains(&kind) {
-                return Ok(model.triads[kind as usize]);
-            }
-            let outcome = calibration.sensor(kind).ok_or_else(|| NO_REST.to_owned())?;
-            match (&outcome.verdict, &outcome.fit) {
-                (Ok(()), Some(fit)) => Ok(fit.triad),
-                (Err(_), _) => Err(outcome.detail().unwrap_or_default()),
-                (Ok(()), None) => Err(NO_REST.to_owned()),
-            }
-        };
+        let own = |kind: SensorKind| own_triad(kind, model, &calibration);
         if !model.calibrated.contains(&SensorKind::Gyr)
             && let Some(why) = calibration.sensor(SensorKind::Gyr).and_then(misread)
         {
@@ -94,28 +84,16 @@ impl RestToRest {
         let rests = calibration.segmentation.as_ref().map(|cut| cut.rests.clone()).unwrap_or_default();
         let usable = |kind: SensorKind| integrity.sensor(kind).map(|sensor| sensor.usable.as_slice());
         let acc_usable = usable(SensorKind::Acc).unwrap_or_default();
-        let mean = |values: &[Vector3<f64>], usable: &[bool], rows: &Range<usize>| {
-            let rows = rows.clone().filter(|row| usable[*row]);
-            let (sum, count) = rows.fold((Vector3::zeros(), 0.0), |(s, n), row| (s + values[row], n + 1.0));
-            sum / f64::max(count, 1.0)
-        };
         let turn = rotation_of(&acc_triad.gain).ok_or("the accelerometer's calibration is singular")?;
         let in_table = |triad: Triad<f64>| Triad { gain: turn * triad.gain, ..triad };
         let acc_triad = in_table(acc_triad);
         let forces: Vec<Vector3<f64>> =
             rests.iter().map(|rows| acc_triad.correct(&mean(&acc.values, acc_usable, rows))).collect();
         // Against a calibration of its own, a rest that was knocked is no part of the question.
-        let errors: Vec<f64> = forces.iter().map(|f| f.norm() - place.gravity).collect();
-        let knocked: Vec<usize> = match model.calibrated.contains(&SensorKind::Acc) {
-            true => Vec::new(),
-            false => outliers(&errors).into_iter().map(|(rest, _)| rest).collect(),
+        let (rests, forces) = match model.calibrated.contains(&SensorKind::Acc) {
+            true => (rests, forces),
+            false => without_knocks(rests, forces, place.gravity),
         };
-        let (rests, forces): (Vec<_>, Vec<_>) = rests
-            .into_iter()
-            .zip(forces)
-            .enumerate()
-            .filter_map(|(at, rest)| (!knocked.contains(&at)).then_some(rest))
-            .unzip();
         if rests.len() < LEAST {
             return Err(format!(
                 "{NO_REST}; of rests, which tell the attitude by gravity, {LEAST} are needed, and there are {}",
@@ -124,20 +102,7 @@ impl RestToRest {
         }
         let gyr_triad = recording.gyr.as_ref().and_then(|_| own(SensorKind::Gyr).ok()).map(in_table);
         let along: Vec<Vector3<f64>> = forces.iter().map(|f| f.normalize()).collect();
-        let mut path =
-            Path { attitudes: vec![None; recording.rows()], at_rest: Vec::new(), turned: Vec::new() };
-        for (at, rows) in rests.iter().enumerate() {
-            let Some(before) = at.checked_sub(1) else {
-                path.begin(rows, &along[0]);
-                continue;
-            };
-            let rates = gyr_triad.as_ref().zip(recording.gyr.as_ref()).zip(usable(SensorKind::Gyr));
-            let turn = rates.and_then(|((triad, gyr), usable)| {
-                let means = [before, at].map(|rest| mean(&gyr.values, usable, &rests[rest]));
-                turn_between(&recording.time, &gyr.values, usable, [&rests[before], rows], means, &triad.gain)
-            });
-            path.go_on(&recording.time, [&rests[before], rows], turn, &along[at]);
-        }
+        let path = path(recording, &rests, &along, gyr_triad.as_ref(), usable(SensorKind::Gyr));
         let tracked = Tracked::new(&recording.time, &path.attitudes, temperature, place)
             .ok_or_else(|| NO_REST.to_owned())?;
         let mut moving = vec![true; recording.rows()];
@@ -154,6 +119,62 @@ impl RestToRest {
             with_gyroscope: gyr_triad.is_some(),
         })
     }
+}
+
+/// A sensor's triad: that of the model, or of the recording's own calibration; or why there is none.
+fn own_triad(kind: SensorKind, model: &Model, calibration: &Calibration) -> Result<Triad<f64>, String> {
+    if model.calibrated.contains(&kind) {
+        return Ok(model.triads[kind as usize]);
+    }
+    let outcome = calibration.sensor(kind).ok_or_else(|| NO_REST.to_owned())?;
+    match (&outcome.verdict, &outcome.fit) {
+        (Ok(()), Some(fit)) => Ok(fit.triad),
+        (Err(_), _) => Err(outcome.detail().unwrap_or_default()),
+        (Ok(()), None) => Err(NO_REST.to_owned()),
+    }
+}
+
+/// Mean of the usable samples of some rows.
+fn mean(values: &[Vector3<f64>], usable: &[bool], rows: &Range<usize>) -> Vector3<f64> {
+    let rows = rows.clone().filter(|row| usable[*row]);
+    let (sum, count) = rows.fold((Vector3::zeros(), 0.0), |(s, n), row| (s + values[row], n + 1.0));
+    sum / f64::max(count, 1.0)
+}
+
+/// Rests and their forces, m/s², without those whose force is an outlier against gravity, m/s².
+fn without_knocks(
+    rests: Vec<Range<usize>>,
+    forces: Vec<Vector3<f64>>,
+    gravity: f64,
+) -> (Vec<Range<usize>>, Vec<Vector3<f64>>) {
+    let errors: Vec<f64> = forces.iter().map(|f| f.norm() - gravity).collect();
+    let knocked: Vec<usize> = outliers(&errors).into_iter().map(|(rest, _)| rest).collect();
+    let all = rests.into_iter().zip(forces).enumerate();
+    all.filter_map(|(at, rest)| (!knocked.contains(&at)).then_some(rest)).unzip()
+}
+
+/// The attitudes from rest to rest, by the direction of gravity at each and, where there is one, by the gyroscope between.
+fn path(
+    recording: &Recording,
+    rests: &[Range<usize>],
+    along: &[Vector3<f64>],
+    gyr_triad: Option<&Triad<f64>>,
+    usable: Option<&[bool]>,
+) -> Path {
+    let mut path = Path { attitudes: vec![None; recording.rows()], at_rest: Vec::new(), turned: Vec::new() };
+    for (at, rows) in rests.iter().enumerate() {
+        let Some(before) = at.checked_sub(1) else {
+            path.begin(rows, &along[0]);
+            continue;
+        };
+        let rates = gyr_triad.zip(recording.gyr.as_ref()).zip(usable);
+        let turn = rates.and_then(|((triad, gyr), usable)| {
+            let means = [before, at].map(|rest| mean(&gyr.values, usable, &rests[rest]));
+            turn_between(&recording.time, &gyr.values, usable, [&rests[before], rows], means, &triad.gain)
+        });
+        path.go_on(&recording.time, [&rests[before], rows], turn, &along[at]);
+    }
+    path
 }
 
 /// Why a gyroscope is refused whose columns are not what they are said to be: nothing follows what it turns by.

@@ -11,6 +11,8 @@
 //! all rests have in common: the table's axes are those in which the accelerometer has none. Not modelled: that two
 //! neighbouring turns share the error of the rest between them.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::block::{Block, Means};
@@ -44,6 +46,23 @@ struct Rest {
     turn: Vec<(usize, Matrix3<f64>, f64, f64)>,
 }
 
+impl Rest {
+    /// Of these rows and this attitude; no turn leads to it yet.
+    fn new(rows: &Range<usize>, c_t_p: &Matrix3<f64>, cuts: &[Block], counts: &[Vec<usize>; 3]) -> Self {
+        let within = |cut: &usize| cuts[*cut].rows.start >= rows.start && cuts[*cut].rows.end <= rows.end;
+        let count = |cut: usize| [0, 1].map(|kind: usize| counts[kind].get(cut).copied().unwrap_or(0) as f64);
+        let along = c_t_p.tr_mul(&-Vector3::z());
+        let first = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
+        Self {
+            inside: (0..cuts.len()).filter(within).map(|cut| (cut, count(cut))).collect(),
+            along,
+            across: [first, along.cross(&first)],
+            from_before: None,
+            turn: Vec::new(),
+        }
+    }
+}
+
 impl GravityObservables {
     /// Of a movement whose means are over `cuts`, with usable rows `counts`; attitudes in the middle of the cuts are `of`.
     pub fn new(
@@ -57,23 +76,9 @@ impl GravityObservables {
         let mut rests: Vec<Rest> = Vec::new();
         let mut blocks = Vec::new();
         for (at, rows) in held.rests.iter().enumerate() {
-            let within = |cut: &Block| cut.rows.start >= rows.start && cut.rows.end <= rows.end;
             let c_t_p = held.attitudes[at];
-            let along = c_t_p.tr_mul(&-Vector3::z());
-            let first = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
-            let middle = |rows: &std::ops::Range<usize>| 0.5 * (time[rows.start] + time[rows.end - 1]);
-            let mut rest = Rest {
-                inside: (0..cuts.len())
-                    .filter(|cut| within(&cuts[*cut]))
-                    .map(|cut| {
-                        (cut, [0, 1].map(|kind: usize| counts[kind].get(cut).copied().unwrap_or(0) as f64))
-                    })
-                    .collect(),
-                along,
-                across: [first, along.cross(&first)],
-                from_before: None,
-                turn: Vec::new(),
-            };
+            let middle = |rows: &Range<usize>| 0.5 * (time[rows.start] + time[rows.end - 1]);
+            let mut rest = Rest::new(rows, &c_t_p, cuts, counts);
             if let Some(before) = at.checked_sub(1).filter(|_| held.turned[at]) {
                 rest.from_before = Some(c_t_p.tr_mul(&held.attitudes[before]));
                 let (start, end) = (middle(&held.rests[before]), middle(rows));

@@ -100,26 +100,27 @@ impl Preparation {
             triads.iter_mut().for_each(|triad| triad.gain = turn.tr_mul(&triad.gain));
         }
         for finding in &conventions.findings {
-            let Some(kind) = finding.effect.sensors.first().copied() else { continue };
-            leave_out(finding, recording, kind, &mut usable[kind as usize]);
-            if let Some(matrix) = finding.dose().and_then(|dose| response(finding.effect, &dose.values)) {
-                let triad = &mut triads[kind as usize];
-                // The samples are M v: what undoes M comes first.
-                triad.gain *= matrix.try_inverse().unwrap_or_else(Matrix3::identity);
-            }
+            undo(finding, recording, &mut usable, &mut triads);
         }
-        let Some(measured) =
-            SensorKind::ALL.iter().find(|kind| usable[**kind as usize].iter().any(|row| *row))
-        else {
+        if !usable.iter().flatten().any(|row| *row) {
             return Err(DiagnosisError::Recording("no sensor has a usable row".to_owned()));
-        };
-        debug_assert!(recording.sensor(*measured).is_some());
+        }
         let mut remarks = conventions.remarks;
         remarks.extend(model.remark.clone());
         remarks.extend(revisits::remark(&*movement));
         remarks.extend(shortcomings(recording));
         let findings = conventions.findings;
         Ok(Self { movement, held, moved, usable, triads, model, findings, remarks })
+    }
+}
+
+/// Leaves out the rows that a fault has spoilt, and has the sensor's triad undo what it does to all of them.
+fn undo(finding: &Finding, recording: &Recording, usable: &mut [Vec<bool>; 3], triads: &mut [Triad<f64>; 3]) {
+    let Some(kind) = finding.effect.sensors.first().copied() else { return };
+    leave_out(finding, recording, kind, &mut usable[kind as usize]);
+    if let Some(matrix) = finding.dose().and_then(|dose| response(finding.effect, &dose.values)) {
+        // The samples are M v: what undoes M comes first.
+        triads[kind as usize].gain *= matrix.try_inverse().unwrap_or_else(Matrix3::identity);
     }
 }
 

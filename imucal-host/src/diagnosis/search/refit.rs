@@ -12,6 +12,7 @@ use crate::{
         mixed_model::{
             design::{Column, Design, Signature},
             noise::{Noise, Weighing},
+            precision::Precision,
         },
         residual::{base_run::Reference, block::Means, forward_model::ForwardModel},
     },
@@ -72,7 +73,7 @@ pub fn signatures(
     columns.par_iter().map(of).collect()
 }
 
-/// Fits the amplitudes of all doses. `None` where the simulator fails.
+/// Fits the amplitudes of all doses.
 pub fn refit(
     scene: &ForwardModel<'_>,
     doses: Vec<Dose>,
@@ -100,15 +101,7 @@ pub fn refit(
         });
         least = Some(noise.clone());
         let precisions = weighing.precisions(&design, &noise);
-        let all: Vec<usize> = (0..columns.len()).collect();
-        let normal = design.normal(&precisions, &all);
-        let (precision, at) = prior(&fit.doses, &columns);
-        let covariance = (&normal.information + DMatrix::from_diagonal(&precision)).cholesky();
-        let covariance = covariance.ok_or(DiagnosisError::Fit { columns: columns.len() })?.inverse();
-        let step = &covariance * (&normal.score - precision.component_mul(&at));
-        let variances = covariance.diagonal();
-        let moved = step.iter().zip(variances.iter()).map(|(s, v)| s.abs() / v.sqrt());
-        let largest = moved.fold(0.0f64, f64::max);
+        let (step, largest) = step(&fit, &columns, &design, &precisions)?;
         let energy = |fit: &Fit| {
             let (precision, at) = prior(&fit.doses, &columns);
             let data = Design::of_residual(scene, &fit.residual).normal(&precisions, &[]).energy;
@@ -136,6 +129,24 @@ pub fn refit(
         near = (largest < NEAR).then_some((weighing, design));
     }
     Ok(fit)
+}
+
+/// The Gauss–Newton step in usual sizes, and how far it goes at most in standard errors.
+fn step(
+    fit: &Fit,
+    columns: &[Column],
+    design: &Design,
+    precisions: &[Precision],
+) -> Result<(DVector<f64>, f64), DiagnosisError> {
+    let all: Vec<usize> = (0..columns.len()).collect();
+    let normal = design.normal(precisions, &all);
+    let (prior, at) = prior(&fit.doses, columns);
+    let covariance = (&normal.information + DMatrix::from_diagonal(&prior)).cholesky();
+    let covariance = covariance.ok_or(DiagnosisError::Fit { columns: columns.len() })?.inverse();
+    let step = &covariance * (&normal.score - prior.component_mul(&at));
+    let moved =
+        step.iter().zip(covariance.diagonal().iter()).map(|(s, v)| s.abs() / v.sqrt()).fold(0.0, f64::max);
+    Ok((step, moved))
 }
 
 /// Precision of each column's prior, and where the column stands, in usual sizes. A term of the baseline may be of any
