@@ -22,12 +22,16 @@ use crate::{
         samples::{self, Samples},
     },
     recording::{Recording, SensorKind},
-    report::{self, table::words},
+    report::{
+        self,
+        prose::{hanging, listed},
+        table::words,
+    },
     simulator::{Programme, Simulation},
     store::StoredCalibration,
 };
 
-/// The effect that the calibration does not model, and its size in multiples of its usual one.
+/// The effect that is in the recording but not in the calibration, and its size in multiples of its usual one.
 const WITHHELD: (&str, f64) = ("acc.scale_cubic", 3.0);
 
 /// What the demo writes, all of it at its end.
@@ -64,7 +68,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let earlier = WRITTEN.iter().all(|(file, _)| out.join(file).exists());
     let mut files = arguments.overwrite.or(earlier).plan(&[], &planned)?;
     say!(
-        "1. Record: a simulated MTx on a three-gimbal rig, in 24 attitudes, six of them twice; one effect is withheld."
+        "1. Record: a simulated Xsens MTx on a three-gimbal rig, at rest in 24 attitudes, six of them twice.\n   \
+         One effect is in the recording that no later step knows of."
     );
     let mut simulation =
         Simulation { programme: Programme::MultiPosition, rate: 50.0, ..Simulation::default() };
@@ -74,7 +79,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let recording = simulation.record("rig.csv.gz")?;
     recording.write_into(&out.join("rig.csv.gz"), &mut files)?;
 
-    say!("\n2. Calibrate, and compare the models.\n");
+    say!("\n2. Calibrate, and compare the models by their residual on data left out of the fit.\n");
     let options = Options { compare: true, ..Options::default() };
     let calibration = calibrate(&recording, &options, &|_| {});
     output::text(&report::table::table(&calibration))?;
@@ -84,7 +89,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let json = serde_json::to_string_pretty(&report::json::calibration(&calibration))? + "\n";
     files.add(&out.join("calibration.json"), json.as_bytes())?;
 
-    say!("\n3. Compare with the truth, which the calibration never saw.\n");
+    say!("\n3. Compare the calibration with the simulated truth.\n");
     let found = against_truth(&calibration, &simulation)?;
 
     say!("\n4. Apply the record through the f32 core and compare with the f64 reference.\n");
@@ -92,7 +97,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let equal = is_equal(&recording, &calibration, &stored, &device)?;
     apply(&recording, &stored, &device).write_into(&out.join("rig-calibrated.csv.gz"), &mut files)?;
 
-    say!("\n5. Diagnose: which effect was withheld, and how far does the gap close with it?\n");
+    say!("\n5. Diagnose: which effect does the model lack, and what share of the gap does it explain?\n");
     let diagnosis = diagnose(&recording, &diagnosis::Options::default(), &|_| {});
     output::text(&report::diagnosis::page(&diagnosis))?;
     let json = serde_json::to_string_pretty(&diagnosis)? + "\n";
@@ -102,9 +107,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     say!(
         "{}",
         if named {
-            "It is the one that was withheld."
+            "The diagnosis names the effect that was withheld."
         } else {
-            "The one that was withheld is not among them."
+            "The diagnosis does not name the effect that was withheld."
         }
     );
 
@@ -137,7 +142,7 @@ fn is_equal(
     Ok(equal)
 }
 
-/// Largest error in standard errors, sensor by sensor, and what was withheld; whether all were accepted.
+/// Largest error in standard errors by sensor, and what to expect of it; whether all sensors were accepted.
 fn against_truth(calibration: &Calibration, simulation: &Simulation) -> anyhow::Result<bool> {
     let unit = simulation.unit_under_test();
     let mut all = true;
@@ -150,21 +155,28 @@ fn against_truth(calibration: &Calibration, simulation: &Simulation) -> anyhow::
         let gain = unit.c_t_q.transpose() * truth.gain;
         let ratio = |error: f64, std: f64| error.abs() / std;
         say!(
-            "{}: gain within {:.1}, bias within {:.1} standard errors",
+            "{}: largest error of the gain {:.1} standard errors, of the bias {:.1}",
             words(kind),
             (fit.triad.gain - gain).zip_map(&fit.gain_std, ratio).max(),
             (fit.triad.bias - truth.bias).zip_map(&fit.bias_std, ratio).max()
         );
     }
     for dose in &simulation.doses {
-        say!("withheld: {}: {}", dose.effect.id, dose.effect.words.cause);
+        let sensors: Vec<&str> = dose.effect.sensors.iter().map(|kind| words(*kind)).collect();
+        let sensors = listed(&sensors);
+        let text = format!(
+            "The effect withheld is {}: {} The model of the {sensors} has no term for it, and a standard error covers noise \
+             alone: many standard errors are expected there, and at most four elsewhere.",
+            dose.effect.id, dose.effect.words.cause
+        );
+        output::text(&hanging("", &text))?;
     }
     Ok(all)
 }
 
 fn print_samples(s: &SampleEquivalence) -> anyhow::Result<()> {
     say!(
-        "{}: {} samples, largest difference {:.1e} of full scale",
+        "{}: {} samples corrected; largest difference {:.1e} of full scale",
         words(s.kind),
         s.samples,
         s.max / s.full_scale
@@ -174,6 +186,9 @@ fn print_samples(s: &SampleEquivalence) -> anyhow::Result<()> {
 
 fn print_fit(fit: &FitEquivalence) -> anyhow::Result<()> {
     let worst = fit.parameters.iter().map(|p| (p.device - p.reference).abs() / p.std).fold(0.0, f64::max);
-    say!("{}: fitted again in f32, largest difference {worst:.4} standard errors", words(fit.kind));
+    say!(
+        "{}: fitted again in f32; largest difference from the f64 reference {worst:.4} standard errors",
+        words(fit.kind)
+    );
     Ok(())
 }

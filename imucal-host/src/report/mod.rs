@@ -4,5 +4,6 @@ pub mod catalogue;
 pub mod diagnosis;
 pub mod json;
 pub mod measure;
+pub mod model;
 pub mod prose;
 pub mod table;

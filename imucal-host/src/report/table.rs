@@ -2,7 +2,11 @@
 
 use std::fmt::{self, Write};
 
-use super::measure::{degrees, measure, measured_degrees, percent, plain, rounded};
+use super::{
+    measure::{degrees, measure, measured_degrees, percent, plain, rounded},
+    model,
+    prose::hanging,
+};
 use crate::{
     calibrate::{
         Calibration, FitSummary, SegmentationReport, SensorOutcome, fit::compare::Comparison,
@@ -65,7 +69,7 @@ fn write_comparison(text: &mut String, comparison: &Comparison) -> fmt::Result {
     writeln!(
         text,
         "  {:<5} {:<52} {:>10} {:>10} {:>10} {:>10} {:>9}",
-        "model", "adds", "parameters", "rms", "held out", "2nd half", "chance"
+        "model", "adds", "parameters", "rms", "held out", "2nd half", "p-value"
     )?;
     for (step, p_value) in &comparison.rungs {
         writeln!(
@@ -87,10 +91,10 @@ fn write_segmentation(text: &mut String, segmentation: &SegmentationReport) -> f
     let reference = if segmentation.from_initial_rest { "the initial rest" } else { "the quietest tenth" };
     let count = segmentation.rests.len();
     let rests = if count == 1 { "rest" } else { "rests" };
-    write!(text, "{count} {rests} at {} times the variance of {reference}", segmentation.multiplier)?;
+    write!(text, "{count} {rests}, found at {} times the variance of {reference}", segmentation.multiplier)?;
     if segmentation.gain_spread > 0.0 {
         let percent = 100.0 * segmentation.gain_spread;
-        write!(text, "; over the thresholds tried, gains move by {percent:.2} % at most")?;
+        write!(text, "; gains change by at most {percent:.2} % over the thresholds tried")?;
     }
     writeln!(text)
 }
@@ -105,6 +109,9 @@ fn write_sensor(text: &mut String, outcome: &SensorOutcome) -> fmt::Result {
             writeln!(text, "  because: {}", outcome.detail().unwrap_or_default())?;
             writeln!(text, "  to do:   {}", refused.advice)?;
         }
+    }
+    if let Some(described) = model::described(outcome.model) {
+        text.push_str(&hanging("  model:   ", described));
     }
     let Some(fit) = &outcome.fit else { return Ok(()) };
     if outcome.verdict.is_err() {
@@ -145,7 +152,7 @@ fn write_fit(text: &mut String, kind: SensorKind, fit: &FitSummary) -> fmt::Resu
     )?;
     writeln!(
         text,
-        "  condition {}, coverage {}, {} iterations to {}",
+        "  condition {}, coverage {}, {} iterations, stopped by {}",
         rounded(fit.condition, 1),
         percent(fit.coverage),
         fit.iterations,
@@ -181,7 +188,7 @@ fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {
     if let Some(wander) = fit.bias_wander.filter(|w| w.interpolated) {
         writeln!(
             text,
-            "  the bias wanders by {} °/s rms from rest to rest: interpolated between neighbouring rests",
+            "  the bias changes by {} °/s rms from rest to rest; it is interpolated between neighbouring rests",
             rounded(wander.spread.norm().to_degrees() / 3f64.sqrt(), 3)
         )?;
     }
@@ -238,8 +245,8 @@ fn write_rig(text: &mut String, rig: &RigFindings) -> fmt::Result {
         }
         writeln!(
             text,
-            "  NOT stored, since TOML and record hold gain and bias alone: a device leaves up to {} of these terms; for a \
-             device acc=I14, whose gain and bias take up what they can of them",
+            "  NOT stored, since TOML and record hold gain and bias alone: a device leaves errors of up to {} uncorrected; for \
+             a device use acc=I14, whose gain and bias absorb a part of these terms",
             plain(higher.uncorrected)
         )?;
     }
@@ -247,7 +254,7 @@ fn write_rig(text: &mut String, rig: &RigFindings) -> fmt::Result {
         writeln!(text, "  {note}")?;
     }
     if !rig.not_told.is_empty() {
-        writeln!(text, "  not told by these poses, held: {}", rig.not_told.join(", "))?;
+        writeln!(text, "  not observable from these poses, fixed: {}", rig.not_told.join(", "))?;
     }
     Ok(())
 }
