@@ -181,7 +181,10 @@ fn what_nothing_can_check_is_said() {
     let mut alone = without_gyroscope(tumbled(14, 5));
     alone.mag = None;
     let calibration = calibrated(&alone);
-    assert!(warnings(&calibration).contains("acc: nothing tells whether its axes are negated or swapped"));
+    assert!(
+        warnings(&calibration)
+            .contains("acc: this recording does not show whether its axes are negated or swapped")
+    );
 }
 
 /// Real recordings, each with one sensor's axes spoilt.

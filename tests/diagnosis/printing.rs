@@ -37,7 +37,7 @@ fn the_list_names_every_effect_of_the_catalogue_and_of_the_contract() {
     for id in ["rig.level_tilt", "acc.scale_cubic", "gyr.earth_rate", "mag.eddy_current", "clk.rate_error"] {
         assert!(ids.contains(&id), "{id}");
     }
-    for part in ["what:", "to do:", "needs:", "usually", "matters from", "what parts them:"] {
+    for part in ["what:", "to do:", "needs:", "usually", "matters from", "distinguish by:"] {
         assert!(out.contains(part), "{part}");
     }
 }

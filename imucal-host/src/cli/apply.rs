@@ -24,7 +24,7 @@ pub(super) struct Arguments {
     /// The calibration: TOML or record
     #[arg(long, value_name = "CAL")]
     calibration: PathBuf,
-    /// The corrected recording; default NAME-calibrated beside the input
+    /// The corrected recording; default NAME-calibrated in the input's folder
     #[arg(long, value_name = "REC2")]
     out: Option<PathBuf>,
     /// Apply a calibration made for another serial

@@ -24,22 +24,22 @@ use crate::{
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
-    /// Recordings with one, two or three effects of the catalogue, or with one from outside; 600 tell the figures
+    /// Recordings with one, two or three effects of the catalogue, or with one from outside; the published figures are of 600
     #[arg(long, value_name = "N", default_value_t = 24)]
     cases: usize,
-    /// Recordings without an effect; 1000 tell the figures
+    /// Recordings without an effect; the published figures are of 1000
     #[arg(long, value_name = "N", default_value_t = 40)]
     healthy: usize,
-    /// Folder of the set; a set that was interrupted goes on, and more cases may be asked of one that is over
+    /// Folder of the set. An interrupted set is resumed, and a finished one can be extended
     #[arg(long, value_name = "DIR", default_value = "imucal-blind")]
     out: PathBuf,
     /// Draw the cases of this nonce, up to 64 hexadecimal digits, instead of a fresh one
     #[arg(long, value_name = "HEX", value_parser = nonce)]
     nonce: Option<Nonce>,
-    /// Cases at a time; as many as there are cores if not given
+    /// Cases at a time (default: the number of cores)
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
-    /// Name the cases that were missed, with what was there and what was answered
+    /// List the missed cases, with the true effects and the answers
     #[arg(long)]
     misses: bool,
     /// Only score what the folder DIR holds

@@ -29,10 +29,13 @@ use crate::{
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
-    /// The recording: NAME.csv, NAME.csv.gz (or NAME.parquet), with NAME.toml beside it
+    /// The recording: NAME.csv, NAME.csv.gz (or NAME.parquet), with its manifest NAME.toml in the same folder
     recording: PathBuf,
-    /// Models, e.g. acc=T9,gyr=K9,mag=E9; acc=T6 fits six parameters from six faces; on a rig acc=I14 (T12, I17, I20,
-    /// I23), gyr=G12 (G21) and mag=X21 (M12, M15, X18); along an optical reference gyr=G12 (G21) and mag=M15 (M12). A sensor named here must be accepted for the program to end with 0
+    /// Models by sensor, e.g. acc=T9,gyr=K9,mag=E9: a letter and the number of parameters. From rests: acc=T9 (gain and
+    /// bias) or T6 (scale and bias, from six faces), gyr=K9 (gain), mag=E9 (ellipsoid). On a rig: acc=I14 (gain, bias and
+    /// tilt of the base) or T12, I17, I20, I23; gyr=G12 (gain and bias) or G21; mag=X21 (gain, bias, hard iron on gimbals
+    /// and field) or M12, M15, X18. With an optical reference: gyr=G12 or G21, mag=M15 or M12. The exit status is 0 only
+    /// if every sensor named here is accepted
     #[arg(long, value_delimiter = ',', value_parser = model)]
     model: Vec<(SensorKind, ModelChoice)>,
     /// Write the calibration for people
@@ -47,10 +50,10 @@ pub(super) struct Arguments {
     /// Use this multiple of the initial rest's variance for the rest test instead of trying 2 to 10
     #[arg(long, value_name = "MULTIPLE", value_parser = multiple)]
     threshold: Option<f64>,
-    /// Fit every model of the ladders, score each on what is left out, and say which to use
+    /// Fit every model, score each on data left out of its fit, and recommend one
     #[arg(long)]
     compare: bool,
-    /// Write sensors as well that are suspect: their fit keeps its limits, but its residual is not the noise
+    /// Also write suspect sensors: their fit is within all limits, but its residual is not the noise
     #[arg(long)]
     accept_suspect: bool,
     #[command(flatten)]

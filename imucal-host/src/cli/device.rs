@@ -37,7 +37,7 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Say who is there, what it holds and how it is
+    /// Print the device's identity, its record and its state
     Identify(Place),
     /// Download the stored record
     Get(Get),
@@ -47,9 +47,9 @@ enum Command {
     Stream(Stream),
     /// Fit a recording's observations on board, and store what is accepted
     Calibrate(Calibrate),
-    /// Have the device refuse changes until its power goes, or until it is unlocked
+    /// Make the device refuse changes until its power is cycled or it is unlocked
     Lock(Place),
-    /// Have it take changes again; only with its key
+    /// Allow changes again; needs the device's key
     Unlock(Place),
 }
 

@@ -23,19 +23,19 @@ use crate::{
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
-    /// The recording to diagnose: NAME.csv, NAME.csv.gz (or NAME.parquet), with NAME.toml beside it
+    /// The recording to diagnose: NAME.csv, NAME.csv.gz (or NAME.parquet), with its manifest NAME.toml in the same folder
     #[arg(required_unless_present = "list")]
     recording: Option<PathBuf>,
     /// The unit's present model, as `imucal calibrate` wrote it (default: calibrated from the recording)
     #[arg(long, value_name = "CAL")]
     model: Option<PathBuf>,
-    /// Withhold effects from what may explain the gap, or take terms (such as acc.misalignment) out of the baseline
+    /// Exclude effects from the candidates, or terms (such as acc.misalignment) from the baseline
     #[arg(long, value_name = "EFFECT_OR_TERM", num_args = 1.., value_parser = known)]
     without: Vec<String>,
     /// Write everything as JSON; `-` prints it instead of the report
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Say of every effect what it is, how large it usually is, what shows it and what it is mistaken for
+    /// List every effect: what it is, its usual size, what a recording needs to show it, what it may be mistaken for
     #[arg(long)]
     list: bool,
     #[command(flatten)]

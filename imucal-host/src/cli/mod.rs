@@ -37,27 +37,27 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Fit what a recording allows; print it with standard errors; refuse what it cannot tell.
+    /// Fit all models that a recording supports, with standard errors; refuse what it does not determine.
     Calibrate(calibrate::Arguments),
-    /// Correct a recording through the core, as the device would.
+    /// Correct a recording with the core's code, as a device does.
     Apply(apply::Arguments),
-    /// Say what a calibration holds, how good it was, and whether it is intact.
+    /// Print a calibration, its quality, and whether it is intact.
     Inspect(inspect::Arguments),
     /// Compare the core in f32 with a reference in f64, sample by sample and fit by fit.
     Verify(verify::Arguments),
     /// Talk to a co-processor: identify, get and put its record, stream, calibrate on board.
     Device(device::Arguments),
-    /// Make a recording of another program's files.
+    /// Convert another program's files to a recording.
     Import(import::Arguments),
-    /// Record a simulated unit on a simulated flight motion simulator.
+    /// Simulate a recording of a unit on a flight motion simulator.
     Simulate(simulate::Arguments),
-    /// The whole way on a simulated sensor: record, calibrate, pack, apply, verify.
+    /// Run every step on a simulated sensor: record, calibrate, pack, apply, verify, diagnose.
     Demo(demo::Arguments),
-    /// Simulated comparisons of estimators and models, each printed as a table.
+    /// Compare estimators and models on simulated data; print tables.
     Study(study::Arguments),
-    /// Say where recording and simulator differ, which effect causes it, and how far it closes the gap.
+    /// Find which effect a simulator lacks: where recording and simulation differ, the cause, and the share it explains.
     Diagnose(diagnose::Arguments),
-    /// Sealed trials of the diagnosis, and how often it was right.
+    /// Run sealed trials of the diagnosis, and print how often it was right.
     Blind(blind::Arguments),
 }
 

@@ -35,10 +35,10 @@ const NEAR: usize = 8;
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
-    /// The recording: NAME.csv or NAME.csv.gz; NAME.toml is written beside it
+    /// The recording: NAME.csv or NAME.csv.gz; the manifest NAME.toml is written to the same folder
     #[arg(long, value_name = "REC", required_unless_present = "list")]
     out: Option<PathBuf>,
-    /// Name the effects there are, what causes them, and the usual size of their parameters
+    /// List all effects: what causes them, and the usual size of their parameters
     #[arg(long)]
     list: bool,
     /// The unit: mtx or 3dm-gx2
@@ -51,7 +51,7 @@ pub(super) struct Arguments {
     /// Several parameters point in a direction drawn from the seed; for P.axis_swap the size is the code of the order
     #[arg(long = "effect", value_name = "ID[=SIZE]", value_parser = dose)]
     effects: Vec<(&'static Effect, f64)>,
-    /// Everything random follows from it
+    /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Sampling rate

@@ -18,7 +18,7 @@ enum Study {
         /// Clouds a figure at 30 % is the mean of; the sweep takes a fifth
         #[arg(long, value_name = "N", default_value_t = 500)]
         runs: u32,
-        /// Everything random follows from it
+        /// Seed of all random numbers
         #[arg(long, value_name = "N", default_value_t = 1)]
         seed: u64,
     },
@@ -31,7 +31,7 @@ enum Study {
         #[arg(long, value_name = "N", default_value_t = 1000)]
         seed: u64,
     },
-    /// Hand recordings good and bad: whether what is accepted is as good as it says
+    /// Healthy and faulty hand recordings: whether accepted calibrations are as good as they report
     ///
     /// Ends with 1 where a limit is broken.
     Trust {
@@ -41,13 +41,13 @@ enum Study {
         /// Recordings of each kind of fault
         #[arg(long, value_name = "N", default_value_t = 10)]
         faulty: u64,
-        /// Everything random follows from it
+        /// Seed of all random numbers
         #[arg(long, value_name = "N", default_value_t = 1)]
         seed: u64,
     },
     /// Two simulated units on the simulated rig, before and after calibration by each model
     Units {
-        /// Everything random follows from it
+        /// Seed of all random numbers
         #[arg(long, value_name = "N", default_value_t = 1)]
         seed: u64,
     },

@@ -109,12 +109,12 @@ pub enum ReadError {
     TimeOrder { path: PathBuf, place: Place, found: f64, before: f64, remedy: String },
     /// Two files of one recording disagree about a sample's time.
     #[error(
-        "{path}, {place}: found the time {found} s beside {other_time} s in {other}, expected them within half an interval ({tolerance:.6} s); give two files of one run, or interpolate one onto the other's times"
+        "{path}, {place}: found the time {found} s against {other_time} s in {other}, expected them within half an interval ({tolerance:.6} s); give two files of one run, or interpolate one onto the other's times"
     )]
     TimesDiffer { path: PathBuf, place: Place, found: f64, other: PathBuf, other_time: f64, tolerance: f64 },
     /// Two files of one recording differ in length.
     #[error(
-        "{path}: found {found} rows beside {expected} in {other}, expected as many; give two files of one run"
+        "{path}: found {found} rows against {expected} in {other}, expected as many; give two files of one run"
     )]
     RowsDiffer { path: PathBuf, found: usize, other: PathBuf, expected: usize },
 
@@ -162,7 +162,7 @@ pub enum ReadError {
     Misled { error: Box<ReadError>, warning: Box<Warning> },
     /// One axis is in another unit than its neighbours.
     #[error(
-        "{path}, column `{column}`: found samples that look like `{found}` beside the other axes in `{expected}` (then the length is steady at {median_norm:.3} m/s², and else it is not); convert the column to `{expected}`"
+        "{path}, column `{column}`: found samples that look like `{found}` while the other axes are in `{expected}` (then the length is steady at {median_norm:.3} m/s², and else it is not); convert the column to `{expected}`"
     )]
     MixedUnits { path: PathBuf, column: &'static str, found: Unit, expected: Unit, median_norm: f64 },
 }

@@ -28,7 +28,7 @@ pub fn entry(effect: &Effect) -> String {
         text += &hanging("  size:     ", &format!("{}: {}", names.join(", "), sizes(&group[0])));
     }
     for other in &effect.confusables {
-        text += &hanging("  or else:  ", &format!("{}; what parts them: {}", other.id, other.parted_by));
+        text += &hanging("  or else:  ", &format!("{}; distinguish by: {}", other.id, other.parted_by));
     }
     text
 }

@@ -62,8 +62,8 @@ fn sentence(diagnosis: &Diagnosis) -> String {
     match diagnosis.verdict {
         Verdict::Explained => format!("The gap is explained by {causes}{closed}."),
         Verdict::Ambiguous => format!(
-            "The gap is explained{closed}, but this recording cannot tell {causes} from what else would explain it as \
-             well."
+            "The gap is explained{closed}, but this recording cannot distinguish {causes} from other effects that \
+             explain it equally well."
         ),
         Verdict::Partly => format!(
             "{causes} {} the gap in part{closed}; what is left matters, and its cause is unknown.",
@@ -89,7 +89,7 @@ fn closed(diagnosis: &Diagnosis) -> String {
     };
     let of = if diagnosis.held_out { ", on data that the fit has not seen" } else { "" };
     let [low, high] = diagnosis.gap_closed_total_ci95.unwrap_or([f64::NAN; 2]);
-    format!(", closing {} of what repeats{of}", share_words(share, [low, high]))
+    format!(", closing {} of the gap beyond the noise{of}", share_words(share, [low, high]))
 }
 
 /// `97 % (95 to 98 %)`; without an interval, the share alone.
@@ -130,10 +130,10 @@ fn write_places(text: &mut String, places: &[Place]) -> fmt::Result {
     if places.is_empty() {
         return Ok(());
     }
-    writeln!(text, "\n{:<62} {:>6} {:>8}", "where it lies: shares overlap", "share", "chance")?;
+    writeln!(text, "\n{:<62} {:>6} {:>8}", "what the gap follows (shares overlap)", "share", "p-value")?;
     for place in places.iter().take(PLACES) {
         let share = finite(place.share, |share| format!("{:.0} %", 100.0 * share));
-        writeln!(text, "  {:<60} {share:>6} {:>8}", place_words(place), chance(place.p_value))?;
+        writeln!(text, "  {:<60} {share:>6} {:>8}", place_words(place), p_value(place.p_value))?;
     }
     Ok(())
 }
@@ -149,7 +149,7 @@ fn write_causes(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
                 let ends = cause.gap_closed_ci95.unwrap_or([f64::NAN; 2]);
                 format!("closes {} of the gap", share_words(share, ends))
             }
-            None => "was undone or left out before the gap was measured".to_owned(),
+            None => "was corrected or left out before the gap was measured".to_owned(),
         };
         let material = if cause.material { "" } else { "; too small to matter" };
         text.push_str(&hanging("  ", &format!("probability {certain}; {share}{material}")));
@@ -165,7 +165,7 @@ fn write_causes(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
     let others: Vec<&str> =
         diagnosis.credible_set.iter().filter(|id| !asserted(id)).map(String::as_str).collect();
     if !others.is_empty() && !diagnosis.causes.is_empty() {
-        text.push_str(&hanging("credible besides, at 95 %: ", &others.join(", ")));
+        text.push_str(&hanging("also credible, at 95 %: ", &others.join(", ")));
     }
     Ok(())
 }
@@ -173,7 +173,7 @@ fn write_causes(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
 fn write_equivalents(text: &mut String, effect: &Effect, cause: &Cause) {
     for other in &cause.equivalents {
         let parted = effect.confusables.iter().find(|confusable| confusable.id == *other);
-        let parted = parted.map_or(String::new(), |known| format!("; what parts them: {}", known.parted_by));
+        let parted = parted.map_or(String::new(), |known| format!("; distinguish by: {}", known.parted_by));
         text.push_str(&hanging("  or else:   ", &format!("{other}{parted}")));
     }
 }
@@ -198,7 +198,7 @@ fn write_experiments(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
         let names: Vec<&str> = experiment.separates.iter().map(String::as_str).collect();
         let [from, to] = [experiment.distinguishability_from, experiment.to].map(|d| finite(d, plain));
         let words = format!(
-            "{}: tells {} apart, by a whitened distance of {to} instead of {from}",
+            "{}: separates {} by {to} standard deviations of the noise instead of {from}",
             experiment.instruction,
             listed(&names)
         );
@@ -211,7 +211,7 @@ fn write_absent(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
     if diagnosis.absent.is_empty() {
         return Ok(());
     }
-    writeln!(text, "\nabsent, and would have been seen from these sizes on")?;
+    writeln!(text, "\nabsent: each would have been detected at this size or larger")?;
     let one = |absent: &crate::diagnosis::finding::Absent| {
         let size = finite(absent.minimum_detectable, |size| format!("{size:.1e}"));
         let unit = if absent.unit == "-" { "" } else { absent.unit.as_str() };
@@ -246,9 +246,9 @@ fn certainty(probability: f64) -> String {
     if probability > 0.9995 { "> 99.9 %".to_owned() } else { format!("{:.1} %", 100.0 * probability) }
 }
 
-/// A small probability.
-fn chance(p_value: f64) -> String {
-    match p_value {
+/// A p-value.
+fn p_value(value: f64) -> String {
+    match value {
         p if !p.is_finite() => "unknown".to_owned(),
         p if p < 1e-99 => "<1e-99".to_owned(),
         p => format!("{p:.0e}"),
@@ -333,7 +333,7 @@ mod tests {
         let text = page(&diagnosis(Verdict::Explained));
         for part in [
             "case-0007.csv: EXPLAINED\n",
-            "explained by mag.bias_step, closing 97 % (95 to 98 %) of what repeats",
+            "explained by mag.bias_step, closing 97 % (95 to 98 %) of the gap beyond the noise",
             "mag x, uT",
             "gimbal_outer of mag (first harmonic)",
             "<1e-99",
@@ -341,8 +341,8 @@ mod tests {
             "x 1.900 ± 0.020 uT; t_start 12.50 s; t_end open",
             "what:      A shock, a change of supply",
             "to do:     Split the recording there",
-            "or else:   mag.bias_drift; what parts them: the same attitude several times",
-            "hold the first pose again, 120 s: tells mag.bias_step and mag.bias_drift apart",
+            "or else:   mag.bias_drift; distinguish by: the same attitude several times",
+            "hold the first pose again, 120 s: separates mag.bias_step and mag.bias_drift by",
             "acc.scale_cubic 2.1e-5 1/(m/s^2)^2",
             "acc.gravity_error: same as scale",
         ] {
@@ -361,7 +361,7 @@ mod tests {
         assert!(first(Verdict::None).contains("no gap beyond the noise"));
         assert!(first(Verdict::Unknown).contains("no effect of the catalogue explains it"));
         assert!(first(Verdict::Partly).contains("mag.bias_step explains the gap in part"));
-        assert!(first(Verdict::Ambiguous).contains("cannot tell mag.bias_step from"));
+        assert!(first(Verdict::Ambiguous).contains("cannot distinguish mag.bias_step from"));
         let refused = first(Verdict::NotTestable);
         assert!(
             refused.contains("Nothing can be said: there is no rig.") && refused.contains("note: and no")

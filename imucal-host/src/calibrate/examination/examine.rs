@@ -419,8 +419,8 @@ fn judged(mut tests: Vec<Tested>, entries: &[u8], std: &[f64]) -> Vec<Suspicion>
         found.push(Suspicion {
             follows: test.follows,
             detail: format!(
-                "its residual follows {}: chance does so in {:.0e} of fits, it explains {:.0} % of the residual's square, \
-                 and {} would move by {:.2e}, {:.0} standard errors",
+                "its residual follows {} (p = {:.0e}), which explains {:.0} % of the residual's square; \
+                 with it {} would change by {:.2e}, {:.0} standard errors",
                 test.name,
                 chance.max(1e-99),
                 100.0 * test.score.explained,

@@ -67,14 +67,14 @@ fn below(steps: &[Step], index: usize) -> Option<&Step> {
 /// are significant against the best so far (or, where it does not contain that one, against what it contains).
 pub fn climb(kind: SensorKind, steps: Vec<Step>) -> Option<Comparison> {
     let mut chosen = steps.first()?;
-    let mut why = "nothing above it is significant and predicts better".to_owned();
+    let mut why = "no larger model is significant and predicts left-out data better".to_owned();
     for (index, step) in steps.iter().enumerate().skip(1) {
         let reference = if contains(step, chosen) { Some(chosen) } else { below(&steps, index) };
         let p = reference.and_then(|lower| p_value(lower, step));
         let held = step.held_out_rms.zip(chosen.held_out_rms).filter(|(new, old)| new < old);
         if let (Some(p), Some((new, old))) = (p.filter(|p| *p < SIGNIFICANT), held) {
             why = format!(
-                "{} adds {} (chance: p = {p:.1e}), and predicts what is left out better: {new:.3e} against {old:.3e}",
+                "{} adds {} (F-test: p = {p:.1e}) and predicts left-out data better: rms {new:.3e} instead of {old:.3e}",
                 step.name, step.adds
             );
             chosen = step;

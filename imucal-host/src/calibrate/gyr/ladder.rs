@@ -2,7 +2,7 @@
 //!
 //! | rung | estimated from |
 //! | --- | --- |
-//! | – | nothing: as the sheet says |
+//! | – | nothing: the data sheet's values |
 //! | B3 | bias, gain nominal |
 //! | K9 | gain from gravity's direction before and after turns, bias from rests: the field form, which knows no attitude |
 //! | G12 | gain and bias from the attitudes |
@@ -99,7 +99,7 @@ fn step(
 fn lower(all: &Observations, first: &Observations, second: &[MotionData]) -> Vec<Step> {
     let rms = |triad: &Triad<f64>| Some(score(second, FULL, &FULL.theta(triad)).1);
     let with = |bias| Triad { bias, ..Triad::identity() };
-    let none = step("-", "nothing: as the sheet says", Vec::new(), &Triad::identity(), &all.data);
+    let none = step("-", "nothing: the data sheet's values", Vec::new(), &Triad::identity(), &all.data);
     let (bias, held) = bias_alone(&all.data, all.bias);
     let (earlier, _) = bias_alone(&first.data, first.bias);
     let only = step("B3", "bias", vec![9, 10, 11], &with(bias), &all.data);

@@ -122,7 +122,7 @@ fn undone(calibration: &mut Calibration) {
         let mirrored = signed_permutation(code).is_some_and(|p| p.determinant() < 0.0);
         let cause = if mirrored { "it is mirrored" } else { "or the unit sits turned on the table" };
         calibration.warnings.push(format!(
-            "{kind}.axis_swap: {}, {cause}; the gain undoes it, as the rig's attitudes tell it",
+            "{kind}.axis_swap: {}, {cause}; the gain, determined from the rig's attitudes, corrects it",
             columns(kind, code)
         ));
     }
@@ -254,14 +254,16 @@ fn contradicted(calibration: &mut Calibration, a: &Matrix3<f64>, aligned: Option
         let (p, what) = match reversed {
             Some(true) => (-a, mirrored),
             Some(false) => (*a, turned),
-            None => (-a, format!("{mirrored}, or {turned}, which [site] latitude_deg would tell")),
+            None => (-a, format!("{mirrored}, or {turned}, which [site] latitude_deg would decide")),
         };
         let advice = format!("{what}: gyroscope and magnetometer agree on the axes; correct its columns");
         refuse_axes(calibration, SensorKind::Acc, code(&p), advice);
         refuse_axes(calibration, SensorKind::Gyr, 0, lean.into());
         refuse_axes(calibration, SensorKind::Mag, 0, lean.into());
     } else {
-        let advice = format!("{mirrored}, or {turned}, or {gyr}: nothing tells which; correct the columns");
+        let advice = format!(
+            "{mirrored}, or {turned}, or {gyr}: this recording does not decide which; correct the columns"
+        );
         refuse_axes(calibration, SensorKind::Acc, code(&-a), advice.clone());
         refuse_axes(calibration, SensorKind::Gyr, code(&a.transpose()), advice);
         refuse_axes(calibration, SensorKind::Mag, 0, lean.into());
@@ -340,7 +342,7 @@ fn unchecked(calibration: &mut Calibration, turned: bool, aligned: bool) {
     }
     for (kind, need) in alone {
         calibration.warnings.push(format!(
-            "{kind}: nothing tells whether its axes are negated or swapped ({kind}.axis_swap), which takes {need}"
+            "{kind}: this recording does not show whether its axes are negated or swapped ({kind}.axis_swap); that needs {need}"
         ));
     }
 }

@@ -53,7 +53,7 @@ pub fn accelerometer(
         && let Some(lower) = ladder::rung("T12", &poses, down)
     {
         calibration.warnings.push(format!(
-            "acc: the poses cannot tell the base's tilt from K; kept T12 instead of {name}, base taken as level"
+            "acc: the poses do not distinguish the base's tilt from K; T12 is used instead of {name}, with the base taken as level"
         ));
         rung = lower;
     }

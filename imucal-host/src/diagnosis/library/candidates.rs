@@ -83,7 +83,7 @@ impl Setting<'_> {
         } else if thermometer && !self.thermometer {
             Some("no temperature was recorded")
         } else if other_calibration && !self.calibrated.contains(&SensorKind::Mag) {
-            Some("it shows against a calibration made elsewhere (--model)")
+            Some("a calibration of the same recording absorbs it; needs one of another recording (--model)")
         } else if exact_attitude && !provided.exact_attitude {
             Some(
                 "a reference attitude has noise and a filter of its own: nothing distinguishes a sensor's low-pass from \

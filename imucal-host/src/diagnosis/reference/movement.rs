@@ -92,11 +92,11 @@ pub fn reference(
     let length = movement.duration() - recording.time.first().copied().unwrap_or(0.0);
     if length < SHORTEST {
         return Err(format!(
-            "{length:.0} s are too short to tell drift from anything else; {SHORTEST:.0} s at least"
+            "{length:.0} s are too short to distinguish drift from other effects; at least {SHORTEST:.0} s are needed"
         ));
     }
     if !movement.moving().iter().any(|moves| *moves) {
-        return Err("the rig stands still: nothing tells an effect from a bias".to_owned());
+        return Err("the rig does not move: no effect can be distinguished from a bias".to_owned());
     }
     Ok(Reference { movement, held })
 }

@@ -79,7 +79,7 @@ impl RestToRest {
             return Err(why);
         }
         let acc_triad = own(SensorKind::Acc).map_err(|why| {
-            format!("{NO_REST}; and its rests do not tell the attitude: the accelerometer's calibration is refused, {why}")
+            format!("{NO_REST}; and its rests do not give the attitude: the accelerometer's calibration is refused, {why}")
         })?;
         let rests = calibration.segmentation.as_ref().map(|cut| cut.rests.clone()).unwrap_or_default();
         let usable = |kind: SensorKind| integrity.sensor(kind).map(|sensor| sensor.usable.as_slice());
@@ -96,7 +96,7 @@ impl RestToRest {
         };
         if rests.len() < LEAST {
             return Err(format!(
-                "{NO_REST}; of rests, which tell the attitude by gravity, {LEAST} are needed, and there are {}",
+                "{NO_REST}; gravity gives the attitude at rests, of which {LEAST} are needed; there are {}",
                 rests.len()
             ));
         }

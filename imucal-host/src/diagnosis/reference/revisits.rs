@@ -21,9 +21,9 @@ pub fn remark(motion: &dyn Motion) -> Option<String> {
     let revisits = (0..rests.len()).filter(|at| again(*at)).count();
     (revisits == 0 && !rests.is_empty()).then(|| {
         format!(
-            "none of {} rests is a revisit of an earlier attitude: how well a rest repeats, and what drifts, is told by \
-             the fit alone, so that an effect that differs from rest to rest may pass for scatter; hold some attitudes \
-             twice, minutes apart",
+            "none of {} rests is a revisit of an earlier attitude: repeatability and drift are \
+             estimated by the fit alone, so that an effect that differs from rest to rest may be taken for pointing \
+             errors; hold some attitudes twice, minutes apart",
             rests.len()
         )
     })

@@ -19,8 +19,8 @@ pub fn leave_out(causes: &mut Vec<Cause>, blocks: &[Block], near: f64) -> Vec<St
     };
     let remark = |cause: Cause| {
         format!(
-            "not asserted: {} from {first:.0} to {last:.0} s, as long as the sensor is carried about; what surrounds it where \
-             it lies would look the same",
+            "not asserted: {} from {first:.0} to {last:.0} s, for as long as the sensor is carried elsewhere; the surroundings \
+             there would look the same",
             cause.effect
         )
     };

@@ -49,7 +49,7 @@ pub fn leave_out(
     Ok(match out.is_empty() {
         true => Vec::new(),
         false => vec![format!(
-            "not asserted, since held-out data do not bear them out or no size of theirs is told from zero: {names}"
+            "not asserted, since held-out data do not confirm them or none of their amplitudes differs from zero: {names}"
         )],
     })
 }

@@ -70,7 +70,7 @@ fn because(effect: &Effect, projected: &Projected, places: &[usize]) -> String {
     let taken = places.iter().all(|p| projected.information[(*p, *p)] < RETAINED * projected.before[*p]);
     match effect.confusables.first() {
         Some(other) if taken => {
-            format!("here the same as {}, which is fitted; what parts them: {}", other.id, other.parted_by)
+            format!("here the same as {}, which is fitted; distinguish by: {}", other.id, other.parted_by)
         }
         _ => format!("it would have to be implausibly large to be seen; it needs: {}", effect.words.needs),
     }

@@ -193,14 +193,14 @@ mod tests {
         let message = pair(ACC, "0.02984 0 0 0\n0.04684 0 0 0\n").unwrap_err();
         assert_says(
             &message,
-            &["xsens_gyro.mat, line 2", "0.04684 s beside 0.03984 s", "xsens_acc.mat", "one run"],
+            &["xsens_gyro.mat, line 2", "0.04684 s against 0.03984 s", "xsens_acc.mat", "one run"],
         );
     }
 
     #[test]
     fn files_of_different_length_and_damaged_lines_are_refused() {
         let short = pair(ACC, "0.02984 0 0 0\n").unwrap_err();
-        assert_says(&short, &["xsens_gyro.mat", "found 1 rows beside 2", "one run"]);
+        assert_says(&short, &["xsens_gyro.mat", "found 1 rows against 2", "one run"]);
         assert_says(&pair(ACC, "0.02984 0 0\n").unwrap_err(), &["line 1", "found 3 fields, expected 4"]);
         assert_says(&pair(ACC, "# gyr\n0 0 x 0\n").unwrap_err(), &["line 2, column `y`", "`x`"]);
         assert_says(&pair("", "").unwrap_err(), &["xsens_acc.mat", "empty"]);

@@ -47,7 +47,7 @@ impl Told {
         match self {
             Self::Encoders => "the encoders as they are read",
             Self::Reference => "the reference attitude as it is read",
-            Self::Rests => "the attitude that gravity tells at rest and the gyroscope between rests",
+            Self::Rests => "the attitude from gravity at rest and from the gyroscope between rests",
         }
     }
 
