@@ -11,7 +11,7 @@ fn the_demo_names_every_file_it_writes_and_all_commands_take_them() {
     let demo = folder
         .run("demo --out demo.d")
         .with(0)
-        .printing(&["cause: acc.scale_cubic", "It is the one that was withheld."]);
+        .printing(&["cause: acc.scale_cubic", "The diagnosis names the effect that was withheld."]);
     assert_eq!(demo.err, "");
     let (_, list) = demo.out.split_once("\nWritten to ").expect("the demo ends by naming its files");
     let mut named: Vec<&str> =
