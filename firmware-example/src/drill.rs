@@ -13,7 +13,10 @@ use imucal_core::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-use crate::scene::{self, Noise, Sensor, rate, spiral, unit};
+use crate::{
+    judgement::unit,
+    scene::{self, Noise, Sensor, rate, spiral},
+};
 
 /// Local gravity, m/s².
 pub const GRAVITY: f32 = 9.80665;
