@@ -140,7 +140,7 @@ fn a_cubic_term_is_reported_with_what_a_record_leaves_of_it() {
     // The cube of gravity at a face, and the gain.
     assert!((higher.uncorrected / (cubic.z * 9.8f64.powi(3)) - 1.0).abs() < 0.1, "{}", higher.uncorrected);
     let table = imucal_host::report::table::table(&calibration);
-    assert!(table.contains("NOT stored") && table.contains("for a device acc=I14"), "{table}");
+    assert!(table.contains("NOT stored") && table.contains("for a device use acc=I14"), "{table}");
 }
 
 #[test]
