@@ -14,8 +14,9 @@ use super::{
         rest_noise::{AtRest, RestNoise},
     },
     gyr, known_attitudes,
-    outcome::{self, Calibration, FitSummary, SegmentationReport, SensorOutcome, ThresholdTrial},
+    outcome::{Calibration, FitSummary, SensorOutcome},
     segmentation::{self, Cut},
+    thresholds::{self, SegmentationReport, ThresholdTrial},
     usable,
 };
 use crate::{
@@ -195,7 +196,7 @@ impl<'a> Rests<'a> {
         {
             let gains: Vec<_> =
                 segmentation::comparable(cuts).filter_map(|cut| Some(cut.fit?.0.gain.diagonal())).collect();
-            fit.gain_spread = Some(outcome::gain_spread(gains.iter().copied()));
+            fit.gain_spread = Some(thresholds::gain_spread(gains.iter().copied()));
         }
         result
     }
@@ -303,7 +304,7 @@ impl GyrShared<'_> {
             .filter(|trial| multipliers.contains(&trial.multiplier))
             .filter_map(|trial| trial.gyr_gain)
             .collect();
-        fit.gain_spread = Some(outcome::gain_spread(compared.iter().copied()));
+        fit.gain_spread = Some(thresholds::gain_spread(compared.iter().copied()));
         outcome
     }
 }

@@ -22,9 +22,11 @@ pub mod mag;
 pub mod outcome;
 pub mod segmentation;
 pub mod suspicion;
+pub mod thresholds;
 
-pub use outcome::{Calibration, FitSummary, Refused, SegmentationReport, SensorOutcome};
+pub use outcome::{Calibration, FitSummary, Refused, SensorOutcome};
 pub use suspicion::{Follows, Status, Suspicion};
+pub use thresholds::SegmentationReport;
 
 pub use self::acc::rests::AccModel;
 use self::{

@@ -2,23 +2,25 @@
 
 use imucal_core::{
     accept::{self, Quantity, Refusal},
-    model::rig::ReferencePose,
+    model::{Parameterisation, rig::ReferencePose},
     observation::ShellPoint,
     solver::Termination,
     triad::Triad,
 };
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, SMatrix, SVector, Vector3};
 
 use super::{
     fit::{
-        alignment::Alignment, compare::Comparison, gyr_rig_fit::MotionFit, rig_fit::RigFit, search::Search,
+        alignment::Alignment, compare::Comparison, gyr_rig_fit::MotionFit, least_squares::dynamic,
+        report::FitReport, rig_fit::RigFit, search::Search,
     },
     suspicion::{Status, Suspicion},
+    thresholds::SegmentationReport,
 };
 use crate::{
     effect::axis_swap,
     observe::{motion::MotionData, pose::Poses, turn::TurnData},
-    recording::{Nominal, SensorKind, Unit},
+    recording::{Nominal, SensorKind, Triple, Unit},
 };
 
 /// A recording's calibration.
@@ -206,7 +208,73 @@ pub struct BiasWander {
     pub interpolated: bool,
 }
 
+/// What a fit estimates of a triad, nominal SI in, with its errors.
+#[derive(Clone, Debug)]
+pub struct Estimates {
+    /// Gain and bias.
+    pub triad: Triad<f64>,
+    /// Their standard errors, zero where an entry is not estimated.
+    pub std: Triad<f64>,
+    /// Covariance of the estimated entries.
+    pub covariance: DMatrix<f64>,
+    /// Which entries these are.
+    pub covariance_of: Vec<u8>,
+}
+
+impl Estimates {
+    /// Of parameters and their covariance.
+    pub fn of<const P: usize>(
+        form: &Parameterisation<P>,
+        theta: &SVector<f64, P>,
+        covariance: &SMatrix<f64, P, P>,
+    ) -> Self {
+        Self {
+            triad: form.triad(theta),
+            std: form.triad(&covariance.diagonal().map(f64::sqrt)),
+            covariance: dynamic(covariance),
+            covariance_of: form.entries().to_vec(),
+        }
+    }
+}
+
 impl FitSummary {
+    /// A fit's figures and estimates; nothing left out, and nothing besides the triad.
+    pub fn new(
+        report: &FitReport,
+        estimates: Estimates,
+        sensor: &Triple,
+        unit_out: Unit,
+        coverage: f64,
+    ) -> Self {
+        Self {
+            triad: estimates.triad,
+            gain_std: estimates.std.gain,
+            bias_std: estimates.std.bias,
+            covariance: estimates.covariance,
+            covariance_of: estimates.covariance_of,
+            unit_in: sensor.unit,
+            unit_out,
+            nominal: sensor.nominal,
+            rms: report.rms,
+            held_out_rms: report.held_out_rms,
+            observations: report.observations,
+            parameters: report.parameters,
+            condition: report.solver.condition,
+            coverage,
+            nonlinearity: report.nonlinearity,
+            inflation: report.inflation,
+            iterations: report.solver.iterations,
+            termination: report.solver.termination,
+            field_norm: None,
+            left_out: Vec::new(),
+            gain_spread: None,
+            bias_wander: None,
+            rig: None,
+            alignment: None,
+            search: None,
+        }
+    }
+
     /// The calibration of raw values in the recording's own unit.
     pub fn raw_triad(&self) -> Triad<f64> {
         if self.in_raw_scale() {
@@ -251,38 +319,6 @@ impl FitSummary {
     fn raw_bias(&self) -> Vector3<f64> {
         self.triad.bias.map(|b| self.nominal.to_raw(b))
     }
-}
-
-/// How the recording was cut into rests.
-#[derive(Clone, Debug)]
-pub struct SegmentationReport {
-    /// Rows of each rest, half-open.
-    pub rests: Vec<std::ops::Range<usize>>,
-    /// Chosen multiple of the initial rest's variance.
-    pub multiplier: f64,
-    /// The threshold it makes, (m/s²)².
-    pub threshold: f64,
-    /// The reference was the initial rest.
-    pub from_initial_rest: bool,
-    /// What each threshold tried came to.
-    pub trials: Vec<ThresholdTrial>,
-    /// Largest relative move of a diagonal gain, of any sensor, over the thresholds.
-    pub gain_spread: f64,
-}
-
-/// One threshold of the rest test.
-#[derive(Clone, Debug)]
-pub struct ThresholdTrial {
-    /// Multiple of the reference variance.
-    pub multiplier: f64,
-    /// Rests found.
-    pub rests: usize,
-    /// Accelerometer gain's diagonal, where it could be fitted.
-    pub acc_gain: Option<Vector3<f64>>,
-    /// Its rms residual, m/s².
-    pub acc_rms: Option<f64>,
-    /// Gyroscope gain's diagonal, where it could be fitted.
-    pub gyr_gain: Option<Vector3<f64>>,
 }
 
 impl Calibration {
@@ -336,16 +372,4 @@ pub fn entry_name(entry: u8) -> String {
     } else {
         format!("bias_{}", axis(entry))
     }
-}
-
-/// Largest relative move of any diagonal gain among those given.
-pub fn gain_spread(gains: impl Iterator<Item = Vector3<f64>> + Clone) -> f64 {
-    (0..3)
-        .map(|axis| {
-            let (low, high) = gains.clone().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), g| {
-                (low.min(g[axis].abs()), high.max(g[axis].abs()))
-            });
-            if high > low { (high - low) / (0.5 * (high + low)) } else { 0.0 }
-        })
-        .fold(0.0, f64::max)
 }

@@ -8,7 +8,7 @@ use std::ops::Range;
 use imucal_core::{observation::Rest, triad::Triad};
 use rayon::prelude::*;
 
-use super::{acc::rests, outcome::ThresholdTrial};
+use super::{acc::rests, thresholds::ThresholdTrial};
 use crate::observe::rest::RestDetector;
 
 /// Multiples of the initial rest's variance that are tried.

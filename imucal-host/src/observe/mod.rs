@@ -1,6 +1,7 @@
 //! From samples to observations: rests, turns between them, and clouds.
 
 pub mod cloud;
+pub mod compression;
 pub mod held;
 pub mod motion;
 pub mod pose;

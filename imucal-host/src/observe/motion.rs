@@ -7,20 +7,18 @@ use std::ops::Range;
 
 use imucal_core::{
     model::rig::{GimbalPose, Pose, RigAxes},
-    observation::{Block, BlockBuilder, Compared, Durations, Motion},
+    observation::{Block, Compared, Durations, Motion},
     rotation::{exp, log, matrix, quaternion, quaternion_log},
 };
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
-use super::turn::{TurnGap, held, jump};
+use super::{compression, compression::jump, turn::TurnGap};
 use crate::{noise::Span, recording::Recording};
 
 /// A block lasts about this long, s: five samples at 100 Hz.
 const BLOCK: f64 = 0.05;
 /// Samples of a block at the most: what is faster than that is tapped or shaken, of which two orders say less.
 const MOST_SAMPLES: f64 = 10.0;
-/// A motion across a gap longer than this many usual intervals is not known.
-const GAP: f64 = 5.0;
 /// A quaternion whose length is further from one is none.
 const UNIT: f64 = 0.1;
 
@@ -214,43 +212,30 @@ impl MotionInput<'_> {
         if let Some(row) = rows.clone().find(|k| !self.usable[*k]) {
             return Err(TurnGap::Unusable { row });
         }
-        let every: Vec<usize> = rows.clone().collect();
-        if let Some(row) = jump(self.time, &every, GAP * self.interval) {
+        let all: Vec<usize> = rows.clone().collect();
+        if let Some(row) = jump(self.time, &all, self.interval) {
             return Err(TurnGap::Jump { row });
         }
-        let [start, end] = ends.map(quaternion);
         let size = (BLOCK / self.interval).round().clamp(1.0, MOST_SAMPLES) as u16;
-        let mut data = MotionData {
+        let compressed =
+            compression::compress(self.time, &all, size, |k| self.rates[k] - wander(self.time[k]));
+        let at = |rows: &Range<usize>| {
+            self.attitude_near(rows.clone()).ok_or(TurnGap::NoAttitude { row: rows.start })
+        };
+        let attitudes = compressed.rows.iter().map(at).collect::<Result<Vec<_>, _>>()?;
+        let [start, end] = ends.map(quaternion);
+        Ok(MotionData {
             span: self.time[rows.start]..self.time[rows.end - 1],
-            rows: rows.clone(),
-            samples: Vec::with_capacity(rows.len()),
-            blocks: Vec::new(),
-            durations: Vec::new(),
-            earth: Vec::new(),
-            force: Vec::new(),
+            rows,
+            samples: compressed.samples,
+            after: [u32::try_from(compressed.blocks.len()).unwrap_or(u32::MAX)],
+            blocks: compressed.blocks,
+            durations: compressed.durations,
+            earth: attitudes.iter().map(|c_t_p| c_t_p.tr_mul(&self.earth_p)).collect(),
+            force: attitudes.iter().map(|c_t_p| c_t_p.tr_mul(&self.force_p)).collect(),
             start,
             end: [end],
-            after: [0],
-        };
-        let mut builder = BlockBuilder::default();
-        let mut first = rows.start;
-        for (k, held) in held(self.time, &every) {
-            let rate = self.rates[k] - wander(self.time[k]);
-            builder.push(&rate, held);
-            data.samples.push((rate, held, data.blocks.len()));
-            if builder.count() < size && k + 1 < rows.end {
-                continue;
-            }
-            let c_t_p = self.attitude_near(first..k + 1).ok_or(TurnGap::NoAttitude { row: first })?;
-            let (block, duration) = builder.finish();
-            data.blocks.push(block);
-            data.durations.push(duration);
-            data.earth.push(c_t_p.tr_mul(&self.earth_p));
-            data.force.push(c_t_p.tr_mul(&self.force_p));
-            first = k + 1;
-        }
-        data.after = [u32::try_from(data.blocks.len()).unwrap_or(u32::MAX)];
-        Ok(data)
+        })
     }
 
     /// A block's attitude: of its middle row, or of the first other row that has one within a block to either side.

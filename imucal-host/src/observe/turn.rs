@@ -6,15 +6,18 @@
 
 use std::ops::Range;
 
-use imucal_core::observation::{Block, BlockBuilder, Durations, Turn};
+use imucal_core::observation::{Block, Durations, Turn};
 use nalgebra::Vector3;
+
+use super::{
+    compression,
+    compression::{Compressed, jump},
+};
 
 /// Samples a block. Five at 100 Hz differ from the product over samples by about 1e-5° in 100 s (models.md 3).
 pub const BLOCK: u16 = 5;
 /// How far into a rest a turn reaches, s; a quarter of the rest where that is shorter.
 pub const MARGIN: f64 = 0.25;
-/// A turn across a gap longer than this many usual intervals is not known.
-const GAP: f64 = 5.0;
 
 /// A turn's blocks, owned.
 #[derive(Clone, Debug)]
@@ -100,21 +103,6 @@ fn turn_rows(time: &[f64], before: &Range<usize>, after: &Range<usize>) -> Range
     first..last
 }
 
-/// Rows with the time for which each one's sample is held, s: from half-way to the row before it to half-way to the one
-/// after (the trapezoidal rule).
-pub(super) fn held<'a>(time: &'a [f64], rows: &'a [usize]) -> impl Iterator<Item = (usize, f64)> + 'a {
-    rows.iter().enumerate().map(|(at, row)| {
-        let from = time[rows[at.saturating_sub(1)]];
-        let to = time[rows[(at + 1).min(rows.len() - 1)]];
-        (*row, 0.5 * (to - from))
-    })
-}
-
-/// The first row that comes later than this after the row before it, s.
-pub(super) fn jump(time: &[f64], rows: &[usize], gap: f64) -> Option<usize> {
-    rows.windows(2).find(|pair| time[pair[1]] - time[pair[0]] > gap).map(|pair| pair[1])
-}
-
 /// Compresses the motion between two rests; see [`compress_rows`].
 ///
 /// # Errors
@@ -160,26 +148,11 @@ pub fn compress_rows(
     if measured.len() < 2 {
         return Err(TurnGap::Unusable { row: rows.start });
     }
-    if let Some(row) = jump(time, &measured, GAP * interval) {
+    if let Some(row) = jump(time, &measured, interval) {
         return Err(TurnGap::Jump { row });
     }
-    let count = rows.len() / usize::from(BLOCK) + 1;
-    let (mut blocks, mut durations) = (Vec::with_capacity(count), Vec::with_capacity(count));
-    let mut builder = BlockBuilder::default();
-    let mut keep = |builder: &mut BlockBuilder<f64>| {
-        let (block, duration) = builder.finish();
-        blocks.push(block);
-        durations.push(duration);
-    };
-    for (k, held) in held(time, &measured) {
-        builder.push(&(gyr[k] - bias.at(time[k])), held);
-        if builder.count() == BLOCK {
-            keep(&mut builder);
-        }
-    }
-    if builder.count() > 0 {
-        keep(&mut builder);
-    }
+    let Compressed { blocks, durations, .. } =
+        compression::compress(time, &measured, BLOCK, |k| gyr[k] - bias.at(time[k]));
     Ok(TurnData { rest_before, rest_after, rows, bias: *bias, blocks, durations })
 }
 

@@ -16,11 +16,12 @@ use crate::{
         fit::{
             compare,
             compare::{Comparison, Step},
-            norm_fit::{NormFit, NormProblem, dynamic, raw_coverage},
+            norm_fit::{NormFit, NormProblem, raw_coverage},
+            report::FitReport,
             rest_noise::RestNoise,
             shell_errors::ShellErrors,
         },
-        outcome::{Evidence, FitSummary, Refused, SensorOutcome},
+        outcome::{Estimates, Evidence, FitSummary, Refused, SensorOutcome},
     },
     noise::Noise,
     recording::{SensorKind, Triple, Unit},
@@ -102,17 +103,8 @@ fn step<const P: usize>(
 ) -> Step {
     let problem = NormProblem { points, norm: gravity, form, serial: false };
     let fit = problem.fit(&Triad::identity());
-    Step {
-        name,
-        adds,
-        entries: form.entries().to_vec(),
-        free: P,
-        residuals: fit.points.len(),
-        squared_sum: 2.0 * fit.report.cost,
-        rms: fit.rms(),
-        held_out_rms: problem.leave_one_out_rms(&fit),
-        second_half_rms: None,
-    }
+    let held_out_rms = problem.leave_one_out_rms(&fit);
+    FitReport { held_out_rms, ..fit.report() }.step(name, adds, form.entries())
 }
 
 /// The outcome where the sensor lay still from beginning to end.
@@ -208,28 +200,14 @@ fn summary<const P: usize>(
     errors: &ShellErrors<P>,
     (coverage, nonlinearity): (f64, f64),
 ) -> FitSummary {
-    let (covariance, sensor) = (errors.covariance, input.sensor);
-    let std = problem.form.triad(&covariance.diagonal().map(f64::sqrt));
-    FitSummary {
-        triad: problem.form.triad(fit.solver.theta()),
-        gain_std: std.gain,
-        bias_std: std.bias,
-        covariance: dynamic(&covariance),
-        covariance_of: problem.form.entries().to_vec(),
-        unit_in: sensor.unit,
-        unit_out: Unit::MetrePerSecondSquared,
-        nominal: sensor.nominal,
-        rms: fit.rms(),
+    let report = FitReport {
         held_out_rms: problem.leave_one_out_rms(fit),
-        observations: fit.points.len(),
-        parameters: P,
-        condition: fit.report.condition,
-        coverage,
         nonlinearity,
         inflation: errors.inflation.max(),
-        iterations: fit.report.iterations,
-        termination: fit.report.termination,
-        field_norm: None,
+        ..fit.report()
+    };
+    let estimates = Estimates::of(&problem.form, fit.solver.theta(), &errors.covariance);
+    FitSummary {
         left_out: fit
             .left_out
             .iter()
@@ -241,11 +219,7 @@ fn summary<const P: usize>(
                 )
             })
             .collect(),
-        gain_spread: None,
-        bias_wander: None,
-        rig: None,
-        alignment: None,
-        search: None,
+        ..FitSummary::new(&report, estimates, input.sensor, Unit::MetrePerSecondSquared, coverage)
     }
 }
 

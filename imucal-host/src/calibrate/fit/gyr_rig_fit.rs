@@ -8,21 +8,24 @@ use imucal_core::{
     model::{Model, Parameterisation, RowSink, attitude::AttitudeModel, parameterisation::FULL},
     observation::Motion,
     scalar::Scalar,
-    solver::{LevenbergMarquardt, SolveReport, lm::Settings},
+    solver::LevenbergMarquardt,
     triad::Triad,
 };
-use nalgebra::{DMatrix, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, SVector, Vector3};
 
 use super::{
     compare::Step,
-    norm_fit::dynamic,
-    outlier::outliers,
+    held_out::{by_steps, root_mean},
+    least_squares,
+    least_squares::dynamic,
+    outlier::{Kept, leaving_out},
+    report::FitReport,
     rows::{Residuals, Rows, influence},
     search::{SWARM_OBSERVATIONS, Search, Searched},
 };
 use crate::observe::motion::MotionData;
 
-/// Largest rms error of a motion, rad (5.7°): beyond it the fit has ended in a wrong minimum, or axes are swapped.
+/// Largest rms error of a turn or motion, rad (5.7°): beyond it the fit has ended in a wrong minimum, or axes are swapped.
 pub const LARGEST_RMS: f64 = 0.1;
 /// How far a swarm looks: each entry of the gain, of the bias (rad/s; 10 °/s) and of the g-sensitivity (rad/s per
 /// m/s²) to either side of its start.
@@ -113,18 +116,10 @@ pub struct MotionFit {
     pub bias_influence: DMatrix<f64>,
     /// All parameters, in the entries' order.
     pub parameters: Vec<f64>,
-    /// The solver's report.
-    pub report: SolveReport<f64>,
+    /// Its figures: three residuals a motion, rms errors of a motion in rad, held out one at a time.
+    pub report: FitReport,
     /// How it was reached.
     pub search: Search,
-    /// Rms attitude error of a motion, rad.
-    pub rms: f64,
-    /// The same of motions left out in turn.
-    pub held_out_rms: Option<f64>,
-    /// Departure from a parabola within one standard error.
-    pub nonlinearity: f64,
-    /// Sum of the weighted squares.
-    pub squared_sum: f64,
     /// Motions used, and those left out with their size in robust standard deviations.
     pub kept: Vec<usize>,
     /// See `kept`.
@@ -134,18 +129,7 @@ pub struct MotionFit {
 impl MotionFit {
     /// The fit as a rung of a comparison.
     pub fn step(&self, name: &'static str, adds: &'static str) -> Step {
-        let free = self.entries.len();
-        Step {
-            name,
-            adds,
-            entries: self.entries.clone(),
-            free,
-            residuals: 3 * self.kept.len(),
-            squared_sum: self.squared_sum,
-            rms: self.rms,
-            held_out_rms: self.held_out_rms,
-            second_half_rms: None,
-        }
+        self.report.step(name, adds, &self.entries)
     }
 }
 
@@ -176,26 +160,21 @@ fn unweighted(errors: &[f64], weights: &[f64]) -> f64 {
 
 /// Fits the entries of `form` from the nominal gain and a static bias, rad/s; gross outliers go by name.
 pub fn fit<const P: usize>(data: &[MotionData], form: Parameterisation<P>, bias: Vector3<f64>) -> MotionFit {
-    let mut kept: Vec<usize> = (0..data.len()).collect();
-    let mut gross = Vec::new();
     let start = form.theta(&Triad { bias, ..Triad::identity() });
-    let mut round = 0;
-    loop {
-        let used: Vec<&MotionData> = kept.iter().map(|k| &data[*k]).collect();
+    let fitted = leaving_out(data.len(), ROUNDS, &mut |used, _| {
+        let used: Vec<&MotionData> = used.iter().map(|k| &data[*k]).collect();
         let motions: Vec<_> = used.iter().map(|d| d.motion()).collect();
         let weights = weights(&used);
         let model = Weighted { motions: &motions, weights: &weights, form };
         let (solver, search) = searching(&model, &used, start, |searched| searched.solve());
         let errors = errors(&model, solver.theta());
-        let out = outliers(&errors);
-        if out.is_empty() || round == ROUNDS {
-            return summarise(&model, &solver, search, kept, gross);
-        }
-        for (index, size) in out.iter().rev() {
-            gross.push((kept.remove(*index), *size));
-        }
-        round += 1;
-    }
+        ((solver, search), errors)
+    });
+    let Kept { fit: (solver, search), used: kept, left_out: gross } = fitted;
+    let used: Vec<&MotionData> = kept.iter().map(|k| &data[*k]).collect();
+    let motions: Vec<_> = used.iter().map(|d| d.motion()).collect();
+    let weights = weights(&used);
+    summarise(&Weighted { motions: &motions, weights: &weights, form }, &solver, search, kept, gross)
 }
 
 /// The fit over all motions by the swarm alone, then Levenberg–Marquardt; `None` where no particle has a finite cost.
@@ -248,20 +227,21 @@ fn summarise<const P: usize>(
     gross: Vec<(usize, f64)>,
 ) -> MotionFit {
     let theta = solver.theta();
-    let covariance = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
+    let count = model.motions.len();
+    let report = FitReport {
+        rms: unweighted(&errors(model, theta), model.weights),
+        held_out_rms: held_out(model, theta, count, |k| model.only(k)),
+        nonlinearity: imucal_core::accept::nonlinearity(solver, model, 1.0),
+        ..FitReport::of(solver, count, 3)
+    };
     MotionFit {
         triad: model.form.triad(theta),
         entries: model.form.entries().to_vec(),
-        covariance: dynamic(&covariance),
-        bias_influence: bias_influence(model, theta)
-            .unwrap_or_else(|| DMatrix::zeros(3 * model.motions.len(), P)),
+        covariance: dynamic(&least_squares::covariance(solver)),
+        bias_influence: bias_influence(model, theta).unwrap_or_else(|| DMatrix::zeros(3 * count, P)),
         parameters: theta.iter().copied().collect(),
-        report: solver.report(),
+        report,
         search,
-        rms: unweighted(&errors(model, theta), model.weights),
-        held_out_rms: held_out(model, theta, model.motions.len(), |k| model.only(k)),
-        nonlinearity: imucal_core::accept::nonlinearity(solver, model, 1.0),
-        squared_sum: 2.0 * solver.report().cost,
         kept,
         gross,
     }
@@ -288,14 +268,10 @@ fn held_out<const P: usize, A: Model<f64, P>>(
     count: usize,
     alone: impl Fn(usize) -> A,
 ) -> Option<f64> {
-    let rows = Rows::of(model, theta);
-    let held: Option<Vec<f64>> = (0..count)
-        .map(|k| {
-            let there = theta + rows.step_without(3 * k..3 * k + 3)?;
-            lengths(&Residuals::of(&alone(k), &there)).first().copied()
-        })
-        .collect();
-    Some(rms(held?.into_iter()))
+    let sum = by_steps(&Rows::of(model, theta), theta, (count, 3), |k, theta| {
+        lengths(&Residuals::of(&alone(k), theta)).iter().map(|e| e * e).sum()
+    });
+    Some(root_mean(sum?, count))
 }
 
 /// Sum of weighted squares and rms attitude error, rad, of motions under parameters that are given.
@@ -318,8 +294,7 @@ pub fn bias_alone(data: &[MotionData], bias: Vector3<f64>) -> (Vector3<f64>, Opt
     let weights = weights(&used);
     let model = Weighted { motions: &motions, weights: &weights, form: FULL };
     let only = BiasOnly(model);
-    let mut solver = LevenbergMarquardt::new(bias, Settings::default());
-    solver.run(&only);
+    let solver = least_squares::solve(&only, bias);
     let held = held_out(&only, solver.theta(), used.len(), |k| BiasOnly(model.only(k)));
     (Vector3::from(*solver.theta()), held)
 }

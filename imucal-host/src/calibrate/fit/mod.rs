@@ -7,8 +7,11 @@
 //! | file | what |
 //! | --- | --- |
 //! | [`rows`] | derivatives as a dense matrix, its covariance and leverages |
-//! | [`norm_fit`], [`rig_fit`], [`reference_fit`], [`gyr_rig_fit`] | least squares by the core's solver for each kind of observation |
-//! | [`outlier`] | observations that are left out |
+//! | [`norm_fit`], [`rig_fit`], [`reference_fit`], [`gyr_rig_fit`] | least squares for each kind of observation |
+//! | [`least_squares`] | one fit by the core's solver |
+//! | [`outlier`] | observations that are left out, and the fit without them |
+//! | [`held_out`] | residuals of observations that the fit has not seen |
+//! | [`report`] | the figures of any of these fits |
 //! | [`autocorrelation`] | by how much serial correlation of residuals inflates standard errors |
 //! | [`rest_noise`], [`rest_bias`], [`shell_errors`] | errors of the observations |
 //! | [`alignment`], [`directions`] | the rotation between two triads, from directions that both see at rest |
@@ -22,10 +25,13 @@ pub mod autocorrelation;
 pub mod compare;
 pub mod directions;
 pub mod gyr_rig_fit;
+pub mod held_out;
 pub mod lag;
+pub mod least_squares;
 pub mod norm_fit;
 pub mod outlier;
 pub mod reference_fit;
+pub mod report;
 pub mod rest_bias;
 pub mod rest_noise;
 pub mod rig_fit;

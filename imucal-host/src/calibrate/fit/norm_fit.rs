@@ -10,14 +10,16 @@ use imucal_core::{
         norm::{NormModel, curvature_excess},
     },
     observation::ShellPoint,
-    solver::{LevenbergMarquardt, SolveReport, lm::Settings},
+    solver::LevenbergMarquardt,
     triad::Triad,
 };
-use nalgebra::{DMatrix, SMatrix, SVector, Vector3};
-use rayon::prelude::*;
+use nalgebra::{SVector, Vector3};
 
 use super::{
-    outlier::{MOST, outliers},
+    held_out::{by_folds, by_steps, root_mean},
+    least_squares,
+    outlier::{Kept, leaving_out_few},
+    report::FitReport,
     rows::{Residuals, Rows},
 };
 
@@ -56,8 +58,6 @@ pub struct Stated {
 pub struct NormFit<const P: usize> {
     /// The solver at its end.
     pub solver: LevenbergMarquardt<f64, P>,
-    /// Its report.
-    pub report: SolveReport<f64>,
     /// Observations used, in order: points with their expected excess.
     pub points: Vec<ShellPoint<f64>>,
     /// Index of each used point among the problem's.
@@ -72,9 +72,7 @@ impl<const P: usize> NormProblem<'_, P> {
     }
 
     fn solve(&self, points: &[ShellPoint<f64>], start: SVector<f64, P>) -> LevenbergMarquardt<f64, P> {
-        let mut solver = LevenbergMarquardt::new(start, Settings::default());
-        solver.run(&self.model(points));
-        solver
+        least_squares::solve(&self.model(points), start)
     }
 
     /// Cost of a plain fit from `start`, and where it ended: for choosing among starts.
@@ -84,40 +82,28 @@ impl<const P: usize> NormProblem<'_, P> {
         (if cost.is_finite() { cost } else { f64::INFINITY }, self.form.triad(solver.theta()))
     }
 
-    /// Fits from `start`, leaving out gross outliers; where all rounds together would leave out more than [`MOST`],
-    /// none is.
+    /// Fits from `start`, leaving out gross outliers; where all rounds together would leave out more than
+    /// [`MOST`](super::outlier::MOST), none is.
     pub fn fit(&self, start: &Triad<f64>) -> NormFit<P> {
-        let fit = self.fit_leaving_out(start, ROUNDS);
-        let too_many = fit.left_out.len() as f64 > MOST * self.points.len() as f64;
-        if too_many { self.fit_leaving_out(start, 0) } else { fit }
-    }
-
-    /// Fits with up to so many rounds of leaving out.
-    fn fit_leaving_out(&self, start: &Triad<f64>, rounds: usize) -> NormFit<P> {
-        let mut used: Vec<usize> = (0..self.points.len()).collect();
-        let mut points = self.points.to_vec();
-        let mut left_out = Vec::new();
-        let mut solver = self.solve(&points, self.form.theta(start));
-        for round in 0..=rounds {
-            if self.serial {
-                self.expect_curvature(&mut points, &solver);
-                solver = self.solve(&points, *solver.theta());
-            }
-            if round == rounds {
-                break;
-            }
-            let found = outliers(&Residuals::of(&self.model(&points), solver.theta()));
-            if found.is_empty() {
-                break;
-            }
-            for (index, size) in found.into_iter().rev() {
-                left_out.push((used.remove(index), size));
-                points.remove(index);
-            }
-            solver = self.solve(&points, *solver.theta());
-        }
-        left_out.sort_by_key(|(index, _)| *index);
-        NormFit { report: solver.report(), solver, points, used, left_out }
+        let mut all = self.points.to_vec();
+        let kept =
+            leaving_out_few(all.len(), ROUNDS, |used, before: Option<&(LevenbergMarquardt<f64, P>, _)>| {
+                if before.is_none() {
+                    all.copy_from_slice(self.points);
+                }
+                let mut points: Vec<_> = used.iter().map(|k| all[*k]).collect();
+                let start = before.map_or_else(|| self.form.theta(start), |(solver, _)| *solver.theta());
+                let mut solver = self.solve(&points, start);
+                if self.serial {
+                    self.expect_curvature(&mut points, &solver);
+                    solver = self.solve(&points, *solver.theta());
+                    used.iter().zip(&points).for_each(|(k, point)| all[*k] = *point);
+                }
+                let residuals = Residuals::of(&self.model(&points), solver.theta());
+                ((solver, points), residuals)
+            });
+        let Kept { fit: (solver, points), used, left_out } = kept;
+        NormFit { solver, points, used, left_out }
     }
 
     /// Sets the excess that the residuals' own noise makes on the curved shell.
@@ -136,30 +122,28 @@ impl<const P: usize> NormProblem<'_, P> {
         if fit.points.len() > SINGLES {
             return self.held_out_rms(fit, PARTS);
         }
-        let rows = Rows::of(&self.model(&fit.points), fit.solver.theta());
-        let mut sum = 0.0;
-        for (k, point) in fit.points.iter().enumerate() {
-            let theta = fit.solver.theta() + rows.step_without(k..k + 1)?;
-            sum += Residuals::of(&self.model(from_ref(point)), &theta).iter().map(|r| r * r).sum::<f64>();
-        }
-        Some((sum / fit.points.len() as f64).sqrt())
+        let (theta, count) = (fit.solver.theta(), fit.points.len());
+        let sum = by_steps(&Rows::of(&self.model(&fit.points), theta), theta, (count, 1), |k, theta| {
+            self.squared_sum(from_ref(&fit.points[k]), theta)
+        });
+        Some(root_mean(sum?, count))
+    }
+
+    fn squared_sum(&self, points: &[ShellPoint<f64>], theta: &SVector<f64, P>) -> f64 {
+        Residuals::of(&self.model(points), theta).iter().map(|r| r * r).sum()
     }
 
     /// Rms residual of observations left out of the fit, `folds` contiguous parts in turn, each time fitted anew;
     /// `None` where a fit does not converge.
     pub fn held_out_rms(&self, fit: &NormFit<P>, folds: usize) -> Option<f64> {
         let count = fit.points.len();
-        let errors: Option<Vec<f64>> = (0..folds.min(count))
-            .into_par_iter()
-            .map(|fold| {
-                let (from, to) = (fold * count / folds.min(count), (fold + 1) * count / folds.min(count));
-                let kept: Vec<_> = fit.points[..from].iter().chain(&fit.points[to..]).copied().collect();
-                let solver = self.solve(&kept, *fit.solver.theta());
-                let residuals = Residuals::of(&self.model(&fit.points[from..to]), solver.theta());
-                solver.report().termination.was_successful().then(|| residuals.iter().map(|r| r * r).sum())
-            })
-            .collect();
-        Some((errors?.iter().sum::<f64>() / count as f64).sqrt())
+        let sum = by_folds(count, folds, |part| {
+            let kept = [&fit.points[..part.start], &fit.points[part.end..]].concat();
+            let solver = self.solve(&kept, *fit.solver.theta());
+            let converged = solver.report().termination.was_successful();
+            converged.then(|| self.squared_sum(&fit.points[part], solver.theta()))
+        });
+        Some(root_mean(sum?, count))
     }
 
     /// Directions seen, as the fit sees them.
@@ -195,10 +179,10 @@ impl<const P: usize> NormProblem<'_, P> {
         let relative_rms = fit.rms() / radius;
         accept::check_observations(coverage, P, limits)?;
         // Before what depends on the noise: a residual that is no noise would be blamed on the poses.
-        if fit.report.termination.was_successful() {
+        if fit.solver.report().termination.was_successful() {
             accept::check_residual(relative_rms, limits)?;
         }
-        accept::check_report(&fit.report)?;
+        accept::check_report(&fit.solver.report())?;
         let error = accept::relative_error(&triad.gain, std, radius);
         accept::check_precision(error, limits)?;
         accept::check_nonlinearity(bend, error, limits)?;
@@ -214,13 +198,13 @@ fn mean_radius(triad: &Triad<f64>, norm: f64) -> f64 {
 impl<const P: usize> NormFit<P> {
     /// Rms residual with the degrees of freedom left; NaN without any.
     pub fn rms(&self) -> f64 {
-        self.solver.variance().map_or(f64::NAN, f64::sqrt)
+        least_squares::rms(&self.solver)
     }
-}
 
-/// A matrix of a run-time size, for reports.
-pub fn dynamic<const P: usize>(matrix: &SMatrix<f64, P, P>) -> DMatrix<f64> {
-    DMatrix::from_column_slice(P, P, matrix.as_slice())
+    /// The fit's figures, one residual a point, without those that need more than the fit.
+    pub fn report(&self) -> FitReport {
+        FitReport::of(&self.solver, self.points.len(), 1)
+    }
 }
 
 /// Directions before there is a fit: from the points' own middle, for a refusal of too little data.

@@ -13,6 +13,59 @@ pub const MOST: f64 = 0.1;
 /// Fewer observations have no spread to speak of.
 const LEAST: usize = 12;
 
+/// A fit without its outliers.
+#[derive(Clone, Debug)]
+pub struct Kept<F> {
+    /// The fit.
+    pub fit: F,
+    /// Observations used, in order.
+    pub used: Vec<usize>,
+    /// Those left out, in the order in which they were, with their size in robust standard deviations.
+    pub left_out: Vec<(usize, f64)>,
+}
+
+impl<F> Kept<F> {
+    /// With those left out in the observations' order.
+    pub fn in_order(mut self) -> Self {
+        self.left_out.sort_by_key(|(index, _)| *index);
+        self
+    }
+}
+
+/// Fits `count` observations, leaving out outliers in up to so many rounds. `fit` makes a fit to some observations
+/// from the fit before, and gives a residual of each.
+pub fn leaving_out<F>(
+    count: usize,
+    rounds: usize,
+    fit: &mut impl FnMut(&[usize], Option<&F>) -> (F, Vec<f64>),
+) -> Kept<F> {
+    let mut used: Vec<usize> = (0..count).collect();
+    let mut left_out = Vec::new();
+    let (mut fitted, mut residuals) = fit(&used, None);
+    for _ in 0..rounds {
+        let found = outliers(&residuals);
+        if found.is_empty() {
+            break;
+        }
+        for (index, size) in found.into_iter().rev() {
+            left_out.push((used.remove(index), size));
+        }
+        (fitted, residuals) = fit(&used, Some(&fitted));
+    }
+    Kept { fit: fitted, used, left_out }
+}
+
+/// As [`leaving_out`]; where all rounds together would leave out more than [`MOST`], none is.
+pub fn leaving_out_few<F>(
+    count: usize,
+    rounds: usize,
+    mut fit: impl FnMut(&[usize], Option<&F>) -> (F, Vec<f64>),
+) -> Kept<F> {
+    let kept = leaving_out(count, rounds, &mut fit);
+    let too_many = kept.left_out.len() as f64 > MOST * count as f64;
+    if too_many { leaving_out(count, 0, &mut fit) } else { kept.in_order() }
+}
+
 /// Robust standard deviation of residuals around zero.
 fn robust_std(residuals: &[f64]) -> Option<f64> {
     Some(1.4826 * median(residuals.iter().map(|r| r.abs()).collect())?)

@@ -24,12 +24,14 @@ use imucal_core::{
     solver::triangular::Triangular,
 };
 use nalgebra::{DMatrix, Matrix3, SMatrix, SVector, Vector3};
-use rayon::prelude::*;
 
 use super::{
     autocorrelation,
-    norm_fit::dynamic,
-    outlier::{MOST, outliers},
+    held_out::{by_folds, root_mean},
+    least_squares,
+    least_squares::dynamic,
+    outlier::{Kept, leaving_out_few},
+    report::FitReport,
     rig_fit::{RigFit, Solved, solve},
     rows::{Residuals, Rows},
 };
@@ -52,10 +54,6 @@ pub struct ReferenceFit {
     pub kept: Vec<ReferencePose<f64>>,
     /// Indices left out, with their size in robust standard deviations.
     pub left_out: Vec<(usize, f64)>,
-    /// Largest factor on a standard error for residuals alike in time.
-    pub inflation: f64,
-    /// Departure from a parabola within one standard error.
-    pub nonlinearity: f64,
 }
 
 /// Parameters to start from, by the module's equation, the field's length such that K's determinant is one; `None`
@@ -96,15 +94,25 @@ pub struct Tracked {
     pub by_lag: Vec<Matrix3<f64>>,
 }
 
-/// Fits `terms` from `base`, leaving out gross outliers; where that would be more than [`MOST`], none is.
+/// Fits `terms` from `base`, leaving out gross outliers; where that would be more than
+/// [`MOST`](super::outlier::MOST), none is.
 pub fn fit<const P: usize>(
     tracked: &Tracked,
     base: &UnifiedParameters<f64>,
     terms: Terms<P>,
 ) -> ReferenceFit {
-    let found = fit_leaving_out(tracked, base, terms, ROUNDS);
-    let too_many = found.left_out.len() as f64 > MOST * tracked.poses.len() as f64;
-    if too_many { fit_leaving_out(tracked, base, terms, 0) } else { found }
+    let found = leaving_out_few(tracked.poses.len(), ROUNDS, |used, _| {
+        let poses: Vec<_> = used.iter().map(|k| tracked.poses[*k]).collect();
+        let Solved { model, solver, gauge } = solve(&poses, (), base, terms, None);
+        let distances = distances(&model, solver.theta());
+        ((model.base, model.held, solver, gauge), distances)
+    });
+    let Kept { fit: (base, held, solver, gauge), used, left_out } = found;
+    let kept: Vec<_> = used.iter().map(|k| tracked.poses[*k]).collect();
+    let by_lag: Vec<_> = used.iter().filter_map(|k| tracked.by_lag.get(*k).copied()).collect();
+    let model = UnifiedModel { poses: &kept, axes: (), base, terms, held };
+    let fit = summarise(&Solved { model, solver, gauge }, &by_lag);
+    ReferenceFit { fit, kept, left_out }
 }
 
 /// Rms residual of an axis at the plain fit.
@@ -113,34 +121,7 @@ pub fn rms<const P: usize>(
     base: &UnifiedParameters<f64>,
     terms: Terms<P>,
 ) -> f64 {
-    solve(poses, (), base, terms, None).solver.variance().map_or(f64::NAN, f64::sqrt)
-}
-
-fn fit_leaving_out<const P: usize>(
-    tracked: &Tracked,
-    base: &UnifiedParameters<f64>,
-    terms: Terms<P>,
-    rounds: usize,
-) -> ReferenceFit {
-    let mut used: Vec<usize> = (0..tracked.poses.len()).collect();
-    let mut kept = tracked.poses.clone();
-    let mut left_out = Vec::new();
-    let mut round = 0;
-    let (fit, inflation, nonlinearity) = loop {
-        let solved = solve(&kept, (), base, terms, None);
-        let found = outliers(&distances(&solved.model, solved.solver.theta()));
-        if found.is_empty() || round == rounds {
-            let by_lag: Vec<_> = used.iter().filter_map(|k| tracked.by_lag.get(*k).copied()).collect();
-            break summarise(&solved, &by_lag);
-        }
-        for (index, size) in found.into_iter().rev() {
-            left_out.push((used.remove(index), size));
-            kept.remove(index);
-        }
-        round += 1;
-    };
-    left_out.sort_by_key(|(index, _)| *index);
-    ReferenceFit { fit, kept, left_out, inflation, nonlinearity }
+    least_squares::rms(&solve(poses, (), base, terms, None).solver)
 }
 
 /// Distance of each output from what it ought to be.
@@ -153,11 +134,7 @@ fn distances<const P: usize>(
     of_poses.chunks_exact(3).map(|r| Vector3::from_column_slice(r).norm()).collect()
 }
 
-/// The fit, its inflation and its departure from a parabola.
-fn summarise<const P: usize>(
-    solved: &Solved<'_, P, ReferencePose<f64>>,
-    by_lag: &[Matrix3<f64>],
-) -> (RigFit, f64, f64) {
+fn summarise<const P: usize>(solved: &Solved<'_, P, ReferencePose<f64>>, by_lag: &[Matrix3<f64>]) -> RigFit {
     let Solved { model, solver, .. } = solved;
     let mut rows = Rows::of(model, solver.theta());
     let now = model.terms.parameters(&model.base, solver.theta());
@@ -177,8 +154,10 @@ fn summarise<const P: usize>(
         }
         None => (SVector::repeat(1.0), DMatrix::repeat(P, P, f64::INFINITY)),
     };
-    let bend = accept::nonlinearity(solver, model, inflation.max());
-    (solved.fit(covariance, held_out(solved)), inflation.max(), bend)
+    let inflation = inflation.max();
+    let nonlinearity = accept::nonlinearity(solver, model, inflation);
+    let held_out_rms = held_out(solved);
+    solved.fit(covariance, FitReport { held_out_rms, nonlinearity, inflation, ..solved.report() })
 }
 
 /// Takes out of each column of the Jacobian what is like `direction`; rows beyond its end have none of it.
@@ -198,17 +177,13 @@ fn take_out<const P: usize>(rows: &mut Rows<P>, direction: &[f64]) {
 fn held_out<const P: usize>(solved: &Solved<'_, P, ReferencePose<f64>>) -> Option<f64> {
     let (model, poses) = (&solved.model, solved.model.poses);
     let base = model.terms.parameters(&model.base, solved.solver.theta());
-    let sums: Option<Vec<f64>> = (0..FOLDS)
-        .into_par_iter()
-        .map(|fold| {
-            let (from, to) = (fold * poses.len() / FOLDS, (fold + 1) * poses.len() / FOLDS);
-            let others = [&poses[..from], &poses[to..]].concat();
-            let again = solve(&others, (), &base, model.terms, None);
-            let alone = UnifiedModel { poses: &poses[from..to], held: 0, ..again.model };
-            let converged = again.solver.report().termination.was_successful();
-            let residuals = Residuals::of(&alone, again.solver.theta());
-            converged.then(|| residuals.iter().map(|r| r * r).sum())
-        })
-        .collect();
-    Some((sums?.iter().sum::<f64>() / (3 * poses.len()) as f64).sqrt())
+    let sum = by_folds(poses.len(), FOLDS, |part| {
+        let others = [&poses[..part.start], &poses[part.end..]].concat();
+        let again = solve(&others, (), &base, model.terms, None);
+        let alone = UnifiedModel { poses: &poses[part], held: 0, ..again.model };
+        let converged = again.solver.report().termination.was_successful();
+        let residuals = Residuals::of(&alone, again.solver.theta());
+        converged.then(|| residuals.iter().map(|r| r * r).sum())
+    });
+    Some(root_mean(sum?, 3 * poses.len()))
 }

@@ -5,13 +5,17 @@ use imucal_core::{
         rig::{GimbalPose, Pose},
         unified::{Terms, UnifiedModel, UnifiedParameters},
     },
-    solver::{LevenbergMarquardt, SolveReport, gauge::Gauge, lm::Settings},
+    solver::{LevenbergMarquardt, gauge::Gauge},
     triad::Triad,
 };
-use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, SVector, Vector3};
 
 use super::{
     compare::Step,
+    held_out::{by_steps, root_mean},
+    least_squares,
+    least_squares::dynamic,
+    report::FitReport,
     rows::{Residuals, Rows, influence},
 };
 use crate::{
@@ -32,18 +36,10 @@ pub struct RigFit {
     pub entries: Vec<u8>,
     /// Those of them that the poses cannot tell, with the entry each is like.
     pub held: Vec<(u8, Option<u8>)>,
-    /// The solver's report.
-    pub report: SolveReport<f64>,
+    /// Its figures: three residuals a pose, held out three at a time.
+    pub report: FitReport,
     /// Covariance of the estimated entries, for noise that may drift from pose to pose; zero where held.
     pub covariance: DMatrix<f64>,
-    /// Rms residual of an axis, with the degrees of freedom left.
-    pub rms: f64,
-    /// Rms residual of poses left out in turn, all three axes of one at a time.
-    pub held_out_rms: Option<f64>,
-    /// Sum of squared residuals.
-    pub squared_sum: f64,
-    /// Residuals used, three a pose.
-    pub residuals: usize,
 }
 
 /// Where a fit ended, and what the poses told of it.
@@ -72,8 +68,7 @@ pub(crate) fn solve<'a, const P: usize, G: Pose<f64>>(
     outer: Option<Vector3<f64>>,
 ) -> Solved<'a, P, G> {
     let free = UnifiedModel { poses, axes, base: *base, terms, held: 0 };
-    let mut solver = LevenbergMarquardt::new(terms.theta(base), Settings::default());
-    solver.run(&free);
+    let mut solver = least_squares::solve(&free, terms.theta(base));
     let gauge = Gauge::of(solver.factor().r(), TOLERANCE, |k| terms.class(k));
     let model = UnifiedModel { held: gauge.held, ..free };
     if gauge.held != 0 {
@@ -82,8 +77,7 @@ pub(crate) fn solve<'a, const P: usize, G: Pose<f64>>(
         for k in (0..P).filter(|k| gauge.is_held(*k)) {
             start[k] = at[k];
         }
-        solver = LevenbergMarquardt::new(start, Settings::default());
-        solver.run(&model);
+        solver = least_squares::solve(&model, start);
     }
     let found = terms.parameters(base, solver.theta());
     let Some(field) = of_known_length(outer, base, &found, &terms, &gauge) else {
@@ -92,8 +86,7 @@ pub(crate) fn solve<'a, const P: usize, G: Pose<f64>>(
     // Held anew where the field has its length: K and sources are then those of the field that is known.
     let model = UnifiedModel { base: UnifiedParameters { vector_n: field, ..*base }, ..model };
     let start = terms.theta(&UnifiedParameters { vector_n: field, ..found });
-    solver = LevenbergMarquardt::new(start, Settings::default());
-    solver.run(&model);
+    let solver = least_squares::solve(&model, start);
     Solved { model, solver, gauge }
 }
 
@@ -137,8 +130,14 @@ fn headed(known: &Vector3<f64>, normal: &Vector3<f64>) -> Option<Vector3<f64>> {
 }
 
 impl<const P: usize, G: Pose<f64>> Solved<'_, P, G> {
-    /// The fit, with these standard errors (zero where held) and this residual of what was left out.
-    pub fn fit(&self, mut covariance: DMatrix<f64>, held_out_rms: Option<f64>) -> RigFit {
+    /// The fit's figures, without those that need more than the solver.
+    pub fn report(&self) -> FitReport {
+        let held = (0..P).filter(|k| self.gauge.is_held(*k)).count();
+        FitReport { parameters: P - held, ..FitReport::of(&self.solver, self.model.poses.len(), 3) }
+    }
+
+    /// The fit, with these standard errors (zero where held) and these figures.
+    pub fn fit(&self, mut covariance: DMatrix<f64>, report: FitReport) -> RigFit {
         let Self { model, solver, gauge } = self;
         let entries = model.terms.entries();
         let held: Vec<usize> = (0..P).filter(|k| gauge.is_held(*k)).collect();
@@ -151,12 +150,8 @@ impl<const P: usize, G: Pose<f64>> Solved<'_, P, G> {
             parameters: model.terms.parameters(&model.base, solver.theta()),
             entries: entries.to_vec(),
             held: held.iter().map(like).collect(),
-            report: solver.report(),
+            report,
             covariance,
-            rms: solver.variance().map_or(f64::NAN, f64::sqrt),
-            held_out_rms,
-            squared_sum: 2.0 * solver.report().cost,
-            residuals: 3 * model.poses.len(),
         }
     }
 }
@@ -165,11 +160,10 @@ fn summarise<const P: usize>(poses: &Poses, solved: &Solved<'_, P, GimbalPose<f6
     let Solved { model, solver, gauge } = solved;
     let held: Vec<usize> = (0..P).filter(|k| gauge.is_held(*k)).collect();
     let rows = Rows::of(model, solver.theta());
-    let covariance = covariance(poses, &rows, &held).unwrap_or_else(|| {
-        let white = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
-        DMatrix::from_column_slice(P, P, white.as_slice())
-    });
-    solved.fit(covariance, held_out(model, solver.theta()))
+    let covariance =
+        covariance(poses, &rows, &held).unwrap_or_else(|| dynamic(&least_squares::covariance(solver)));
+    let held_out_rms = held_out(model, &rows, solver.theta());
+    solved.fit(covariance, FitReport { held_out_rms, ..solved.report() })
 }
 
 /// Covariance A V Aᵀ of least squares, A = (JᵀJ)⁻¹Jᵀ, for noise that drifts; zero where held. `None` where the rows do
@@ -196,37 +190,29 @@ fn covariance<const P: usize>(poses: &Poses, rows: &Rows<P>, held: &[usize]) -> 
     covariance.iter().all(|x| x.is_finite()).then_some(covariance)
 }
 
-/// Each pose left out in turn, one Gauss–Newton step from the optimum of all.
-fn held_out<const P: usize>(model: &UnifiedModel<'_, f64, P>, theta: &SVector<f64, P>) -> Option<f64> {
-    let rows = Rows::of(model, theta);
-    let mut sum = 0.0;
-    for k in 0..model.poses.len() {
-        let there = theta + rows.step_without(3 * k..3 * k + 3)?;
+/// Rms residual of an axis of poses left out in turn, all three axes of one at a time.
+fn held_out<const P: usize>(
+    model: &UnifiedModel<'_, f64, P>,
+    rows: &Rows<P>,
+    theta: &SVector<f64, P>,
+) -> Option<f64> {
+    let count = model.poses.len();
+    let sum = by_steps(rows, theta, (count, 3), |k, theta| {
         let alone = UnifiedModel { poses: &model.poses[k..=k], held: 0, ..*model };
-        sum += Residuals::of(&alone, &there).iter().map(|r| r * r).sum::<f64>();
-    }
-    Some((sum / (3 * model.poses.len()) as f64).sqrt())
+        Residuals::of(&alone, theta).iter().map(|r| r * r).sum()
+    });
+    Some(root_mean(sum?, 3 * count))
 }
 
 impl RigFit {
     /// The fit as a rung of a comparison.
     pub fn step(&self, name: &'static str, adds: &'static str) -> Step {
-        Step {
-            name,
-            adds,
-            entries: self.entries.clone(),
-            free: self.free(),
-            residuals: self.residuals,
-            squared_sum: self.squared_sum,
-            rms: self.rms,
-            held_out_rms: self.held_out_rms,
-            second_half_rms: None,
-        }
+        self.report.step(name, adds, &self.entries)
     }
 
     /// Parameters that were estimated and not held.
     pub fn free(&self) -> usize {
-        self.entries.len() - self.held.len()
+        self.report.parameters
     }
 
     /// Standard error of an entry; `None` where it was not estimated.

@@ -10,8 +10,10 @@
 //! | [`turn_errors`] | what the accelerometer's errors add to a turn's |
 //! | [`motions`], [`rig`] | turns along a reference attitude, or a rig's encoders |
 //! | [`bias_smoother`] | a bias that drifts between the rests |
+//! | [`acceptance`] | the limits that both are judged by |
 //! | [`ladder`] | forms of the model, compared by held-out residuals |
 
+pub mod acceptance;
 pub mod bias_smoother;
 pub mod ladder;
 pub mod motions;

@@ -184,7 +184,7 @@ pub fn lagging(
     if plain.data.len() < LEAST_FOR_LAG {
         return plain;
     }
-    let rms = |lag: f64| gyr_rig_fit::fit(&at(lag).data, FULL, plain.bias).rms;
+    let rms = |lag: f64| gyr_rig_fit::fit(&at(lag).data, FULL, plain.bias).report.rms;
     let lag = Lag::of(rms, rms);
     let mut found = if let Lag::Found(lag) = lag { at(lag) } else { plain };
     found.notes.push(lag.note());

@@ -10,22 +10,22 @@
 //! reconstruction; the model is [`imucal_core::model::attitude`].
 
 use imucal_core::{
-    accept::{self, Limits, Refusal},
+    accept::Refusal,
     coverage::Coverage,
     model::parameterisation::{FULL, FULL_WITH_SENSITIVITY},
     triad::Triad,
 };
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use super::motions::{Observations, lagging, on_encoders};
+use super::{
+    acceptance::judge,
+    motions::{Observations, lagging, on_encoders},
+};
 use crate::{
     calibrate::{
         Options,
-        fit::{
-            gyr_rig_fit,
-            gyr_rig_fit::{LARGEST_RMS, MotionFit},
-        },
-        outcome::{Calibration, Evidence, FitSummary, Refused, RigFindings, SensorOutcome},
+        fit::{gyr_rig_fit, gyr_rig_fit::MotionFit},
+        outcome::{Calibration, Estimates, Evidence, FitSummary, Refused, RigFindings, SensorOutcome},
     },
     noise::Span,
     observe::{motion, pose},
@@ -104,7 +104,7 @@ pub(crate) fn fit(name: &str, observations: &Observations) -> MotionFit {
 fn outcome(name: &'static str, sensor: &Triple, observations: &Observations) -> SensorOutcome {
     let fit = fit(name, observations);
     let summary = summarise(&fit, sensor, observations);
-    match judge(&fit, &summary) {
+    match judge(&fit.report.solver, &summary, LEAST_MOTIONS) {
         Ok(()) => SensorOutcome {
             suspicions: Vec::new(),
             kind: SensorKind::Gyr,
@@ -118,16 +118,6 @@ fn outcome(name: &'static str, sensor: &Triple, observations: &Observations) -> 
         },
         Err(refusal) => refused(name, refusal, Some(summary)),
     }
-}
-
-fn judge(fit: &MotionFit, summary: &FitSummary) -> Result<(), Refusal> {
-    let limits = Limits { rms: LARGEST_RMS, ..Limits::for_norm(fit.entries.len(), LEAST_MOTIONS) };
-    accept::check_report(&fit.report)?;
-    let std = Triad { gain: summary.gain_std, bias: Vector3::zeros() };
-    let error = accept::relative_error(&summary.triad.gain, &std, 1.0);
-    accept::check_precision(error, &limits)?;
-    accept::check_nonlinearity(fit.nonlinearity, error, &limits)?;
-    accept::check_plausibility(&summary.triad, true, fit.rms, &limits)
 }
 
 fn refused(model: &'static str, refusal: Refusal, fit: Option<FitSummary>) -> SensorOutcome {
@@ -176,32 +166,22 @@ fn summarise(fit: &MotionFit, sensor: &Triple, observations: &Observations) -> F
         let at = |of: &dyn Fn(usize) -> f64| Matrix3::from_fn(|i, j| of(12 + 3 * i + j));
         (at(&|k| fit.parameters[k]), at(&std))
     });
-    FitSummary {
+    let estimates = Estimates {
         triad: fit.triad,
-        gain_std: Matrix3::from_fn(|i, j| std(3 * i + j)),
-        bias_std: Vector3::from_fn(|i, _| std(9 + i)),
+        std: Triad {
+            gain: Matrix3::from_fn(|i, j| std(3 * i + j)),
+            bias: Vector3::from_fn(|i, _| std(9 + i)),
+        },
         covariance: covariance.view((0, 0), (12, 12)).into_owned(),
         covariance_of: fit.entries[..12].to_vec(),
-        unit_in: sensor.unit,
-        unit_out: Unit::RadianPerSecond,
-        nominal: sensor.nominal,
-        rms: fit.rms,
-        held_out_rms: fit.held_out_rms,
-        observations: fit.kept.len(),
-        parameters: fit.entries.len(),
-        condition: fit.report.condition,
-        coverage: Coverage::of(axes.iter().copied()).share,
-        nonlinearity: fit.nonlinearity,
-        inflation: 1.0,
-        iterations: fit.report.iterations,
-        termination: fit.report.termination,
-        field_norm: None,
+    };
+    let coverage = Coverage::of(axes.iter().copied()).share;
+    FitSummary {
         left_out,
-        gain_spread: None,
         bias_wander: observations.wander,
         rig: Some(RigFindings { notes, g_sensitivity: sensitivity, ..RigFindings::default() }),
-        alignment: None,
         search: Some(fit.search),
+        ..FitSummary::new(&fit.report, estimates, sensor, Unit::RadianPerSecond, coverage)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use imucal_core::{
-    accept::{self, Limits, Refusal},
+    accept::{self, Refusal},
     coverage::Coverage,
     model::{parameterisation::FULL_GAIN, turn::TurnModel},
     observation::{Rest, Turn},
@@ -13,6 +13,7 @@ use imucal_core::{
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::{
+    acceptance::judge,
     turn_errors,
     turn_errors::{Between, RateNoise},
 };
@@ -20,15 +21,19 @@ use crate::{
     calibrate::{
         fit::{
             directions::Directions,
-            norm_fit::dynamic,
-            outlier::outliers,
+            gyr_rig_fit::LARGEST_RMS,
+            held_out::{by_steps, root_mean},
+            least_squares,
+            least_squares::dynamic,
+            outlier::{Kept, leaving_out},
+            report::FitReport,
             rest_bias,
             rest_bias::BiasErrors,
             rest_noise::AtRest,
             rows::{Residuals, Rows, weakest_inflation},
             search::{SWARM_OBSERVATIONS, Search, Searched},
         },
-        outcome::{BiasWander, Evidence, FitSummary, KnownTurn, Refused, SensorOutcome},
+        outcome::{BiasWander, Estimates, Evidence, FitSummary, KnownTurn, Refused, SensorOutcome},
     },
     observe::{
         quantum::quantum,
@@ -45,8 +50,6 @@ const LEAST_TURNS: usize = 8;
 const LEAST_ANGLE: f64 = 0.26;
 /// The bias wanders where the rests' means spread this many times wider than their own noise explains.
 const WANDER: f64 = 1.5;
-/// Largest rms error of a turn, rad (5.7°): beyond it axes are swapped or a unit is wrong.
-const LARGEST_RMS: f64 = 0.1;
 /// How far a swarm looks, each entry of the gain to either side of nominal: as far as a gain is plausible below it.
 const REACH: f64 = 0.5;
 
@@ -209,22 +212,26 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
     if let Err(refusal) = check_turns(input, &turns) {
         return refuse(refusal, None);
     }
-    let (mut solver, mut search) = solve(&input.with_directions(&turns.data));
-    let gross = outliers(&turn_errors(&input.with_directions(&turns.data), solver.theta()));
-    for (index, size) in gross.iter().rev() {
-        let turn = turns.data.remove(*index);
-        turns.left_out.push(format!(
-            "turn from rest {} to {}: {size:.1} robust standard deviations",
-            turn.rest_before + 1,
-            turn.rest_after + 1
-        ));
-    }
     let known = input.with_directions(&turns.data);
-    if !gross.is_empty() {
-        (solver, search) = solve(&known);
-    }
+    let fitted = leaving_out(known.len(), 1, &mut |used, _| {
+        let known: Vec<_> = used.iter().map(|k| known[*k]).collect();
+        let (solver, search) = solve(&known);
+        let errors = turn_errors(&known, solver.theta());
+        ((solver, search), errors)
+    });
+    let Kept { fit: (solver, search), used, left_out } = fitted;
+    turns.left_out.extend(left_out.iter().map(|(index, size)| {
+        let TurnData { rest_before, rest_after, .. } = turns.data[*index];
+        format!(
+            "turn from rest {} to {}: {size:.1} robust standard deviations",
+            rest_before + 1,
+            rest_after + 1
+        )
+    }));
+    turns.data = used.iter().map(|k| turns.data[*k].clone()).collect();
+    let known = input.with_directions(&turns.data);
     let summary = summarise(input, &turns, &known, (&solver, search));
-    match judge(&solver, &summary) {
+    match judge(&solver.report(), &summary, LEAST_TURNS) {
         Ok(()) => SensorOutcome {
             suspicions: Vec::new(),
             kind: SensorKind::Gyr,
@@ -261,16 +268,6 @@ fn check_turns(input: &GyrInput<'_>, turns: &Turns) -> Result<(), Refusal> {
     }
 }
 
-fn judge(solver: &LevenbergMarquardt<f64, 9>, summary: &FitSummary) -> Result<(), Refusal> {
-    let limits = Limits { rms: LARGEST_RMS, ..Limits::for_norm(9, LEAST_TURNS) };
-    accept::check_report(&solver.report())?;
-    let std = Triad { gain: summary.gain_std, bias: Vector3::zeros() };
-    let error = accept::relative_error(&summary.triad.gain, &std, 1.0);
-    accept::check_precision(error, &limits)?;
-    accept::check_nonlinearity(summary.nonlinearity, error, &limits)?;
-    accept::check_plausibility(&summary.triad, true, summary.rms, &limits)
-}
-
 fn refuse(refusal: Refusal, fit: Option<FitSummary>) -> SensorOutcome {
     let advice = match refusal {
         Refusal::NoMotion | Refusal::TooFewObservations { .. } => {
@@ -297,14 +294,11 @@ fn refuse(refusal: Refusal, fit: Option<FitSummary>) -> SensorOutcome {
 /// Rms error of turns left out of the fit, one at a time. Each time the fit takes one Gauss–Newton step from the
 /// optimum of all; the held turn is then integrated afresh.
 fn held_out_rms(known: &[Turn<'_, f64>], theta: &SVector<f64, 9>) -> Option<f64> {
-    let rows = Rows::of(&TurnModel { turns: known, form: FULL_GAIN }, theta);
-    let errors: Option<Vec<f64>> = (0..known.len())
-        .map(|left| {
-            let step = rows.step_without(3 * left..3 * left + 3)?;
-            turn_errors(&known[left..=left], &(theta + step)).first().copied()
-        })
-        .collect();
-    Some(rms(&errors?))
+    let (rows, count) = (Rows::of(&TurnModel { turns: known, form: FULL_GAIN }, theta), known.len());
+    let sum = by_steps(&rows, theta, (count, 3), |k, theta| {
+        turn_errors(&known[k..=k], theta).iter().map(|e| e * e).sum()
+    });
+    Some(root_mean(sum?, count))
 }
 
 fn summarise(
@@ -313,42 +307,33 @@ fn summarise(
     known: &[Turn<'_, f64>],
     (solver, search): (&LevenbergMarquardt<f64, 9>, Search),
 ) -> FitSummary {
-    let report = solver.report();
     let gain = FULL_GAIN.triad(solver.theta()).gain;
-    let classical = solver.covariance().unwrap_or_else(|| SMatrix::repeat(f64::INFINITY));
+    let classical = least_squares::covariance(solver);
     let bias = rest_bias::errors(input.rests, &input.rest_means(), &input.at_rest());
     let covariance = gain_covariance(input, turns, known, &gain, &bias).unwrap_or(classical);
-    let inflation = covariance.diagonal().component_div(&classical.diagonal()).map(f64::sqrt).max();
-    FitSummary {
-        triad: Triad { gain, bias: turns.bias },
-        gain_std: FULL_GAIN.triad(&covariance.diagonal().map(f64::sqrt)).gain,
-        bias_std: bias.std,
-        covariance: dynamic(&covariance),
-        covariance_of: FULL_GAIN.entries().to_vec(),
-        unit_in: input.sensor.unit,
-        unit_out: Unit::RadianPerSecond,
-        nominal: input.sensor.nominal,
+    let report = FitReport {
         rms: rms(&turn_errors(known, solver.theta())),
         held_out_rms: held_out_rms(known, solver.theta()),
-        observations: known.len(),
-        parameters: 9,
-        condition: report.condition,
-        coverage: Coverage::of(known.iter().flat_map(|t| turn_axis(t))).share,
         nonlinearity: accept::nonlinearity(
             solver,
             &TurnModel { turns: known, form: FULL_GAIN },
             weakest_inflation(solver, &covariance),
         ),
-        inflation,
-        iterations: report.iterations,
-        termination: report.termination,
-        field_norm: None,
+        inflation: covariance.diagonal().component_div(&classical.diagonal()).map(f64::sqrt).max(),
+        ..FitReport::of(solver, known.len(), 3)
+    };
+    let estimates = Estimates {
+        triad: Triad { gain, bias: turns.bias },
+        std: Triad { gain: FULL_GAIN.triad(&covariance.diagonal().map(f64::sqrt)).gain, bias: bias.std },
+        covariance: dynamic(&covariance),
+        covariance_of: FULL_GAIN.entries().to_vec(),
+    };
+    let coverage = Coverage::of(known.iter().flat_map(|t| turn_axis(t))).share;
+    FitSummary {
         left_out: turns.left_out.clone(),
-        gain_spread: None,
         bias_wander: Some(turns.wander),
-        rig: None,
-        alignment: None,
         search: Some(search),
+        ..FitSummary::new(&report, estimates, input.sensor, Unit::RadianPerSecond, coverage)
     }
 }
 

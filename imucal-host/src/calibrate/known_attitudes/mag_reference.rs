@@ -93,7 +93,7 @@ pub fn magnetometer(
 
 /// The fit as a rung of a comparison, with as many residuals as are independent of each other.
 fn step((name, adds): (&'static str, &'static str), found: &ReferenceFit) -> Step {
-    let alike = found.inflation * found.inflation;
+    let alike = found.fit.report.inflation * found.fit.report.inflation;
     let step = found.fit.step(name, adds);
     let residuals = (step.residuals as f64 / alike) as usize;
     Step { residuals, squared_sum: step.squared_sum / alike, ..step }
@@ -150,8 +150,6 @@ fn outcome(
     let coverage = Coverage::of(found.kept.iter().map(|pose| triad.correct(&pose.value).normalize()));
     let unit = Unit::of(SensorKind::Mag)[0];
     let mut summary = rig::summarise(&found.fit, sensor, unit, triad, covariance, coverage.share);
-    summary.inflation = found.inflation;
-    summary.nonlinearity = found.nonlinearity;
     summary.left_out = samples::stretches(&found.left_out);
     let verdict = judge(found, &summary, &coverage, field.is_some());
     if field.is_none() {
@@ -205,13 +203,13 @@ fn judge(
     accept::check_observations(coverage, found.fit.free(), &limits)?;
     let relative = summary.rms / found.fit.parameters.vector_n.norm();
     // Before what depends on the noise: a residual that is no noise would be blamed on the poses.
-    if found.fit.report.termination.was_successful() {
+    if found.fit.report.solver.termination.was_successful() {
         accept::check_residual(relative, &limits)?;
     }
-    accept::check_report(&found.fit.report)?;
+    accept::check_report(&found.fit.report.solver)?;
     let error = summary.relative_error(found.fit.parameters.vector_n.norm());
     accept::check_precision(error, &limits)?;
-    accept::check_nonlinearity(found.nonlinearity, error, &limits)?;
+    accept::check_nonlinearity(summary.nonlinearity, error, &limits)?;
     accept::check_plausibility(&summary.triad, nominal, relative, &limits)
 }
 

@@ -4,6 +4,7 @@ use imucal_core::{
     accept::{self, Limits, Refusal},
     coverage::Coverage,
     model::{rig::Pose, unified::UnifiedParameters},
+    triad::Triad,
 };
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -13,7 +14,8 @@ use crate::{
         Options,
         fit::{compare, rig_fit::RigFit},
         outcome::{
-            Calibration, Evidence, FitSummary, HigherOrder, Refused, RigFindings, SensorOutcome, entry_name,
+            Calibration, Estimates, Evidence, FitSummary, HigherOrder, Refused, RigFindings, SensorOutcome,
+            entry_name,
         },
     },
     observe::pose::{self, Poses},
@@ -241,13 +243,13 @@ fn refused(
 fn judge(fit: &RigFit, summary: &FitSummary, coverage: &Coverage<f64>, norm: f64) -> Result<(), Refusal> {
     let limits = limits();
     accept::check_observations(coverage, fit.free(), &limits)?;
-    if fit.residuals <= fit.free() {
+    if fit.report.residuals <= fit.free() {
         let need = fit.free() / 3 + 1;
-        return Err(Refusal::TooFewObservations { have: fit.residuals / 3, need });
+        return Err(Refusal::TooFewObservations { have: fit.report.residuals / 3, need });
     }
-    accept::check_report(&fit.report)?;
+    accept::check_report(&fit.report.solver)?;
     accept::check_precision(summary.relative_error(norm), &limits)?;
-    accept::check_plausibility(&summary.triad, true, fit.rms / norm, &limits)
+    accept::check_plausibility(&summary.triad, true, fit.report.rms / norm, &limits)
 }
 
 /// The figures of a fit; `triad` and `covariance` are [`RigFit::triad`]'s.
@@ -255,37 +257,17 @@ pub(crate) fn summarise(
     fit: &RigFit,
     sensor: &Triple,
     unit_out: Unit,
-    triad: imucal_core::triad::Triad<f64>,
+    triad: Triad<f64>,
     covariance: DMatrix<f64>,
     coverage: f64,
 ) -> FitSummary {
     let std = |k: usize| covariance[(k, k)].sqrt();
+    let std =
+        Triad { gain: Matrix3::from_fn(|i, j| std(3 * i + j)), bias: Vector3::from_fn(|i, _| std(9 + i)) };
+    let estimates = Estimates { triad, std, covariance, covariance_of: (0..12).collect() };
     FitSummary {
-        triad,
-        gain_std: Matrix3::from_fn(|i, j| std(3 * i + j)),
-        bias_std: Vector3::from_fn(|i, _| std(9 + i)),
-        covariance,
-        covariance_of: (0..12).collect(),
-        unit_in: sensor.unit,
-        unit_out,
-        nominal: sensor.nominal,
-        rms: fit.rms,
-        held_out_rms: fit.held_out_rms,
-        observations: fit.residuals / 3,
-        parameters: fit.free(),
-        condition: fit.report.condition,
-        coverage,
-        nonlinearity: 0.0,
-        inflation: 1.0,
-        iterations: fit.report.iterations,
-        termination: fit.report.termination,
-        field_norm: None,
-        left_out: Vec::new(),
-        gain_spread: None,
-        bias_wander: None,
         rig: Some(findings(fit)),
-        alignment: None,
-        search: None,
+        ..FitSummary::new(&fit.report, estimates, sensor, unit_out, coverage)
     }
 }
 

@@ -15,11 +15,13 @@ use crate::{
             alignment,
             alignment::FieldAtRest,
             directions::Directions,
-            norm_fit::{NormFit, NormProblem, dynamic, raw_coverage},
+            least_squares::dynamic,
+            norm_fit::{NormFit, NormProblem, raw_coverage},
+            report::FitReport,
             rest_noise::AtRest,
             shell_errors::ShellErrors,
         },
-        outcome::{Evidence, FitSummary, Refused, SensorOutcome},
+        outcome::{Estimates, Evidence, FitSummary, Refused, SensorOutcome},
     },
     ellipsoid::{adjusted, sphere},
     observe::cloud::{Cloud, cloud},
@@ -120,9 +122,7 @@ fn fit(cloud: &Cloud, input: &MagInput<'_>) -> Result<Judged, Refusal> {
     };
     let errors = ShellErrors::of_cloud(&problem, &fit, &at, &at_rest.noise_of_cloud());
     let (bend, verdict) = problem.judge(&fit, &coverage, &errors.stated(&problem.form, &fit), false, &limits);
-    let mut summary = summarise(&problem, &fit, sensor, &errors);
-    summary.coverage = coverage.share;
-    summary.nonlinearity = bend;
+    let mut summary = summarise(&problem, &fit, sensor, &errors, (coverage.share, bend));
     if field.is_none() {
         to_unit_determinant(&mut summary, norm);
     }
@@ -142,35 +142,18 @@ fn summarise(
     fit: &NormFit<9>,
     sensor: &Triple,
     errors: &ShellErrors<9>,
+    (coverage, nonlinearity): (f64, f64),
 ) -> FitSummary {
-    let covariance = errors.covariance;
-    let std = problem.form.triad(&covariance.diagonal().map(f64::sqrt));
-    FitSummary {
-        triad: problem.form.triad(fit.solver.theta()),
-        gain_std: std.gain,
-        bias_std: std.bias,
-        covariance: dynamic(&covariance),
-        covariance_of: problem.form.entries().to_vec(),
-        unit_in: sensor.unit,
-        unit_out: Unit::MicroTesla,
-        nominal: sensor.nominal,
-        rms: fit.rms(),
+    let report = FitReport {
         held_out_rms: problem.held_out_rms(fit, FOLDS),
-        observations: fit.points.len(),
-        parameters: 9,
-        condition: fit.report.condition,
-        coverage: 0.0,
-        nonlinearity: 0.0,
+        nonlinearity,
         inflation: errors.inflation.max(),
-        iterations: fit.report.iterations,
-        termination: fit.report.termination,
-        field_norm: None,
+        ..fit.report()
+    };
+    let estimates = Estimates::of(&problem.form, fit.solver.theta(), &errors.covariance);
+    FitSummary {
         left_out: stretches(&fit.left_out),
-        gain_spread: None,
-        bias_wander: None,
-        rig: None,
-        alignment: None,
-        search: None,
+        ..FitSummary::new(&report, estimates, sensor, Unit::MicroTesla, coverage)
     }
 }
 

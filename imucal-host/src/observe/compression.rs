@@ -1,0 +1,78 @@
+//! Rates compressed to blocks: the one loop behind turns and motions.
+
+use std::ops::Range;
+
+use imucal_core::observation::{Block, BlockBuilder};
+use nalgebra::Vector3;
+
+/// Rates across a gap longer than this many usual intervals are not known.
+const GAP: f64 = 5.0;
+
+/// Rows compressed to blocks.
+#[derive(Clone, Debug, Default)]
+pub struct Compressed {
+    /// The blocks.
+    pub blocks: Vec<Block<f64>>,
+    /// How long each lasts, s.
+    pub durations: Vec<f64>,
+    /// First row of each, and the one after its last.
+    pub rows: Vec<Range<usize>>,
+    /// Each sample's rate, rad/s, how long it is held, s, and the block it is in.
+    pub samples: Vec<(Vector3<f64>, f64, usize)>,
+}
+
+/// The row after the first gap in time.
+pub fn jump(time: &[f64], rows: &[usize], interval: f64) -> Option<usize> {
+    rows.windows(2).find(|pair| time[pair[1]] - time[pair[0]] > GAP * interval).map(|pair| pair[1])
+}
+
+/// Compresses rows to blocks of `size` samples. `rate` gives that of a row, rad/s; it is held from half-way to the
+/// sample before it to half-way to the one after (the trapezoidal rule).
+pub fn compress(time: &[f64], rows: &[usize], size: u16, rate: impl Fn(usize) -> Vector3<f64>) -> Compressed {
+    let count = rows.len() / usize::from(size) + 1;
+    let mut all = Compressed {
+        blocks: Vec::with_capacity(count),
+        durations: Vec::with_capacity(count),
+        rows: Vec::with_capacity(count),
+        samples: Vec::with_capacity(rows.len()),
+    };
+    let mut builder = BlockBuilder::default();
+    let mut first = 0;
+    for (index, row) in rows.iter().copied().enumerate() {
+        let from = if index == 0 { time[row] } else { time[rows[index - 1]] };
+        let to = rows.get(index + 1).map_or(time[row], |next| time[*next]);
+        let (rate, held) = (rate(row), 0.5 * (to - from));
+        builder.push(&rate, held);
+        all.samples.push((rate, held, all.blocks.len()));
+        if builder.count() < size && index + 1 < rows.len() {
+            continue;
+        }
+        let (block, duration) = builder.finish();
+        all.blocks.push(block);
+        all.durations.push(duration);
+        all.rows.push(rows[first]..row + 1);
+        first = index + 1;
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seven_samples_are_two_blocks_that_last_as_long_as_they() {
+        let time: Vec<f64> = (0..8).map(f64::from).collect();
+        let all = compress(&time, &[0, 1, 2, 4, 5, 6, 7], 5, |row| Vector3::x() * row as f64);
+        assert_eq!((all.rows, all.samples[5].2), (vec![0..6, 6..8], 1));
+        assert!((all.durations.iter().sum::<f64>() - 7.0).abs() < 1e-12);
+        let turned: f64 = all.samples.iter().map(|(rate, held, _)| rate.x * held).sum();
+        assert!((turned - 24.5).abs() < 1e-12, "{turned}");
+    }
+
+    #[test]
+    fn a_gap_of_six_intervals_is_one_and_a_dropout_is_none() {
+        assert_eq!(jump(&[0.0, 1.0, 3.0, 9.0], &[0, 1, 2, 3], 1.0), Some(3));
+        assert_eq!(jump(&[0.0, 1.0, 3.0, 8.0], &[0, 1, 2, 3], 1.0), None);
+    }
+}
