@@ -16,17 +16,24 @@
 //! variance. That there is none at all, a recording cannot tell: without any, the error of a bias is said to be up to
 //! twice as large as it is (`tests/recovery_rig`).
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector, Vector3};
 use statrs::function::gamma::{gamma_lr, ln_gamma};
 
-use super::{Noise, Span, restricted::Restricted, whitening::Whitening};
+use super::{
+    Noise, Span, flicker,
+    knots::Knots,
+    precision::Precision,
+    random_effects::{ChannelBlocks, RandomEffects},
+    restricted::Restricted,
+    sparse_rows::SparseRows,
+};
 
 /// Ratios ρ that are weighed, each twice the one before.
 const RATIOS: u32 = 13;
 /// ln of the range that s² has one half of its prior in.
 const SCATTER: f64 = 13.8;
-/// Of more observations than this, those of a long recording, every second, third … is weighed: all would take long.
-const MOST: usize = 300;
 
 /// Residuals of observations in time order, three rows each, and their derivatives by what is fitted.
 #[derive(Clone, Copy, Debug)]
@@ -44,25 +51,19 @@ pub struct Residuals<'a> {
 impl Noise {
     /// Of residuals; `None` where there are too few, or the derivatives are dependent.
     pub fn of(given: &Residuals<'_>) -> Option<Self> {
-        let step = given.spans.len().div_ceil(MOST).max(1);
-        let spans: Vec<Span> = given.spans.iter().step_by(step).cloned().collect();
-        let (rows, free) = (3 * spans.len(), given.jacobian.ncols());
-        if given.jacobian.nrows() != 3 * given.spans.len() || rows < free + 3 {
+        let (rows, free) = (3 * given.spans.len(), given.jacobian.ncols());
+        if given.jacobian.nrows() != rows || rows < free + 3 || given.spans.iter().any(Span::is_empty) {
             return None;
         }
-        let weighed = |row: usize| 3 * step * (row / 3) + row % 3;
-        let residuals = DMatrix::from_fn(rows, 1, |row, _| given.residuals[weighed(row)]);
-        let mut jacobian = DMatrix::from_fn(rows, free, |row, k| given.jacobian[(weighed(row), k)]);
-        // Columns at unit length: parameters of different units would spoil the factorisation.
-        jacobian.column_iter_mut().for_each(|mut column| {
-            column.normalize_mut();
-        });
         let density = given.density.unwrap_or_else(|| Vector3::repeat(1.0));
+        let columns = columns(given, &density);
         let observed = given.spans.iter().map(|span| span.end - span.start).sum::<f64>();
+        let volume = given.spans.len() as f64 * density.map(f64::ln).sum();
         let weighed = (0..RATIOS).filter_map(|k| {
             let drift = f64::from(1u32 << k) / observed;
-            let whitening = Self { density, white: 1.0, drift }.whitening(&spans)?;
-            Some((drift, weigh(&whitening, &residuals, &jacobian, given.density.is_some())?))
+            let (products, log_determinant) = products(given.spans, drift, &columns);
+            let found = Restricted::of_products(&products, rows, 3.0 * log_determinant + volume)?;
+            Some((drift, Weighed::of(&found, given.density.is_some())))
         });
         let weighed: Vec<(f64, Weighed)> = weighed.collect();
         let most = weighed.iter().map(|(_, w)| w.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
@@ -85,16 +86,49 @@ struct Weighed {
     scale: f64,
 }
 
-fn weigh(
-    whitening: &Whitening,
-    residuals: &DMatrix<f64>,
-    jacobian: &DMatrix<f64>,
-    known: bool,
-) -> Option<Weighed> {
-    let data = whitening.whiten(residuals)?;
-    let found = Restricted::of(&data, whitening.whiten(jacobian)?, whitening.log_determinant());
-    let moment = |power: f64| log_moment(0.5 * found.freedom as f64 - power, 0.5 * found.left, known);
-    Some(Weighed { log_likelihood: found.log_volume + moment(0.0), scale: (moment(1.0) - moment(0.0)).exp() })
+impl Weighed {
+    fn of(found: &Restricted, known: bool) -> Self {
+        let moment = |power: f64| log_moment(0.5 * found.freedom as f64 - power, 0.5 * found.left, known);
+        Self { log_likelihood: found.log_volume + moment(0.0), scale: (moment(1.0) - moment(0.0)).exp() }
+    }
+}
+
+/// Derivatives and, last, residuals of each axis in units of its white noise; derivatives at unit length over all axes,
+/// since parameters of different units would spoil the factorisation.
+fn columns(given: &Residuals<'_>, density: &Vector3<f64>) -> [Vec<Vec<f64>>; 3] {
+    let lengths: Vec<f64> = given.jacobian.column_iter().map(|column| column.norm()).collect();
+    [0, 1, 2].map(|axis| {
+        let of_axis = |column: &dyn Fn(usize) -> f64, length: f64| -> Vec<f64> {
+            let scale = 1.0 / (length * density[axis].sqrt());
+            (0..given.spans.len()).map(|k| column(3 * k + axis) * scale).collect()
+        };
+        let derivatives =
+            lengths.iter().enumerate().map(|(k, length)| of_axis(&|row| given.jacobian[(row, k)], *length));
+        derivatives.chain([of_axis(&|row| given.residuals[row], 1.0)]).collect()
+    })
+}
+
+/// Xᵀ (V/S)⁻¹ X over all axes, and ln|V/S| of one, for white noise of w = 1 and a drift.
+fn products(spans: &[Span], drift: f64, columns: &[Vec<Vec<f64>>; 3]) -> (DMatrix<f64>, f64) {
+    let processes = flicker::processes(spans, drift);
+    let weight = |span: &Span| {
+        let length = span.end - span.start;
+        let own: f64 = processes.iter().map(|process| process.mean_given_ends(length).1).sum();
+        1.0 / (1.0 / length + own)
+    };
+    let channel = ChannelBlocks {
+        weights: spans.iter().map(weight).collect(),
+        offsets: SparseRows::empty(spans.len()),
+    };
+    let knots = Knots::over(spans, &processes);
+    let effects = Arc::new(RandomEffects::new(knots, vec![channel], 0, processes.len()));
+    let precision = Precision::new(Arc::clone(&effects), 0.0, &[&processes]);
+    let of_axis = |columns: &Vec<Vec<f64>>| {
+        let columns = columns.iter().map(Vec::as_slice).collect();
+        precision.products(&effects.cross_products(&[columns]))
+    };
+    let [x, y, z] = columns.each_ref().map(of_axis);
+    (x + y + z, precision.log_determinant)
 }
 
 /// ln ∫ s^−2a exp(−x/s²) p(s²) ds².
@@ -195,7 +229,7 @@ mod tests {
             for density in [None, Some(Vector3::repeat(1.0)), Some(Vector3::repeat(1e-9))] {
                 let given = Residuals { spans: &spans, density, residuals: &residuals, jacobian: &jacobian };
                 let noise = Noise::of(&given).unwrap();
-                let variance = noise.density.x * noise.relative_covariance(&spans)[(0, 0)];
+                let variance = noise.density.x * noise.carried(&spans[..1], &DMatrix::identity(1, 1))[(0, 0)];
                 // 93 degrees of freedom know it to 15 %; a drift that might be there comes on top.
                 assert!(
                     (0.6..2.0).contains(&(variance / (scatter / 4.0))),
@@ -214,25 +248,39 @@ mod tests {
     }
 
     #[test]
-    fn whitened_rows_have_unit_variance_and_no_memory() {
-        let spans = spans(40);
-        let noise = Noise { density: Vector3::repeat(1.0), white: 1.0, drift: 1.0 };
-        let whitening = noise.whitening(&spans).unwrap();
-        let (mut square, mut product) = (0.0, 0.0);
-        for seed in 0..50 {
-            let rows = means(&spans, 1.0, 1.0, seed);
-            let white = whitening.whiten(&DMatrix::from_column_slice(120, 1, rows.as_slice())).unwrap();
-            square += white.norm_squared() / 6000.0;
-            product += (3..120).map(|k| white[k] * white[k - 3]).sum::<f64>() / 5850.0;
+    fn the_likelihood_is_that_of_the_dense_covariance() {
+        let (spans, drift) = (spans(20), 0.7);
+        let residuals = means(&spans, 1.0, 1.0, 3);
+        let density = Vector3::new(1.0, 2.0, 0.5);
+        let jacobian = DMatrix::from_fn(60, 2, |row, k| ((row + 7 * k) as f64).cos());
+        let given =
+            Residuals { spans: &spans, density: Some(density), residuals: &residuals, jacobian: &jacobian };
+        let (found, log_determinant) = products(&spans, drift, &columns(&given, &density));
+        let white = DMatrix::identity(20, 20) / 4.0;
+        let covariance = white + flicker::covariance_of(&spans, &flicker::processes(&spans, drift));
+        let factor = covariance.cholesky().unwrap();
+        let mut expected = DMatrix::zeros(3, 3);
+        for axis in 0..3 {
+            let x = DMatrix::from_fn(20, 3, |k, column| {
+                let row = 3 * k + axis;
+                let value = if column < 2 {
+                    jacobian[(row, column)] / jacobian.column(column).norm()
+                } else {
+                    residuals[row]
+                };
+                value / density[axis].sqrt()
+            });
+            expected += x.tr_mul(&factor.solve(&x));
         }
-        assert!((square - 1.0).abs() < 0.06 && product.abs() < 0.05, "{square} {product}");
+        assert!((found - expected).amax() < 1e-9);
+        assert!((log_determinant - factor.ln_determinant()).abs() < 1e-9);
     }
 
     #[test]
-    fn every_other_of_many_observations_tells_as_much_as_all_of_some() {
-        let spans = spans(2 * MOST);
+    fn six_hundred_observations_tell_white_noise_and_drift() {
+        let spans = spans(600);
         let residuals = means(&spans, 1.0, 1.0, 3);
-        let jacobian = biases(2 * MOST);
+        let jacobian = biases(600);
         let given = Residuals { spans: &spans, density: None, residuals: &residuals, jacobian: &jacobian };
         let noise = Noise::of(&given).unwrap();
         // A recording of an hour is given a fourth correlation time, which this drift has not: what the others then

@@ -176,7 +176,7 @@ impl Parts<'_> {
         let (data, unit) =
             (lower.solve_lower_triangular(residuals)?, lower.solve_lower_triangular(jacobian)?);
         let of_column = |column: usize| {
-            let found = Restricted::of(&data.columns(column, 1).into(), unit.clone(), log_determinant);
+            let found = Restricted::of_rows(&data.columns(column, 1).into(), unit.clone(), log_determinant);
             let (log, sizes) = self.sizes(found.left, found.freedom as f64);
             let log = log + found.log_volume;
             log.is_finite().then_some((log, sizes))

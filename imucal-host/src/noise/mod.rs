@@ -1,4 +1,5 @@
-//! Noise of observations that are means over stretches of time: white, scatter from one to the next, drift.
+//! Noise of observations: white, scatter from one to the next, drift. The linear mixed model that calibration and diagnosis
+//! weigh their observations by, and the parameters that calibration gives it.
 //!
 //! ```text
 //! V_ij = S ( w δ_ij / T_i + d F_ij )       each axis on its own, S its white noise
@@ -12,23 +13,53 @@
 //! | d | variance of the drift over S; its inverse is the time over which white noise averages to the drift's size | 1/s |
 //! | F | covariance of unit flicker between the observations' means ([`flicker`]) | – |
 //!
-//! S is measured within rests, w and d from residuals ([`estimate`]). Not modelled: axes that err alike, scatter whose
-//! size or direction depends on the pose, an error that repeats when a pose comes back.
+//! S is measured within rests, w and d from residuals ([`estimate`]).
+//!
+//! | file | what |
+//! | --- | --- |
+//! | [`process`], [`knots`] | a drift: a Gauss–Markov process, and where its values are estimated |
+//! | [`skyline`], [`sparse_rows`], [`symmetric_product`] | matrices that are banded, have few entries a row, or are symmetric |
+//! | [`random_effects`], [`precision`] | what observations share, and their inverse covariance with that eliminated, in the order of time; cost and memory linear in length |
+//! | [`flicker`] | processes whose sum is 1/f noise |
+//! | [`restricted`] | the restricted likelihood |
+//! | [`white`], [`within`] | white noise of samples, and drift within rests |
+//! | [`estimate`] | w and d from residuals |
+//! | [`interval`] | standard errors whose ±1.96 hold 95 % |
+//!
+//! Not modelled: axes that err alike, scatter whose size or direction depends on the pose, an error that repeats when a
+//! pose comes back.
 
 use std::ops::Range;
 
 use nalgebra::{DMatrix, Vector3};
 
-pub mod estimate;
+pub mod process;
+
+pub mod knots;
+
+pub mod skyline;
+
+pub mod sparse_rows;
+
+pub mod symmetric_product;
+
+pub mod random_effects;
+
+pub mod precision;
+
 pub mod flicker;
-pub mod interval;
-mod restricted;
+
+pub mod restricted;
+
 pub mod white;
-pub mod whitening;
+
 pub mod within;
 
+pub mod estimate;
+
+pub mod interval;
+
 pub use estimate::Residuals;
-pub use whitening::Whitening;
 
 /// When an observation was made, s.
 pub type Span = Range<f64>;
@@ -56,28 +87,25 @@ impl Noise {
         self.density * self.drift
     }
 
-    /// V / S, the same for each axis, of observations in time order that do not overlap.
-    pub fn relative_covariance(&self, spans: &[Span]) -> DMatrix<f64> {
-        let mut covariance = flicker::covariance(spans) * self.drift;
-        for (k, span) in spans.iter().enumerate() {
-            covariance[(k, k)] += self.white / (span.end - span.start);
+    /// Aᵀ (V/S) A of observations in time order that do not overlap; A has a row for each.
+    pub fn carried(&self, spans: &[Span], influence: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut sum = DMatrix::zeros(influence.ncols(), influence.ncols());
+        for (span, row) in spans.iter().zip(influence.row_iter()) {
+            sum.ger(self.white / (span.end - span.start), &row.transpose(), &row.transpose(), 1.0);
         }
-        covariance
-    }
-
-    /// What makes three rows an observation independent and of unit variance; `None` where a span has no length.
-    pub fn whitening(&self, spans: &[Span]) -> Option<Whitening> {
-        Whitening::new(self.relative_covariance(spans), self.density.map(f64::sqrt))
+        for process in flicker::processes(spans, self.drift) {
+            sum += process.carried(spans, influence);
+        }
+        sum
     }
 
     /// Covariance of what follows linearly from the observations: `influence` has three rows for each, and a column
     /// for each result.
     pub fn propagated(&self, spans: &[Span], influence: &DMatrix<f64>) -> DMatrix<f64> {
-        let covariance = self.relative_covariance(spans);
         let mut sum = DMatrix::zeros(influence.ncols(), influence.ncols());
         for axis in 0..3 {
-            let own = influence.rows_with_step(axis, spans.len(), 2);
-            sum += own.transpose() * &covariance * own * self.density[axis];
+            let own = influence.rows_with_step(axis, spans.len(), 2).into_owned();
+            sum += self.carried(spans, &own) * self.density[axis];
         }
         sum
     }

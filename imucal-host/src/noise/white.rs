@@ -1,15 +1,24 @@
-//! Density of a triad's white noise, from within its rests.
+//! White noise of a triad: one estimator a purpose.
+//!
+//! | purpose | estimator |
+//! | --- | --- |
+//! | errors of the means of rests: [`density`] | Allan variance at 0.5 s |
+//! | weights of block means at rest: [`at_rest`] | steps between neighbouring pieces of a tenth of a second |
+//! | weights of block means in motion: [`second_differences`] | second differences of residuals, since movements are smooth |
+//! | size of a sample's noise, at rest or not: [`of_samples`] | median of steps from sample to sample |
 //!
 //! ```text
 //! S = τ · ½ ⟨(ȳ_{k+1} − ȳ_k)²⟩        ȳ: means over τ, both of one rest
 //! ```
 //!
-//! The Allan variance at τ = 0.5 s (Allan 1966): long beside a sensor's filter, which makes its samples alike, and short
-//! beside drift. The variance of a sample would be too small or too large by what the filter does.
+//! Means over τ = 0.5 s (Allan 1966) are long compared with a sensor's filter, which makes its samples alike, and short
+//! compared with drift. The variance of a sample would be too small or too large by what the filter does.
 
 use std::ops::Range;
 
 use nalgebra::Vector3;
+
+use crate::recording::order_statistics::{mean_without_largest, std_of_median};
 
 /// τ, s.
 pub(super) const AVERAGED: f64 = 0.5;
@@ -64,6 +73,55 @@ pub(super) fn means(
     }
     let full = sums.iter().map(|(_, count)| *count).fold(0.0, f64::max);
     sums.into_iter().map(|(sum, count)| (count > 0.8 * full).then(|| sum / count)).collect()
+}
+
+/// A mean and how many samples it is of.
+pub type Piece = (Vector3<f64>, f64);
+
+/// Variance of one sample of each axis at rest, from steps between neighbouring pieces of so many rows of each stretch,
+/// without the largest hundredth; zero without any.
+pub fn at_rest(
+    values: &[Vector3<f64>],
+    usable: &[bool],
+    stretches: impl Iterator<Item = Range<usize>>,
+    rows: usize,
+) -> [f64; 3] {
+    let mut squares: [Vec<f64>; 3] = Default::default();
+    for stretch in stretches {
+        let stretch: Vec<usize> = stretch.collect();
+        // A sensor may be slower than the recording: then some rows hold nothing of it.
+        let pieces: Vec<Piece> = stretch
+            .chunks_exact(rows)
+            .filter_map(|rows| {
+                let measured = rows.iter().filter(|row| usable[**row]);
+                let (sum, count) =
+                    measured.fold((Vector3::zeros(), 0.0), |(s, n), row| (s + values[*row], n + 1.0));
+                (count > 0.0).then(|| (sum / count, count))
+            })
+            .collect();
+        for pair in pieces.windows(2) {
+            let ((before, m), (after, n)) = (pair[0], pair[1]);
+            let step = after - before;
+            let samples = 1.0 / (1.0 / m + 1.0 / n);
+            squares.iter_mut().zip(step.iter()).for_each(|(s, step)| s.push(step * step * samples));
+        }
+    }
+    squares.map(|squares| mean_without_largest(squares, 100))
+}
+
+/// Squared second differences of three neighbouring means, as variances of one sample, by axis.
+pub fn second_differences([(a, l), (b, m), (c, n)]: [Piece; 3]) -> Vector3<f64> {
+    let share = 1.0 / l + 4.0 / m + 1.0 / n;
+    (a / l - 2.0 * b / m + c / n).map(|bend| bend * bend / share)
+}
+
+/// Standard deviation of a sample's noise: the largest of the axes'. Movements that last many samples hardly count.
+pub fn of_samples(values: &[Vector3<f64>]) -> f64 {
+    let of = |axis: usize| {
+        let steps = values.windows(2).map(|pair| (pair[1][axis] - pair[0][axis]).abs());
+        std_of_median(steps.filter(|step| step.is_finite()).collect()).unwrap_or(0.0) / 2.0f64.sqrt()
+    };
+    (0..3).map(of).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

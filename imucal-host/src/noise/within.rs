@@ -125,7 +125,7 @@ impl Factor {
         let spans: Vec<Span> =
             (0..count).map(|k| white::AVERAGED * k as f64..white::AVERAGED * (k + 1) as f64).collect();
         let all: Vec<f64> = std::iter::once(SHORTEST).chain(times.iter().copied()).collect();
-        let drift = flicker::covariance_over(&spans, &all) * (all.len() as f64 * r);
+        let drift = flicker::covariance_of(&spans, &flicker::of_times(&all, all.len() as f64 * r));
         let factor = Cholesky::new(DMatrix::identity(count, count) / white::AVERAGED + drift)?;
         let weights = factor.solve(&DVector::repeat(count, 1.0));
         let total = weights.sum();

@@ -7,6 +7,7 @@
 //! has begun in it or not yet ended. Source: Tedaldi, Pretto & Menegatti 2014 (ICRA), section IV; the gyroscope's part,
 //! the recording's ends and the fallback without an initial rest are ours.
 
+use crate::recording::order_statistics::MEDIAN_SIZE;
 use std::ops::Range;
 
 use imucal_core::observation::{Moments, Rest};
@@ -202,7 +203,7 @@ fn without_turning(quiet: Vec<bool>, rate: &[Vector3<f64>]) -> Vec<bool> {
         quiet.iter().zip(rate).filter(|(still, _)| **still).map(|(_, w)| w).step_by(10).collect();
     let of_axis = |value: &dyn Fn(&Vector3<f64>) -> f64| median(chosen.iter().map(|w| value(w)).collect());
     let bias = Vector3::from_fn(|axis, _| of_axis(&|w| w[axis]).unwrap_or(0.0));
-    let spread = 1.4826 * of_axis(&|w| (w - bias).norm()).unwrap_or(0.0);
+    let spread = of_axis(&|w| (w - bias).norm()).unwrap_or(0.0) / MEDIAN_SIZE;
     let limit = (TURNING * spread).clamp(TURNING_LIMITS.0, TURNING_LIMITS.1);
     quiet.iter().zip(rate).map(|(still, w)| *still && (w - bias).norm() <= limit).collect()
 }

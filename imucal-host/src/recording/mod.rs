@@ -10,6 +10,7 @@ pub mod check;
 mod fixture;
 mod format;
 pub mod manifest;
+pub mod order_statistics;
 mod place;
 pub mod read;
 mod read_error;
@@ -23,10 +24,11 @@ mod write_error;
 use self::format::Format;
 pub use self::{
     manifest::{Manifest, site::LEAST_DIP},
+    order_statistics::median,
     place::Place,
     read_error::ReadError,
     sensor_kind::SensorKind,
-    triple::{Nominal, Triple, median},
+    triple::{Nominal, Triple},
     unit::Unit,
     warning::Warning,
     write_error::WriteError,

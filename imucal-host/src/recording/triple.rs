@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::unit::Unit;
+use super::{order_statistics::median, unit::Unit};
 
 /// Nominal, affine conversion of one sensor: file value = offset + per_unit · SI value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,17 +63,6 @@ impl Triple {
         let norms = self.values.iter().map(nalgebra::Matrix::norm).filter(|norm| norm.is_finite());
         median(norms.collect())
     }
-}
-
-/// The middle value (the upper one of an even number); `None` of nothing. NaN sorts beyond every
-/// number, so take it out before.
-#[must_use]
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = values.len() / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@
 //! Between rows the nearest row's swing goes on with constant acceleration. Where readings change no more than their
 //! noise would make them, the cubic goes through those of a fifth of a second. Not modelled: readings that lag the gimbal.
 
+use crate::recording::order_statistics::std_of_median;
 use std::{f64::consts::TAU, sync::OnceLock};
 
 use nalgebra::{Matrix3, Matrix4, Vector4};
@@ -22,10 +23,7 @@ use super::{
 };
 use crate::{
     effect::{Machine, Swing, Truth},
-    recording::{
-        manifest::{Axis, Rig, RigKind},
-        median,
-    },
+    recording::manifest::{Axis, Rig, RigKind},
 };
 
 /// Readings within so long of a row tell its swing, s: least and most.
@@ -222,9 +220,8 @@ fn noise(angles: &[[f64; 3]]) -> [f64; 3] {
         let bend = |w: &[[f64; 3]]| {
             (w[0][axis] - 4.0 * w[1][axis] + 6.0 * w[2][axis] - 4.0 * w[3][axis] + w[4][axis]).abs()
         };
-        // Fourth differences, since movements are smooth. The median of |x| is 0.674 of its standard deviation; the
-        // difference has that of a reading, times √70.
-        median(angles.windows(5).map(bend).collect()).unwrap_or(0.0) / (0.674 * 70.0f64.sqrt())
+        // Fourth differences, since movements are smooth: of √70 times a reading's standard deviation.
+        std_of_median(angles.windows(5).map(bend).collect()).unwrap_or(0.0) / 70.0f64.sqrt()
     })
 }
 

@@ -71,12 +71,11 @@ impl Directions {
     pub fn propagated(&self, by: &[(usize, MatrixXx3<f64>)]) -> DMatrix<f64> {
         let rows = by.first().map_or(0, |(_, by)| by.nrows());
         let spans: Vec<Span> = by.iter().map(|(rest, _)| self.spans[*rest].clone()).collect();
-        let between = self.noise.relative_covariance(&spans);
         let moved: Vec<MatrixXx3<f64>> = by.iter().map(|(rest, by)| by * self.by_mean(*rest)).collect();
         let mut covariance = DMatrix::zeros(rows, rows);
         for axis in 0..3 {
-            let own = DMatrix::from_fn(rows, by.len(), |row, k| moved[k][(row, axis)]);
-            covariance += &own * &between * own.transpose() * self.noise.density[axis];
+            let own = DMatrix::from_fn(by.len(), rows, |k, row| moved[k][(row, axis)]);
+            covariance += self.noise.carried(&spans, &own) * self.noise.density[axis];
         }
         let zero = DMatrix::zeros(rows, self.covariance_of.len());
         let common = by.iter().fold(zero, |sum, (rest, by)| sum + by * self.by_entries(*rest));

@@ -4,7 +4,7 @@
 //! absolute values). Ordinary noise does not reach that in a lifetime; a knock on the table or a magnet does. Where
 //! more than [`MOST`] would go, none goes: then the model is wrong, not the data.
 
-use crate::recording::median;
+use crate::recording::order_statistics::std_of_median;
 
 /// Robust standard deviations beyond which an observation is left out.
 pub const GROSS: f64 = 7.0;
@@ -68,7 +68,7 @@ pub fn leaving_out_few<F>(
 
 /// Robust standard deviation of residuals around zero.
 fn robust_std(residuals: &[f64]) -> Option<f64> {
-    Some(1.4826 * median(residuals.iter().map(|r| r.abs()).collect())?)
+    std_of_median(residuals.iter().map(|r| r.abs()).collect())
 }
 
 /// Indices of the residuals to leave out, with their size in robust standard deviations.

@@ -49,7 +49,7 @@ pub fn errors(rests: &[Rest<f64>], means: &[Vector3<f64>], at_rest: &AtRest<'_>)
     let influence = DMatrix::from_fn(count, 1, |k, _| f64::from(rests[k].gyr.count()) / total);
     let length = |k: usize| spans[k].end - spans[k].start;
     let white = DMatrix::from_diagonal(&DVector::from_fn(count, |k, _| 1.0 / length(k)));
-    let drift = flicker::covariance(&spans);
+    let drift = flicker::covariance_of(&spans, &flicker::processes(&spans, 1.0));
     let ratios = rest_noise::drifts(&at_rest.within(), &spans);
     let parts = Parts { parts: [&white, &drift], ratios: &ratios, scale: Scale::AtLeastOne, five: true };
     let carried = [&white, &drift].map(|part| influence.tr_mul(&(part * &influence)));

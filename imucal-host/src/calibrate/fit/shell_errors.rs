@@ -89,7 +89,8 @@ impl<const P: usize> ShellErrors<P> {
         let normals = normals(&problem.form.triad(fit.solver.theta()), &fit.points);
         let alike = |k: usize, l: usize, of: &Vector3<f64>| normals[k].component_mul(&normals[l]).dot(of);
         let white = DMatrix::from_fn(count, count, |k, l| if k == l { alike(k, k, &own(k)) } else { 0.0 });
-        let drift = flicker::covariance(&spans).map_with_location(|k, l, f| f * alike(k, l, &shown.density));
+        let drift = flicker::covariance_of(&spans, &flicker::processes(&spans, 1.0))
+            .map_with_location(|k, l, f| f * alike(k, l, &shown.density));
         let jacobian = DMatrix::from_fn(count, P, |row, k| rows.jacobian[row][k]);
         let ratios = shown.drifts(&spans);
         let parts = Parts {
@@ -215,7 +216,7 @@ fn blocked<const P: usize>(
     let length = at.last()? - at.first()?;
     let spans: Vec<Span> = blocks.iter().map(|block| block.span.clone()).collect();
     let times = TIMES.map(|time| time * length);
-    let between = flicker::covariance_over(&spans, &times);
+    let between = flicker::covariance_of(&spans, &flicker::of_times(&times, 1.0));
     let starts: Vec<usize> = blocks
         .iter()
         .scan(0, |next, block| {

@@ -2,6 +2,7 @@
 //!
 //! A menu of shapes for each, the best by evidence, and from there a search by halved steps.
 
+use crate::noise::precision::Precision;
 use rayon::prelude::*;
 
 use super::{
@@ -14,7 +15,6 @@ use crate::{
         mixed_model::{
             augmented_normal::AugmentedNormal,
             design::{Design, Signature},
-            precision::Precision,
         },
         residual::{base_run::Reference, forward_model::ForwardModel},
     },

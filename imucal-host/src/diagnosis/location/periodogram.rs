@@ -7,6 +7,7 @@
 //! Against the median of its neighbours, since noise that is taken for drift is not alike at all frequencies. Not looked
 //! for: periods shorter than a few blocks, and those so long that half-waves of the recording follow them.
 
+use crate::noise::precision::Precision;
 use std::{f64::consts::TAU, ops::Range};
 
 use nalgebra::DVector;
@@ -14,7 +15,7 @@ use rayon::prelude::*;
 
 use super::covariate::{Covariate, Function};
 use crate::{
-    diagnosis::{mixed_model::precision::Precision, search::linearisation::Linearisation},
+    diagnosis::search::linearisation::Linearisation,
     effect::Effect,
     recording::{SensorKind, median},
 };

@@ -220,3 +220,50 @@ pub fn score_test(projected: &Projected, places: &[usize]) -> (f64, usize) {
     }
     (sum, rank)
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::*;
+    use crate::{
+        diagnosis::mixed_model::design::Normal,
+        noise::precision::{
+            Precision,
+            tests::{DRIFTS, SIGMA, Toy, columns, slices},
+        },
+    };
+
+    /// The residual of five blocks and five columns, weighed by drift and offsets; the last column is another by twice its
+    /// size.
+    fn five_blocks() -> (DMatrix<f64>, Normal) {
+        let toy = Toy::new(5, 1);
+        let mut x = columns(&toy, 5).remove(0);
+        let twice = x.column(2) * 2.0;
+        x.set_column(3, &twice);
+        let effects = toy.effects(DRIFTS.len());
+        let products = effects.cross_products(&[slices(&x)]);
+        let precision = Precision::new(effects, SIGMA, &[&DRIFTS]);
+        let (dense, _) = toy.products(std::slice::from_ref(&x), &DRIFTS);
+        (dense, Normal::of(&products, &precision))
+    }
+
+    /// What is left of the residual's weighed square by some columns, of dense products.
+    fn left(dense: &DMatrix<f64>, by: usize) -> f64 {
+        let score: DVector<f64> = dense.view((0, 4), (by, 1)).column(0).into_owned();
+        let information = dense.view((0, 0), (by, by)).into_owned();
+        dense[(4, 4)] - score.dot(&information.cholesky().unwrap().solve(&score))
+    }
+
+    #[test]
+    fn a_score_test_is_what_a_covariate_takes_of_the_residual() {
+        let (dense, normal) = five_blocks();
+        let projected = Projected::new(&normal, &[0, 1], &[2, 3]).unwrap();
+        let expected = left(&dense, 2) - left(&dense, 3);
+        let (statistic, rank) = score_test(&projected, &[0]);
+        assert!((statistic - expected).abs() < 1e-6 * expected && rank == 1, "{statistic} {expected}");
+        // The same covariate twice tells nothing more.
+        let (twice, rank) = score_test(&projected, &[0, 1]);
+        assert!((twice - expected).abs() < 1e-6 * expected && rank == 1, "{twice} {expected}");
+    }
+}

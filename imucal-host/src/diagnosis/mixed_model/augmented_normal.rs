@@ -9,20 +9,20 @@
 //! | --- | --- |
 //! | X | fitted columns and, last, the residual |
 //! | F | further columns |
-//! | D, Y | white noise and the eliminated random effects: [`super::precision`] |
+//! | D, Y | white noise and the eliminated random effects: [`crate::noise::precision`] |
 //!
 //! XᵀΣ⁻¹X and Y_X are the same for all that is tried.
 
+use crate::noise::{
+    precision::Precision,
+    random_effects::{Columns, in_parts},
+};
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::{
-    design::{Channel, Design, Normal, Signature, places, reaching},
-    precision::Precision,
-    random_effects::{Columns, in_parts},
-};
+use super::design::{Channel, Design, Normal, Signature, places, reaching};
 
 /// What is fitted in any case, and the residual.
 pub struct AugmentedNormal<'a> {
@@ -102,12 +102,10 @@ impl Fitted<'_> {
 
 #[cfg(test)]
 mod tests {
+    use crate::noise::precision::tests::{DRIFTS, SIGMA, Toy};
     use nalgebra::{DVector, Vector3};
 
-    use super::{
-        super::precision::tests::{DRIFTS, SIGMA, Toy},
-        *,
-    };
+    use super::*;
     use crate::{diagnosis::residual::block::Means, recording::SensorKind};
 
     const BLOCKS: usize = 5;

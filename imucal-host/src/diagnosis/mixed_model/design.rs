@@ -2,15 +2,15 @@
 //!
 //! A channel is one axis of one sensor. Columns are in usual sizes of their parameters, so that one means usual.
 
+use crate::noise::{
+    precision::Precision,
+    random_effects::{Columns, CrossProducts, RandomEffects},
+};
 use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use rayon::prelude::*;
 
-use super::{
-    precision::Precision,
-    random_effects::{Columns, CrossProducts, RandomEffects},
-};
 use crate::{
     diagnosis::residual::{block::Means, forward_model::ForwardModel},
     effect::Effect,

@@ -8,19 +8,16 @@
 //! | symbol | meaning |
 //! | --- | --- |
 //! | r, X | residual and columns |
-//! | Σ | covariance: [`super::precision`] |
+//! | Σ | covariance: [`crate::noise::precision`] |
 //! | Λ | a vague prior of the columns' amounts |
 
+use crate::noise::{precision::Precision, process::Process};
 use std::{cell::RefCell, sync::Arc};
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::{
-    design::{DesignProducts, GroupProducts, Normal},
-    precision::Precision,
-    process::Process,
-};
+use super::design::{DesignProducts, GroupProducts, Normal};
 use crate::recording::SensorKind;
 
 /// Prior information on a column: a usual size is one, and this many of them would be no surprise.
@@ -73,13 +70,11 @@ pub fn reml_criterion(normal: &Normal) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use crate::noise::precision::tests::{SIGMA, Toy, columns};
     use nalgebra::DVector;
 
     use super::{
-        super::{
-            design::{Channel, ChannelGroup, Design},
-            precision::tests::{SIGMA, Toy, columns},
-        },
+        super::design::{Channel, ChannelGroup, Design},
         *,
     };
 

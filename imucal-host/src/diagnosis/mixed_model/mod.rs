@@ -12,11 +12,7 @@
 //!
 //! | file | what |
 //! | --- | --- |
-//! | [`skyline`] | Cholesky factor of a banded matrix |
-//! | [`sparse_rows`], [`symmetric_product`] | rows with few entries; products that are symmetric |
-//! | [`process`] | a drift: a Gauss–Markov process at knots |
-//! | [`random_effects`] | D⁻¹ and Z of channels, and their cross-products with X and y |
-//! | [`precision`] | Σ⁻¹: the random effects eliminated, in the order of time |
+//! | [`crate::noise`] | drifts, and Σ⁻¹ with the random effects eliminated in the order of time; calibration uses them too |
 //! | [`design`] | columns X by channel, and their normal equations |
 //! | [`augmented_normal`] | normal equations of trial columns added to fitted ones |
 //! | [`likelihood`] | the restricted likelihood (REML) |
@@ -37,12 +33,6 @@ pub mod augmented_normal;
 pub mod design;
 pub mod likelihood;
 pub mod noise;
-pub mod precision;
-pub mod process;
-pub mod random_effects;
 pub mod repeatability;
 pub mod shared_offsets;
-pub mod skyline;
-pub mod sparse_rows;
-pub mod symmetric_product;
 pub mod white_noise;

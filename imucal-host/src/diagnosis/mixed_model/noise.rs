@@ -6,6 +6,13 @@
 //! Each sensor has its own; the axes of a sensor share drift and scatter. Not modelled: noise that axes have in common,
 //! white noise that changes in the course of the recording.
 
+use crate::noise::{
+    knots::Knots,
+    precision::Precision,
+    process::Process,
+    random_effects::{ChannelBlocks, RandomEffects},
+    sparse_rows::SparseRows,
+};
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -14,11 +21,7 @@ use rayon::prelude::*;
 use super::{
     design::{Channel, ChannelGroup, Design, DesignProducts, Normal},
     likelihood::Likelihood,
-    precision::Precision,
-    process::Process,
-    random_effects::{ChannelBlocks, RandomEffects},
     repeatability::PointingErrors,
-    sparse_rows::SparseRows,
 };
 use crate::{
     diagnosis::residual::{block::Block, forward_model::ForwardModel},
@@ -185,7 +188,7 @@ impl<'s> Weighing<'s> {
             ChannelBlocks { weights: self.weights(channel, noise, &|_| true), offsets: offsets(channel) }
         };
         let rows = channels.iter().map(rows).collect();
-        let effects = Arc::new(RandomEffects::new(&self.times, rows, count, DRIFTS));
+        let effects = Arc::new(RandomEffects::new(Knots::at(&self.times), rows, count, DRIFTS));
         ChannelGroup { channels, effects }
     }
 
@@ -223,7 +226,7 @@ impl<'s> Weighing<'s> {
     ) -> RandomEffects {
         let weights = self.weights(channel, noise, inside);
         let (count, offsets) = self.scattered(channel).offsets();
-        RandomEffects::new(&self.times, vec![ChannelBlocks { weights, offsets }], count, DRIFTS)
+        RandomEffects::new(Knots::at(&self.times), vec![ChannelBlocks { weights, offsets }], count, DRIFTS)
     }
 
     fn weights(&self, channel: &Channel, noise: &Noise, inside: &(dyn Fn(usize) -> bool + Sync)) -> Vec<f64> {

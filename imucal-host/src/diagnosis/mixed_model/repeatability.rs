@@ -14,11 +14,11 @@
 //! that all sensors stand off together, and that a stretch begins where the last one ended, is told by
 //! `shared_offsets`. Not modelled: that the gyroscope sees it change.
 
+use crate::noise::sparse_rows::SparseRows;
 use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::sparse_rows::SparseRows;
 use crate::{
     diagnosis::residual::{
         block::Block, forward_model::ForwardModel, gimbal_derivatives::gimbal_derivatives,

@@ -14,13 +14,13 @@
 //! sets of effects are screened so, and the best are scored with the offsets of this file. Not modelled: that the
 //! gyroscope sees offsets change.
 
+use crate::noise::sparse_rows::SparseRows;
 use rayon::prelude::*;
 
 use super::{
     design::{Channel, ChannelGroup, Design, GroupProducts, Normal},
     noise::{Noise, Weighing},
     repeatability::stretches,
-    sparse_rows::SparseRows,
 };
 use crate::{
     diagnosis::residual::{

@@ -5,7 +5,11 @@ use nalgebra::Vector3;
 use super::noise::{Noise, SensorNoise, USUAL, Weighing};
 use crate::{
     diagnosis::residual::block::{Block, Means},
-    recording::{SensorKind, median},
+    noise::white,
+    recording::{
+        SensorKind,
+        order_statistics::{MEDIAN_SQUARE, median, variance_without_largest_tenth},
+    },
 };
 
 /// Pieces of which neighbours are compared, s.
@@ -34,7 +38,7 @@ impl Weighing<'_> {
                 first.rest.is_some() && first.rest == other.rest
             });
             for (white, bends) in white.iter_mut().zip(bends) {
-                *white = white.max(usual_square(bends).sqrt());
+                *white = white.max(variance_without_largest_tenth(bends).sqrt());
             }
         }
         white
@@ -45,28 +49,10 @@ impl Weighing<'_> {
         let Some(triple) = self.scene.recording.sensor(kind) else { return [1.0; 3] };
         let interval = self.scene.recording.median_interval().unwrap_or(PIECE);
         let length = ((PIECE / interval).round() as usize).max(1);
-        let mut squares: [Vec<f64>; 3] = Default::default();
         let usable = &self.scene.usable[kind as usize];
-        for block in self.scene.blocks.iter().filter(|block| block.rest.is_some()) {
-            // A sensor may be slower than the recording: then some rows hold nothing of it.
-            let rows: Vec<usize> = block.rows.clone().collect();
-            let pieces: Vec<(Vector3<f64>, f64)> = rows
-                .chunks_exact(length)
-                .filter_map(|rows| {
-                    let measured = rows.iter().filter(|row| usable[**row]);
-                    let (sum, count) = measured
-                        .fold((Vector3::zeros(), 0.0), |(s, n), row| (s + triple.values[*row], n + 1.0));
-                    (count > 0.0).then(|| (sum / count, count))
-                })
-                .collect();
-            for pair in pieces.windows(2) {
-                let ((before, m), (after, n)) = (pair[0], pair[1]);
-                let step = after - before;
-                let samples = 1.0 / (1.0 / m + 1.0 / n);
-                squares.iter_mut().zip(step.iter()).for_each(|(s, step)| s.push(step * step * samples));
-            }
-        }
-        squares.map(|squares| trimmed_mean(squares).sqrt().max(f64::MIN_POSITIVE))
+        let rests = self.scene.blocks.iter().filter(|block| block.rest.is_some());
+        let variances = white::at_rest(&triple.values, usable, rests.map(|block| block.rows.clone()), length);
+        variances.map(|variance| variance.sqrt().max(f64::MIN_POSITIVE))
     }
 
     /// From second differences of the residuals of neighbouring moving blocks; at least as at rest. What a hand adds is
@@ -77,9 +63,8 @@ impl Weighing<'_> {
         let in_motion = |_: &Block, other: &Block| other.rest.is_none();
         let bends = |length: usize| self.bends(kind, values, length, in_motion);
         let most: Vec<[f64; 3]> = match sway {
-            // The median of a χ² of one degree is 0.455.
-            [] => vec![bends(1).map(|b| median(b).unwrap_or(0.0) / 0.455)],
-            _ => sway.iter().map(|length| bends(*length).map(usual_square)).collect(),
+            [] => vec![bends(1).map(|b| median(b).unwrap_or(0.0) / MEDIAN_SQUARE)],
+            _ => sway.iter().map(|length| bends(*length).map(variance_without_largest_tenth)).collect(),
         };
         std::array::from_fn(|axis| {
             let square = most.iter().map(|squares| squares[axis]).fold(0.0, f64::max);
@@ -116,27 +101,9 @@ impl Weighing<'_> {
                     (sum + values[k] * n, count + n)
                 })
             };
-            let [(a, l), (b, m), (c, n)] = [0, 1, 2].map(group);
-            let bend = a / l - 2.0 * b / m + c / n;
-            let share = 1.0 / l + 4.0 / m + 1.0 / n;
-            squares.iter_mut().zip(bend.iter()).for_each(|(s, bend)| s.push(bend * bend / share));
+            let bends = white::second_differences([0, 1, 2].map(group));
+            squares.iter_mut().zip(bends.iter()).for_each(|(squares, bend)| squares.push(*bend));
         }
         squares
     }
-}
-
-/// The mean square of normal numbers from their squares without the largest tenth: a hand's jolts, and the beginning and
-/// end of an episode, are no noise.
-fn usual_square(mut squares: Vec<f64>) -> f64 {
-    squares.sort_unstable_by(f64::total_cmp);
-    let kept = squares.len() - squares.len() / 10;
-    // The mean of a χ² of one degree below its ninth decile is 0.623.
-    squares[..kept].iter().sum::<f64>() / (0.623 * kept.max(1) as f64)
-}
-
-/// The mean without the largest hundredth.
-fn trimmed_mean(mut values: Vec<f64>) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    let kept = values.len() - values.len() / 100;
-    values[..kept].iter().sum::<f64>() / kept.max(1) as f64
 }

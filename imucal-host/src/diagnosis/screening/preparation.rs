@@ -17,10 +17,10 @@ use crate::{
         settings::Settings,
     },
     effect::{Act, DataRun, Effect, Spoils, axis_swap},
+    noise::white,
     recording::{
         Recording, SensorKind, Triple,
         check::{integrity, integrity::Integrity},
-        median,
     },
     simulator::Recorded,
     store::StoredCalibration,
@@ -145,16 +145,6 @@ fn usable_rows(
     usable
 }
 
-/// Noise of a triad's samples, SI unit: the largest of the axes', from neighbouring samples.
-fn noise(triple: &Triple) -> f64 {
-    let of = |axis: usize| {
-        let steps = triple.values.windows(2).map(|pair| (pair[1][axis] - pair[0][axis]).abs());
-        // The median of |x| is 0.674 of its standard deviation; a step has that of a sample, times √2.
-        median(steps.filter(|step| step.is_finite()).collect()).unwrap_or(0.0) / (0.674 * 2.0f64.sqrt())
-    };
-    (0..3).map(of).fold(0.0, f64::max)
-}
-
 /// What the samples of a data effect are of those before it, where that is linear: a column an axis.
 fn response(effect: &Effect, values: &[f64]) -> Option<Matrix3<f64>> {
     let Act::Data(_, alter) = effect.act else { return None };
@@ -184,7 +174,7 @@ fn leave_out_clipped(finding: &Finding, time: &[f64], triple: &Triple, usable: &
     let shortfall = finding.parameters.first().and_then(|amount| amount.value);
     let Some((shortfall, full_scale)) = shortfall.zip(triple.full_scale_si()) else { return };
     // Just below the limit noise is clipped on one side; and to choose samples by their noise would be a bias as well.
-    let most = full_scale / (1.0 + shortfall) - CLIPPED * noise(triple);
+    let most = full_scale / (1.0 + shortfall) - CLIPPED * white::of_samples(&triple.values);
     let is_beyond = |(value, _): &(&Vector3<f64>, &f64)| value.amax() >= most;
     let beyond: Vec<f64> = triple.values.iter().zip(time).filter(is_beyond).map(|(_, time)| *time).collect();
     for (usable, time) in usable.iter_mut().zip(time) {

@@ -1,5 +1,6 @@
 //! The linear problem about a fit: signatures as columns, sets of effects judged by least squares and evidence.
 
+use crate::noise::precision::Precision;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -22,7 +23,6 @@ use crate::{
         mixed_model::{
             design::{Design, DesignProducts, Normal},
             noise::{Noise, SensorNoise, Weighing},
-            precision::Precision,
             shared_offsets::SharedOffsets,
         },
         residual::{base_run::Reference, forward_model::ForwardModel},

@@ -198,3 +198,24 @@ fn without(set: &[&'static Effect], at: usize) -> (Set, &'static Effect) {
 fn either(one: &[SensorKind], other: &[SensorKind]) -> Vec<SensorKind> {
     SensorKind::ALL.into_iter().filter(|kind| one.contains(kind) || other.contains(kind)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect;
+
+    #[test]
+    fn a_set_without_one_of_its_effects_keeps_the_others_in_order() {
+        let set: Set = effect::CATALOGUE.iter().take(3).collect();
+        let (fewer, taken) = without(&set, 1);
+        assert!(fewer == [set[0], set[2]] && taken == set[1]);
+        assert!(is_among(&set, taken) && !is_among(&fewer, taken));
+    }
+
+    #[test]
+    fn two_reaches_together_name_each_sensor_once() {
+        use SensorKind::{Acc, Gyr, Mag};
+        assert_eq!(either(&[Mag, Acc], &[Acc]), [Acc, Mag]);
+        assert_eq!(either(&[], &[Gyr]), [Gyr]);
+    }
+}

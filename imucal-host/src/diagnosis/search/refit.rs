@@ -2,6 +2,7 @@
 //!
 //! Gauss–Newton: the residual at full rate, its derivative from the nodes. Steps that make it worse are halved.
 
+use crate::noise::precision::Precision;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -12,7 +13,6 @@ use crate::{
         mixed_model::{
             design::{Column, Design, Signature},
             noise::{Noise, Weighing},
-            precision::Precision,
         },
         residual::{base_run::Reference, block::Means, forward_model::ForwardModel},
     },

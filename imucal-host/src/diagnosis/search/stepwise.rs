@@ -221,3 +221,37 @@ fn with_white(noise: &Noise, white: &Noise) -> Noise {
     }
     noise
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{diagnosis::mixed_model::noise::SensorNoise, effect};
+
+    fn noise(white: f64, drift: f64) -> Noise {
+        let sensor = SensorNoise {
+            white: [white; 3],
+            moving: [2.0 * white; 3],
+            drift: [drift; 2],
+            slow: 120.0,
+            scatter: 0.0,
+            breadth: 0.0,
+        };
+        Noise { sensors: [sensor; 3] }
+    }
+
+    #[test]
+    fn a_set_is_the_same_in_whatever_order_it_was_found() {
+        let set: Vec<&'static Effect> = effect::CATALOGUE.iter().take(3).collect();
+        let turned: Vec<&'static Effect> = set.iter().rev().copied().collect();
+        assert_eq!(key(&set), key(&turned));
+        assert_ne!(key(&set), key(&set[..2]));
+    }
+
+    #[test]
+    fn white_noise_is_lowered_by_a_better_fit_and_never_raised() {
+        let (old, better, worse) = (noise(1.0, 0.5), noise(0.25, 0.1), noise(4.0, 9.0));
+        let found = with_white(&old, &better).sensors[0];
+        assert_eq!((found.white, found.moving, found.drift), ([0.25; 3], [0.5; 3], [0.5; 2]));
+        assert_eq!(with_white(&old, &worse), old);
+    }
+}

@@ -58,3 +58,104 @@ impl Evidence<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        diagnosis::{settings::Settings, verdict::shares::Share},
+        recording::SensorKind,
+    };
+
+    fn cause(equivalents: &[&str]) -> Cause {
+        Cause {
+            effect: "mag.bias_step".into(),
+            probability: 0.9,
+            equivalents: equivalents.iter().map(|name| (*name).to_owned()).collect(),
+            parameters: Vec::new(),
+            material: true,
+            gap_closed: Some(0.9),
+            gap_closed_ci95: None,
+        }
+    }
+
+    fn closed(share: f64) -> Closed {
+        Closed { total: Share { value: share, interval: [share; 2] }, each: Vec::new(), explainable: 100.0 }
+    }
+
+    fn left(size: f64) -> Following {
+        let (driver, detail) = ("rate".to_owned(), String::new());
+        Following { kind: SensorKind::Mag, driver, detail, size, p_value: 1e-9 }
+    }
+
+    /// By causes, the share that they close, and the size of what still follows a covariate, of 100.
+    fn verdict(causes: &[Cause], share: f64, size: Option<f64>) -> Verdict {
+        decided(causes, share, size, |_| {})
+    }
+
+    fn decided(
+        causes: &[Cause],
+        share: f64,
+        size: Option<f64>,
+        alter: impl Fn(&mut Evidence<'_>),
+    ) -> Verdict {
+        let (closed, left) = (closed(share), size.map(left));
+        let mut evidence = Evidence {
+            causes,
+            clock: None,
+            closed: &closed,
+            left: left.as_ref(),
+            refuted: false,
+            within_model: false,
+            faulty: false,
+        };
+        alter(&mut evidence);
+        evidence.verdict(&Settings::default().verdict)
+    }
+
+    #[test]
+    fn without_a_cause_it_is_the_residual_that_decides() {
+        assert_eq!(verdict(&[], 0.0, None), Verdict::None);
+        assert_eq!(verdict(&[], 0.0, Some(50.0)), Verdict::Unknown);
+        assert_eq!(decided(&[], 0.0, None, |evidence| evidence.faulty = true), Verdict::Explained);
+    }
+
+    #[test]
+    fn a_cause_explains_as_much_as_it_leaves_nothing() {
+        let causes = [cause(&[])];
+        assert_eq!(verdict(&causes, 0.95, None), Verdict::Explained);
+        assert_eq!(verdict(&causes, 0.95, Some(60.0)), Verdict::Partly);
+        assert_eq!(verdict(&causes, 0.0, Some(60.0)), Verdict::Unknown);
+        assert_eq!(verdict(&[cause(&["mag.bias_drift"])], 0.95, None), Verdict::Ambiguous);
+    }
+
+    #[test]
+    fn a_refuted_cause_leaves_no_sure_answer() {
+        let refuted = |evidence: &mut Evidence<'_>| evidence.refuted = true;
+        assert_eq!(decided(&[], 0.0, None, refuted), Verdict::Unknown);
+        assert_eq!(decided(&[cause(&[])], 0.95, None, refuted), Verdict::Partly);
+    }
+
+    #[test]
+    fn what_a_given_model_may_err_by_is_no_gap() {
+        let within = |evidence: &mut Evidence<'_>| evidence.within_model = true;
+        assert_eq!(decided(&[cause(&[])], 0.95, None, within), Verdict::None);
+        assert_eq!(decided(&[cause(&[])], 0.95, Some(60.0), within), Verdict::Unknown);
+    }
+
+    #[test]
+    fn the_clock_of_the_reference_is_a_cause_where_no_other_is() {
+        let clock = cause(&[]);
+        let (closed, left) = (closed(0.9), left(0.0));
+        let evidence = Evidence {
+            causes: &[],
+            clock: Some(&clock),
+            closed: &closed,
+            left: Some(&left),
+            refuted: false,
+            within_model: false,
+            faulty: false,
+        };
+        assert_eq!(evidence.verdict(&Settings::default().verdict), Verdict::Explained);
+    }
+}

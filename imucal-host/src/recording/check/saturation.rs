@@ -4,10 +4,7 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use crate::recording::{
-    triple::{Triple, median},
-    unit::Unit,
-};
+use crate::recording::{order_statistics::median, triple::Triple, unit::Unit};
 
 /// Consecutive rows of one axis at a limit.
 #[derive(Clone, Debug, PartialEq)]

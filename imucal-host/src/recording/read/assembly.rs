@@ -12,10 +12,11 @@ use crate::recording::{
     Recording,
     check::{absurd, unit_check},
     manifest::Manifest,
+    order_statistics::median,
     place::Places,
     read_error::ReadError,
     sensor_kind::SensorKind,
-    triple::{Nominal, Triple, median},
+    triple::{Nominal, Triple},
     unit::TimeUnit,
     warning::Warning,
 };

@@ -13,10 +13,10 @@ use crate::{
     recording::{
         Recording,
         manifest::Manifest,
+        order_statistics::median,
         place::{Place, Places},
         read_error::ReadError,
         sensor_kind::SensorKind,
-        triple::median,
     },
 };
 

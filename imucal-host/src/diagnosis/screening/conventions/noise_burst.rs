@@ -10,6 +10,7 @@
 //! and all stretches are counted in its probability. Its ends are then moved to the rows where the likelihood is
 //! greatest.
 
+use crate::recording::order_statistics::std_of_median;
 use std::ops::Range;
 
 use nalgebra::Vector3;
@@ -153,8 +154,7 @@ fn normalise(bends: &[Bend], windows: &mut [Window], moves: bool) -> Option<Vect
     let steps: Vec<f64> = levels.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     let rows = own.iter().map(|window| window.bends.len()).min().unwrap_or(1) as f64;
     let least = (2.0 * ALIKE / (3.0 * rows)).sqrt();
-    // The median of |step| is 0.6745 √2 standard deviations.
-    let scatter = (median(steps).unwrap_or(0.0) / 0.954).max(least);
+    let scatter = (std_of_median(steps).unwrap_or(0.0) / 2.0f64.sqrt()).max(least);
     for (window, level) in own.iter_mut().zip(levels) {
         window.level = level / scatter;
     }

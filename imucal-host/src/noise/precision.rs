@@ -19,7 +19,7 @@ use nalgebra::DMatrix;
 
 use super::{
     process::Process,
-    random_effects::{CrossProducts, RandomEffects, SPACING},
+    random_effects::{CrossProducts, RandomEffects},
     skyline::{Factor, Skyline},
     symmetric_product,
 };
@@ -45,9 +45,8 @@ impl Precision {
         let with = |sigma: f64, drifts: &[&[Process]]| {
             let scales = scales(&effects, sigma, drifts);
             let factor = matrix(&effects, &scales, drifts).factorised()?;
-            let knots = effects.knots.len();
             let drift = drifts.iter().flat_map(|own| own.iter());
-            let of_drifts: f64 = drift.map(|drift| drift.log_determinant(knots, SPACING)).sum();
+            let of_drifts: f64 = drift.map(|drift| effects.knots.log_determinant(drift)).sum();
             let log_determinant = effects.log_determinant + factor.log_determinant + of_drifts;
             Some(Self { effects: Arc::clone(&effects), scales, factor, log_determinant })
         };
@@ -119,13 +118,8 @@ fn matrix(effects: &RandomEffects, scales: &[f64], drifts: &[&[Process]]) -> Sky
     }
     for (channel, drifts) in drifts.iter().enumerate() {
         for (process, drift) in drifts.iter().enumerate() {
-            add_precision(
-                &mut matrix,
-                &effects.knots,
-                channel * effects.processes,
-                (process, drifts.len()),
-                drift,
-            );
+            let first = channel * effects.processes;
+            add_precision(&mut matrix, effects, first, (process, drifts.len()), drift);
         }
     }
     matrix
@@ -134,26 +128,29 @@ fn matrix(effects: &RandomEffects, scales: &[f64], drifts: &[&[Process]]) -> Sky
 /// Adds a drift's precision; `first` is the channel's first state at a knot.
 fn add_precision(
     matrix: &mut Skyline,
-    knots: &[usize],
+    effects: &RandomEffects,
     first: usize,
     (process, count): (usize, usize),
     drift: &Process,
 ) {
-    let (kept, q) = (drift.kept(SPACING), drift.innovation(SPACING));
-    for (knot, start) in knots.iter().enumerate() {
-        let inner = if knot == 0 || knot + 1 == knots.len() { 1.0 } else { 1.0 + kept * kept };
+    let mut add = |(knot, other): (usize, usize), value: f64| {
+        let [start, begin] = [knot, other].map(|knot| effects.of_knots[knot] + first);
         for (row, signed) in parts(process, count) {
             for (column, also) in parts(process, count) {
-                let (row, sign) = (start + first + row, signed * also);
                 // Each pair once: the matrix mirrors what is off its diagonal.
-                if row >= start + first + column {
-                    matrix.add(row, start + first + column, sign * inner / q);
-                }
-                if knot > 0 {
-                    matrix.add(row, knots[knot - 1] + first + column, -sign * kept / q);
+                if knot != other || row >= column {
+                    matrix.add(start + row, begin + column, signed * also * value);
                 }
             }
         }
+    };
+    add((0, 0), 1.0 / (drift.sigma * drift.sigma));
+    let transitions = effects.knots.transitions(drift);
+    let each = transitions.flat_map(|(kept, q, times)| std::iter::repeat_n((kept, q), times));
+    for (before, (kept, q)) in each.enumerate() {
+        add((before, before), kept * kept / q);
+        add((before + 1, before), -kept / q);
+        add((before + 1, before + 1), 1.0 / q);
     }
 }
 
@@ -165,11 +162,13 @@ fn parts(process: usize, count: usize) -> impl Iterator<Item = (usize, f64)> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use nalgebra::DVector;
 
     use super::{
         super::{
+            Span, flicker,
+            knots::{Knots, SPACING},
             random_effects::{ChannelBlocks, Columns},
             sparse_rows::SparseRows,
         },
@@ -206,7 +205,7 @@ pub(super) mod tests {
         }
 
         pub fn effects(&self, processes: usize) -> Arc<RandomEffects> {
-            Arc::new(RandomEffects::new(&self.times, self.channels.clone(), 2, processes))
+            Arc::new(RandomEffects::new(Knots::at(&self.times), self.channels.clone(), 2, processes))
         }
 
         /// Σ by its definition, over the blocks that hold something, and these, channel below channel.
@@ -295,6 +294,26 @@ pub(super) mod tests {
         let x = DVector::from_fn(40, |k, _| ((k * k) as f64).sin());
         let found = DVector::from_vec(precision.apply(x.as_slice())).select_rows(&told);
         assert!((sigma * found - x.select_rows(&told)).amax() < 1e-9);
+    }
+
+    #[test]
+    fn means_over_spans_are_weighed_by_their_covariance() {
+        let spans: Vec<Span> = vec![0.0..4.0, 6.0..6.5, 6.5..9.0, 40.0..90.0];
+        let drifts = [10.0, 100.0, 1000.0].map(|time| Process { time, sigma: 1.3 });
+        let own = |span: &Span| 2.0 / (span.end - span.start);
+        let left =
+            |span: &Span| drifts.iter().map(|d| d.mean_given_ends(span.end - span.start).1).sum::<f64>();
+        let weights = spans.iter().map(|span| 1.0 / (own(span) + left(span))).collect();
+        let channel = ChannelBlocks { weights, offsets: SparseRows::empty(4) };
+        let effects = RandomEffects::new(Knots::over(&spans, &drifts), vec![channel], 0, 3);
+        let precision = Precision::new(Arc::new(effects), 0.0, &[&drifts]);
+        let white = DVector::from_fn(4, |k, _| own(&spans[k]));
+        let covariance = flicker::covariance_of(&spans, &drifts) + DMatrix::from_diagonal(&white);
+        let x = DMatrix::from_fn(4, 2, |k, column| ((3 * k + column) as f64).cos());
+        let expected = x.tr_mul(&covariance.clone().cholesky().unwrap().solve(&x));
+        let found = precision.products(&precision.effects().cross_products(&[slices(&x)]));
+        assert!((found - expected).amax() < 1e-10);
+        assert!((precision.log_determinant - covariance.determinant().ln()).abs() < 1e-10);
     }
 
     #[test]

@@ -23,14 +23,17 @@ use std::{iter, ops::Range, sync::Arc};
 
 use nalgebra::DMatrix;
 
-use super::{skyline::Skyline, sparse_rows::SparseRows, symmetric_product};
+use super::{
+    knots::{Knots, Row},
+    skyline::Skyline,
+    sparse_rows::SparseRows,
+    symmetric_product,
+};
 
-/// Distance between knots, s.
-pub const SPACING: f64 = 2.5;
 /// Blocks that are multiplied at a time: few enough to stay in a processor's cache.
 const PART: usize = 512;
 
-/// One channel: an axis of a sensor.
+/// One channel: what one axis of a sensor reads.
 #[derive(Clone, Debug)]
 pub struct ChannelBlocks {
     /// Inverse white variance of each block, zero where it holds nothing.
@@ -45,8 +48,10 @@ pub struct RandomEffects {
     channels: Vec<Rows>,
     /// Drifts of a channel.
     pub(super) processes: usize,
+    /// Knots of the drifts.
+    pub(super) knots: Knots,
     /// The first state of each knot.
-    pub(super) knots: Vec<usize>,
+    pub(super) of_knots: Vec<usize>,
     /// The state of each offset.
     pub(super) offsets: Vec<usize>,
     /// Zᵀ D⁻¹ Z, with room for the precision of the drifts.
@@ -76,26 +81,20 @@ pub struct CrossProducts {
 /// Columns of a channel, block by block; one without a value is zero.
 pub type Columns<'a> = Vec<&'a [f64]>;
 
-/// The knot before a block, and how far it lies on the way to the next, 0 to 1.
-type Place = (usize, f64);
-
 impl RandomEffects {
-    /// From the blocks' times, s, increasing; the channels; and the number of offsets and of a channel's drifts.
-    pub fn new(times: &[f64], channels: Vec<ChannelBlocks>, offsets: usize, processes: usize) -> Self {
-        let (places, knots) = places(times);
-        let (knots, offsets) = states(&places, knots, &channels, offsets, channels.len() * processes);
+    /// From the knots of the blocks; the channels; and the number of offsets and of a channel's drifts.
+    pub fn new(knots: Knots, channels: Vec<ChannelBlocks>, offsets: usize, processes: usize) -> Self {
+        let (of_knots, offsets) = states(&knots, &channels, offsets, channels.len() * processes);
         let rows = |(at, channel): (usize, ChannelBlocks)| {
-            let sum = |knot: usize| knots[knot] + at * processes + processes - 1;
             let mut z = SparseRows::default();
-            for (block, (knot, share)) in places.iter().enumerate() {
-                let drift = [(*knot, 1.0 - share), (knot + 1, *share)].into_iter().take(2 * processes.min(1));
+            for (block, row) in knots.rows().iter().enumerate() {
                 let shared = channel.offsets.row(block).iter().map(|(offset, u)| (offsets[*offset], *u));
-                z.push(drift.map(|(knot, share)| (sum(knot), share)).chain(shared));
+                z.push(drift_entries(row, &of_knots, at * processes, processes).chain(shared));
             }
             Rows { weights: channel.weights, z }
         };
         let channels: Vec<Rows> = channels.into_iter().enumerate().map(rows).collect();
-        let mut gram = Skyline::new(envelope(&channels, &knots, &offsets, processes));
+        let mut gram = Skyline::new(envelope(&channels, &of_knots, &offsets, processes));
         for (weight, row) in channels.iter().flat_map(Rows::iter).filter(|(weight, _)| *weight > 0.0) {
             for (at, (one, a)) in row.iter().enumerate() {
                 row[..=at].iter().for_each(|(other, b)| gram.add(*one, *other, weight * a * b));
@@ -103,7 +102,7 @@ impl RandomEffects {
         }
         let weights = channels.iter().flat_map(|rows| &rows.weights);
         let log_determinant = weights.filter(|w| **w > 0.0).map(|w| -w.ln()).sum();
-        Self { channels, processes, knots, offsets, gram, log_determinant }
+        Self { channels, processes, knots, of_knots, offsets, gram, log_determinant }
     }
 
     /// Number of random numbers.
@@ -114,7 +113,7 @@ impl RandomEffects {
     /// The states of all drifts.
     pub(super) fn drift_states(&self) -> impl Iterator<Item = usize> {
         let width = self.channels.len() * self.processes;
-        self.knots.iter().flat_map(move |knot| *knot..knot + width)
+        self.of_knots.iter().flat_map(move |knot| *knot..knot + width)
     }
 
     /// Whether blocks share more than drift.
@@ -227,39 +226,41 @@ impl CrossProducts {
     }
 }
 
-/// The place of each block among the knots, and the number of these.
-fn places(times: &[f64]) -> (Vec<Place>, usize) {
-    let start = times.first().copied().unwrap_or(0.0);
-    let length = times.last().copied().unwrap_or(0.0) - start;
-    let knots = ((length / SPACING).ceil() as usize + 1).max(2);
-    let place = |time: &f64| {
-        let at = (time - start) / SPACING;
-        let knot = (at.floor() as usize).min(knots - 2);
-        (knot, at - knot as f64)
-    };
-    (times.iter().map(place).collect(), knots)
+/// The states of a channel's drifts that a block counts; `first` is the channel's first at a knot. A knot's last state is
+/// the sum of the drifts, the others are all drifts but the first.
+fn drift_entries(
+    row: &Row,
+    of_knots: &[usize],
+    first: usize,
+    processes: usize,
+) -> impl Iterator<Item = (usize, f64)> {
+    let ends = [(row.knot, row.weights[0]), (row.knot + 1, row.weights[1])];
+    ends.into_iter().take(2 * processes.min(1)).flat_map(move |(knot, weight)| {
+        let start = of_knots[knot] + first;
+        let more = row.more.iter().enumerate().map(move |(drift, more)| (start + drift, *more));
+        more.chain([(start + processes - 1, weight)])
+    })
 }
 
 /// The first state of each knot and the state of each offset, in time; `width` states belong to a knot.
 fn states(
-    places: &[Place],
-    knots: usize,
+    knots: &Knots,
     channels: &[ChannelBlocks],
     offsets: usize,
     width: usize,
 ) -> (Vec<usize>, Vec<usize>) {
-    let mut before = vec![knots - 1; offsets];
+    let mut before = vec![knots.count - 1; offsets];
     for channel in channels {
-        for (block, (knot, _)) in places.iter().enumerate() {
+        for (block, row) in knots.rows().iter().enumerate() {
             let shared = channel.offsets.row(block).iter();
-            shared.for_each(|(offset, _)| before[*offset] = before[*offset].min(*knot));
+            shared.for_each(|(offset, _)| before[*offset] = before[*offset].min(row.knot));
         }
     }
     let mut ordered: Vec<usize> = (0..offsets).collect();
     ordered.sort_by_key(|offset| before[*offset]);
     let mut of_offsets = vec![0; offsets];
-    let (mut of_knots, mut state, mut next) = (Vec::with_capacity(knots), 0, ordered.iter().peekable());
-    for knot in 0..knots {
+    let (mut of_knots, mut state, mut next) = (Vec::with_capacity(knots.count), 0, ordered.iter().peekable());
+    for knot in 0..knots.count {
         for offset in iter::from_fn(|| next.next_if(|offset| before[**offset] == knot)) {
             of_offsets[*offset] = state;
             state += 1;
