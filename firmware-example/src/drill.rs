@@ -13,10 +13,7 @@ use imucal_core::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-use crate::{
-    judgement::unit,
-    scene::{self, Noise, Sensor, rate, spiral},
-};
+use crate::scene::{self, Noise, Sensor, rate, spiral, unit};
 
 /// Local gravity, m/s².
 pub const GRAVITY: f32 = 9.80665;

@@ -32,7 +32,6 @@ pub mod fit;
 pub mod fitting;
 #[cfg(target_os = "none")]
 mod gate;
-pub mod judgement;
 #[cfg(target_os = "none")]
 pub mod machine;
 pub mod replay;

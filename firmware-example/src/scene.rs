@@ -4,8 +4,6 @@
 use imucal_core::{observation::Moments, triad::Triad};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::judgement::unit;
-
 /// Samples of a rest.
 const SAMPLES: usize = 8;
 
@@ -51,6 +49,11 @@ impl Sensor {
         }
         moments.mean()
     }
+}
+
+/// A vector at unit length.
+pub fn unit(v: &Vector3<f32>) -> Vector3<f32> {
+    v / libm::sqrtf(v.dot(v))
 }
 
 /// Direction `index` of `count` on a Fibonacci spiral.

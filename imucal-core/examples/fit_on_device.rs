@@ -8,11 +8,11 @@
 use std::error::Error;
 
 use imucal_core::{
-    accept::{self, Limits, Refusal},
-    coverage::Coverage,
+    accept::{Limits, Refusal},
+    fit::{Criteria, FitSummary, Observed, Units, standard_errors},
     model::{norm::NormModel, parameterisation::UPPER_TRIANGULAR},
     observation::{Moments, ShellPoint},
-    record::{self, CalibrationRecord, Date, FitQuality, RawUnit, SensorIdentity, TriadRecord},
+    record::{self, CalibrationRecord, Date, RawUnit, SensorIdentity, TriadRecord},
     solver::LevenbergMarquardt,
     triad::Triad,
 };
@@ -20,6 +20,13 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Local gravity, m/s².
 const GRAVITY: f32 = 9.80665;
+/// Here the driver gives nominal m/s², and the record keeps them.
+const UNITS: Units = Units {
+    raw: RawUnit::MetrePerSecondSquared,
+    calibrated: RawUnit::MetrePerSecondSquared,
+    offset: 0.0,
+    per_unit: 1.0,
+};
 /// Rests that are waited for.
 const RESTS: usize = 18;
 /// Samples of a rest.
@@ -33,53 +40,14 @@ fn calibrate(rests: &[Moments<f32>; RESTS]) -> Result<TriadRecord, Refusal> {
     let mut solver = LevenbergMarquardt::new(start, Default::default());
     // A step is a pass over the points or two: a main loop may do other work between them.
     while solver.step(&model).is_none() {}
-    judge(&model, &solver)
-}
-
-/// Asks of a fit all that `accept` asks.
-fn judge(model: &NormModel<'_, f32, 9>, solver: &LevenbergMarquardt<f32, 9>) -> Result<TriadRecord, Refusal> {
     let triad = UPPER_TRIANGULAR.triad(solver.theta());
+    let std = UPPER_TRIANGULAR.triad(&standard_errors(&solver.covariance()));
     let limits = Limits::for_norm(9, 10);
-    let directions = model.points.iter().map(|point| triad.correct(&point.value).normalize());
-    let coverage = Coverage::of(directions);
-    accept::check_observations(&coverage, 9, &limits)?;
-    accept::check_report(&solver.report())?;
-    let covariance = solver.covariance().ok_or(Refusal::NotFinite)?;
-    let std = UPPER_TRIANGULAR.triad(&covariance.diagonal().map(libm::sqrtf));
-    let error = accept::relative_error(&triad.gain, &std, GRAVITY);
-    accept::check_precision(error, &limits)?;
-    accept::check_nonlinearity(accept::nonlinearity(solver, model, 1.0), error, &limits)?;
-    let rms = solver.variance().map_or(f32::NAN, libm::sqrtf);
-    accept::check_plausibility(&triad, true, rms / GRAVITY, &limits)?;
-    let quality = FitQuality {
-        gain_std: rows(&std.gain),
-        bias_std: std.bias.into(),
-        rms,
-        held_out_rms: None,
-        observations: RESTS as u32,
-        parameters: 9,
-        condition: solver.report().condition,
-        coverage: coverage.share,
-        field_norm: None,
-    };
-    Ok(in_record(&triad, quality))
-}
-
-/// A triad as a record has it.
-fn in_record(triad: &Triad<f32>, quality: FitQuality) -> TriadRecord {
-    TriadRecord {
-        gain: rows(&triad.gain),
-        bias: triad.bias.into(),
-        unit_in: RawUnit::MetrePerSecondSquared,
-        unit_out: RawUnit::MetrePerSecondSquared,
-        model: "T9".parse().unwrap_or_default(),
-        temperature: None,
-        quality,
-    }
-}
-
-fn rows(matrix: &Matrix3<f32>) -> [[f32; 3]; 3] {
-    matrix.transpose().into()
+    let observed = Observed::Points(&points);
+    let criteria = Criteria { observed, limits, radius: GRAVITY, nonlinearity: true };
+    let summary = FitSummary::of(&solver, &model, &triad, &criteria);
+    summary.check(&triad, &std, &criteria)?;
+    Ok(summary.record(&triad, &std, "T9", &UNITS))
 }
 
 /// What the sensor is like; a calibration is to undo it.

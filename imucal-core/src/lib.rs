@@ -17,10 +17,11 @@
 //! | what is found | [`solver`] | Levenberg–Marquardt and particle swarm of fixed size, each with a report |
 //! | whether to believe it | [`coverage`], [`accept`] | typed refusals with their figures |
 //! | what is kept | [`record`] | bytes with a version and a CRC |
+//! | what a fit comes to | [`fit`] | its figures, all checks in order, its part of a record |
 //! | what is applied | [`corrector`] | `calibrated = gain · (raw − bias)`, sample by sample |
 //! | what is said to a host | `link`, a feature | frames and messages between a device and its host |
 //!
-//! A device that only applies needs the last two.
+//! A device that only applies needs [`record`] and [`corrector`] alone.
 //!
 //! # Parameterisation
 //!
@@ -71,6 +72,8 @@ pub mod coverage;
 pub mod accept;
 
 pub mod record;
+
+pub mod fit;
 
 pub mod corrector;
 

@@ -7,6 +7,7 @@
 use heapless::Vec;
 use imucal_core::{
     accept::Limits,
+    fit::{Criteria, FitSummary, Observed, errors_by_sensitivity, standard_errors},
     link::{Capacity, Fault, FitModel, FitProgress, FitTask, Observation},
     model::{
         Parameterisation,
@@ -30,9 +31,7 @@ mod report;
 use models::{LEVELLED, level, norm_model, rig_axes, rig_model};
 use observations::Observations;
 pub use report::Finished;
-use report::{Figures, errors, finished, inverse_errors};
-
-use crate::judgement::{Judgement, Question, Seen};
+use report::{Figures, finished};
 
 /// Blocks of a swarm's cost in one slice.
 pub const SLICE: usize = 384;
@@ -309,11 +308,12 @@ impl<
         let triad = form.triad(solver.theta());
         // Raw unit; that of a gain of the same size in all directions.
         let radius = task.norm * libm::sqrtf(3.0 / triad.gain.norm_squared());
-        let question = Question { seen: Seen::Points(&self.memory.seen.points), limits, radius, bend: true };
-        let judgement = Judgement::of(solver, &norm_model(task, &self.memory.seen, form), &triad, &question);
+        let observed = Observed::Points(&self.memory.seen.points);
+        let criteria = Criteria { observed, limits, radius, nonlinearity: true };
+        let summary = FitSummary::of(solver, &norm_model(task, &self.memory.seen, form), &triad, &criteria);
         let covariance = solver.covariance();
-        let std = form.triad(&errors(&covariance));
-        finished(task, figures(solver.theta(), &covariance), &judgement, &question, &triad, &std)
+        let std = form.triad(&standard_errors(&covariance));
+        finished(task, figures(solver.theta(), &covariance), &summary, &criteria, &triad, &std)
     }
 
     #[inline(never)]
@@ -325,14 +325,15 @@ impl<
     ) -> Finished {
         let triad = form.triad(solver.theta());
         let limits = Limits { rms: LARGEST_TURN, ..Limits::for_norm(9, LEAST_TURNS) };
-        let question = Question { seen: Seen::Ends(&self.memory.seen.ends), limits, radius: 1.0, bend: true };
-        let judgement =
-            self.memory.seen.with_turns(form, |model| Judgement::of(solver, model, &triad, &question));
+        let observed = Observed::TurnEnds(&self.memory.seen.ends);
+        let criteria = Criteria { observed, limits, radius: 1.0, nonlinearity: true };
+        let summary =
+            self.memory.seen.with_turns(form, |model| FitSummary::of(solver, model, &triad, &criteria));
         // The blocks were made less the bias of the task.
         let whole = Triad { bias: triad.bias + Vector3::from(task.bias), ..triad };
         let covariance = solver.covariance();
-        let std = form.triad(&errors(&covariance));
-        finished(task, figures(solver.theta(), &covariance), &judgement, &question, &whole, &std)
+        let std = form.triad(&standard_errors(&covariance));
+        finished(task, figures(solver.theta(), &covariance), &summary, &criteria, &whole, &std)
     }
 
     #[inline(never)]
@@ -345,12 +346,12 @@ impl<
             directions: LEAST_POSES,
             ..Limits::for_norm(12, LEAST_POSES)
         };
-        let seen = Seen::Poses(&self.memory.seen.poses);
-        let question = Question { seen, limits, radius: task.norm, bend: false };
-        let judgement = Judgement::of(solver, &rig_model(task, &self.memory.seen), &triad, &question);
+        let observed = Observed::Poses(&self.memory.seen.poses);
+        let criteria = Criteria { observed, limits, radius: task.norm, nonlinearity: false };
+        let summary = FitSummary::of(solver, &rig_model(task, &self.memory.seen), &triad, &criteria);
         let covariance = solver.covariance();
-        let std = inverse_errors(&gain, &covariance);
-        finished(task, figures(solver.theta(), &covariance), &judgement, &question, &triad, &std)
+        let std = errors_by_sensitivity(&gain, &covariance);
+        finished(task, figures(solver.theta(), &covariance), &summary, &criteria, &triad, &std)
     }
 }
 

@@ -2,13 +2,11 @@
 
 use heapless::Vec;
 use imucal_core::{
+    fit::{Criteria, FitSummary, Units},
     link::{FitReport, FitTask, MOST_COVARIANCE},
     record::{RawUnit, Sensor, TriadRecord},
     triad::Triad,
 };
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
-
-use crate::judgement::{Judgement, Question, Unit};
 
 /// A fit that was judged.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,36 +15,6 @@ pub struct Finished {
     pub report: FitReport,
     /// For the record, where the fit was accepted.
     pub accepted: Option<(Sensor, TriadRecord)>,
-}
-
-/// Standard errors of the parameters; zero where there are none, which no accepted fit has.
-pub(super) fn errors<const P: usize>(covariance: &Option<SMatrix<f32, P, P>>) -> SVector<f32, P> {
-    covariance.as_ref().map_or_else(SVector::zeros, |c| c.diagonal().map(libm::sqrtf))
-}
-
-/// Standard errors of gain and bias where the sensitivity K = gain⁻¹ was fitted: by `dG = −G dK G`.
-pub(super) fn inverse_errors(gain: &Matrix3<f32>, covariance: &Option<SMatrix<f32, 14, 14>>) -> Triad<f32> {
-    let mut std = Triad { gain: Matrix3::zeros(), bias: Vector3::zeros() };
-    let Some(covariance) = covariance else { return std };
-    for (i, left) in gain.row_iter().enumerate() {
-        for (j, right) in gain.column_iter().enumerate() {
-            // Derivative of G_ij by K_kl is −G_ik G_lj.
-            let mut by = SVector::<f32, 14>::zeros();
-            for (slot, factor) in
-                by.iter_mut().zip(left.iter().flat_map(|a| right.iter().map(move |b| a * b)))
-            {
-                *slot = factor;
-            }
-            if let Some(entry) = std.gain.get_mut((i, j)) {
-                *entry = libm::sqrtf((covariance * by).dot(&by));
-            }
-        }
-    }
-    let variances = covariance.diagonal();
-    for (slot, variance) in std.bias.iter_mut().zip(variances.iter().skip(9)) {
-        *slot = libm::sqrtf(*variance);
-    }
-    std
 }
 
 /// A list of what there is room for: one that is extended beyond its room panics.
@@ -74,13 +42,13 @@ pub(super) struct Figures<'a> {
     pub(super) covariance: Option<&'a [f32]>,
 }
 
-/// What a judgement comes to.
+/// What a fit comes to.
 #[inline(never)]
 pub(super) fn finished(
     task: &FitTask,
     figures: Figures<'_>,
-    judgement: &Judgement,
-    question: &Question<'_>,
+    summary: &FitSummary<f32>,
+    criteria: &Criteria<'_, f32>,
     triad: &Triad<f32>,
     std: &Triad<f32>,
 ) -> Finished {
@@ -90,10 +58,10 @@ pub(super) fn finished(
         Sensor::Gyroscope => RawUnit::RadianPerSecond,
         Sensor::Magnetometer => RawUnit::MicroTesla,
     };
-    let verdict = judgement.verdict(triad, std, question);
-    let unit = Unit { raw: task.unit_in, calibrated, offset: task.offset, per_unit: task.per_unit };
-    let record = || (sensor, judgement.record(triad, std, task.model.name(), &unit));
-    let solved = &judgement.report;
+    let verdict = summary.check(triad, std, criteria);
+    let units = Units { raw: task.unit_in, calibrated, offset: task.offset, per_unit: task.per_unit };
+    let record = || (sensor, summary.record(triad, std, task.model.name(), &units));
+    let solved = &summary.report;
     let covariance = figures.covariance.map_or_else(Vec::new, |matrix| upper(matrix, figures.theta.len()));
     let report = FitReport {
         model: task.model,
@@ -104,8 +72,8 @@ pub(super) fn finished(
         cost: solved.cost,
         gradient: solved.gradient,
         condition: solved.condition,
-        nonlinearity: judgement.nonlinearity,
-        coverage: judgement.coverage.share,
+        nonlinearity: summary.nonlinearity,
+        coverage: summary.coverage.share,
         refusal: verdict.err(),
         theta: list(figures.theta.iter()),
         covariance,

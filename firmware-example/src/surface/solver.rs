@@ -3,8 +3,10 @@
 use imucal_core::{
     accept::{self, Limits, Refusal},
     coverage::Coverage,
+    fit::{self, Criteria, FitSummary, Observed, Units},
     model::{Cost, RowSink, norm::NormModel, parameterisation::UPPER_TRIANGULAR},
     observation::ShellPoint,
+    record::RawUnit,
     solver::{
         self, LevenbergMarquardt, SolveReport, Termination,
         gauge::Gauge,
@@ -37,6 +39,7 @@ pub(super) fn reach_all() {
     let shell = NormModel { points: &points, norm: 9.8, form: UPPER_TRIANGULAR };
     let fit = descent(&shell);
     judged(&fit, &shell);
+    summarised(&fit, &shell);
     factor();
     searched();
 }
@@ -77,6 +80,22 @@ fn judged(fit: &LevenbergMarquardt<f32, 9>, shell: &NormModel<'_, f32, 9>) {
     ];
     let refusal = verdicts.into_iter().find_map(Result::err).unwrap_or(Refusal::NotFinite);
     reach!(accept::Refusal::reason(&refusal));
+}
+
+#[inline(never)]
+fn summarised(solver: &LevenbergMarquardt<f32, 9>, shell: &NormModel<'_, f32, 9>) {
+    let triad = UPPER_TRIANGULAR.triad(solver.theta());
+    let observed = Observed::Points(shell.points);
+    let criteria = Criteria { observed, limits: Limits::for_norm(9, 10), radius: 9.8, nonlinearity: true };
+    reach!(fit::Observed::coverage(&criteria.observed, &triad));
+    let summary: FitSummary<f32> = reach!(fit::FitSummary::of(solver, shell, &triad, &criteria));
+    let covariance = solver.covariance();
+    let std = UPPER_TRIANGULAR.triad(&reach!(fit::standard_errors(&covariance)));
+    reach!(fit::errors_by_sensitivity(&triad.gain, &covariance));
+    let _accepted = reach!(fit::FitSummary::check(&summary, &triad, &std, &criteria));
+    let unit = RawUnit::MetrePerSecondSquared;
+    let units = Units { raw: unit, calibrated: unit, offset: 0.0, per_unit: 1.0 };
+    reach!(fit::FitSummary::record(&summary, &triad, &std, "T9", &units));
 }
 
 #[inline(never)]
