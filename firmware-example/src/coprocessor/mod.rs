@@ -12,6 +12,7 @@
 //! corrected, from the sensors and from the host alike. The rules of the link stand in [`imucal_core::link`].
 
 mod calibration;
+mod job;
 mod outgoing;
 mod requests;
 
@@ -26,9 +27,10 @@ use imucal_core::{
 use crate::{
     board::{Board, ByteLink, Clock, SampleSource},
     fitting::{Finished, Fitting, Memory},
-    storage::{Slots, StorageError, Writing},
+    storage::{Slots, StorageError},
 };
 use calibration::Calibration;
+use job::{Due, Job, Stream};
 use outgoing::Outgoing;
 
 /// Bytes taken from the link in one turn, so that a flood of them leaves time for samples.
@@ -36,39 +38,6 @@ const BYTES_A_TURN: usize = 64;
 
 /// Turns with bytes or samples after which a slice of work is done all the same.
 const TURNS_WITHOUT_WORK: u8 = 32;
-
-/// What takes many slices, and the request it answers.
-#[derive(Clone, Debug)]
-#[expect(clippy::large_enum_variant, reason = "there is one, and no heap")]
-enum Job {
-    /// Before the first turn.
-    Booting,
-    None,
-    /// A record on its way into flash.
-    Storing(Asked, Writing),
-    /// Slices of the fit that are left; `None`: to its end.
-    Stepping(Asked, Option<u16>),
-    /// A fit that has stopped, and the day.
-    Judging(Asked, Date),
-}
-
-/// An answer that waits until the link is free.
-#[derive(Clone, Copy, Debug)]
-enum Due {
-    Stored(u32),
-    Progress,
-    Report,
-    Fault(Fault),
-}
-
-/// A stream of corrected samples.
-#[derive(Clone, Copy, Debug)]
-struct Stream {
-    asked: Asked,
-    every: u16,
-    /// Samples until the next that is sent.
-    left: u16,
-}
 
 /// The co-processor on its board. The sizes are those of [`Memory`].
 #[derive(Debug)]

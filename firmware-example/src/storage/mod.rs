@@ -28,13 +28,15 @@
 //! what the next start reads; whoever needs more writes a second copy. Nor damage to both ends of a slot at once, which
 //! looks as if it had never been sealed.
 
-use crc::{CRC_32_ISO_HDLC, Crc, Digest, NoTable};
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use embedded_storage::nor_flash::{NorFlash, NorFlashError, NorFlashErrorKind};
 use imucal_core::record;
 
+mod examination;
 pub mod layout;
 mod writing;
 
+use examination::Found;
 use layout::{Head, Row, SEAL, Slot};
 pub use writing::Writing;
 use writing::{Phase, seal};
@@ -71,16 +73,6 @@ pub struct Newest {
     end: usize,
     /// Where the next record may go, in the same block.
     next: Option<usize>,
-}
-
-/// What a slot holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Found {
-    Nothing,
-    /// Sequence number and length of a whole record.
-    Whole(u32, usize),
-    /// A record that was whole once, or seems so.
-    Damaged(u32),
 }
 
 /// Slots in a region of flash, all of which is theirs.
@@ -353,71 +345,6 @@ impl<F: NorFlash> Slots<F> {
             Err(StorageError::TooLong) => Ok(false),
             Err(error) => Err(error),
         }
-    }
-
-    /// What a slot holds.
-    fn examine(&mut self, at: usize, slot: Slot) -> Result<Found, StorageError> {
-        let mut piece = [0; PIECE];
-        self.flash.read(at as u32, &mut piece).map_err(of_flash)?;
-        let header = header(&piece, slot);
-        if let Some((sequence, length)) = header
-            && self.is_whole(at, HEADER + length)?
-        {
-            return Ok(Found::Whole(sequence, length));
-        }
-        let claimed = header.map(|(sequence, _)| sequence);
-        let once = match (slot.sealed, self.sealed(at, slot)?) {
-            (false, _) => claimed,
-            (true, Some(sequence)) => Some(sequence),
-            // A seal that has lost bits itself; without one the writing was cut off.
-            (true, None) if !self.is_blank(at + slot.size - SEAL, SEAL)? => claimed,
-            (true, None) => None,
-        };
-        Ok(once.map_or(Found::Nothing, Found::Damaged))
-    }
-
-    /// Sequence number in the seal of a slot.
-    fn sealed(&mut self, at: usize, slot: Slot) -> Result<Option<u32>, StorageError> {
-        let mut piece = [0; PIECE];
-        self.flash.read((at + slot.size - SEAL) as u32, &mut piece).map_err(of_flash)?;
-        let Some([a, b, c, d, na, nb, nc, nd]) = piece.first_chunk::<8>().copied() else { return Ok(None) };
-        let sequence = u32::from_le_bytes([a, b, c, d]);
-        Ok((sequence == !u32::from_le_bytes([na, nb, nc, nd])).then_some(sequence))
-    }
-
-    /// The CRC behind the first `end` bytes of a slot is theirs.
-    fn is_whole(&mut self, at: usize, end: usize) -> Result<bool, StorageError> {
-        let (mut digest, mut stored) = (CRC.digest(), [0; CHECKSUM]);
-        let mut piece = [0; PIECE];
-        for from in (0..end + CHECKSUM).step_by(PIECE) {
-            self.flash.read((at + from) as u32, &mut piece).map_err(of_flash)?;
-            take(&piece, from, end, &mut digest, &mut stored);
-        }
-        Ok(digest.finalize() == u32::from_le_bytes(stored))
-    }
-}
-
-/// Sequence number and length at the start of a slot.
-fn header(piece: &[u8; PIECE], slot: Slot) -> Option<(u32, usize)> {
-    let [a, b, c, d, l, h, nl, nh] = *piece.first_chunk::<HEADER>()?;
-    let length = u16::from_le_bytes([l, h]);
-    let intact = u16::from_le_bytes([nl, nh]) == !length && usize::from(length) <= slot.room();
-    intact.then_some((u32::from_le_bytes([a, b, c, d]), length.into()))
-}
-
-/// Of a piece at `at`: what lies before `end` goes into the digest, the four bytes after it are the stored one.
-fn take(
-    piece: &[u8],
-    at: usize,
-    end: usize,
-    digest: &mut Digest<'_, u32, NoTable>,
-    stored: &mut [u8; CHECKSUM],
-) {
-    let (body, rest) = piece.split_at_checked(end.saturating_sub(at)).unwrap_or((piece, &[]));
-    digest.update(body);
-    let from = (at + body.len()).saturating_sub(end);
-    for (slot, byte) in stored.iter_mut().skip(from).zip(rest) {
-        *slot = *byte;
     }
 }
 

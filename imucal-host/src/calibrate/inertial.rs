@@ -13,7 +13,9 @@ use super::{
         directions::Directions,
         rest_noise::{AtRest, RestNoise},
     },
-    gyr, known_attitudes,
+    gyr,
+    gyr::turns::without_accelerometer,
+    known_attitudes,
     outcome::{Calibration, FitSummary, SensorOutcome},
     segmentation::{self, Cut},
     thresholds::{self, SegmentationReport, ThresholdTrial},
@@ -35,13 +37,12 @@ pub(crate) fn calibrate(
     calibration: &mut Calibration,
 ) -> Option<Directions> {
     let wanted = recording.gyr.as_ref().filter(|_| !options.skip.contains(&SensorKind::Gyr));
-    let (gyr_on_rig, motions) = wanted
-        .and_then(|gyr| {
-            progress("fitting the gyroscope");
-            let usable = usable(integrity, SensorKind::Gyr, recording.rows());
-            gyr::rig::gyroscope(recording, gyr, &usable, options, calibration)
-        })
-        .unzip();
+    let usable_gyr = usable(integrity, SensorKind::Gyr, recording.rows());
+    let by_attitudes = wanted.and_then(|gyr| {
+        progress("fitting the gyroscope");
+        gyr::rig::gyroscope(recording, gyr, &usable_gyr, options, calibration)
+    });
+    let (gyr_on_rig, motions) = by_attitudes.unzip();
     let motions = motions.flatten().filter(|_| options.compare);
     let compare_gyr = |calibration: &mut Calibration, field: FieldForm<'_>| {
         let comparison = motions.as_ref().and_then(|motions| gyr::ladder::comparison(motions, field));
@@ -49,15 +50,14 @@ pub(crate) fn calibrate(
     };
     let Some(acc) = &recording.acc else {
         compare_gyr(calibration, &|_| None);
-        let without = || wanted.map(|_| gyr::turns::without_accelerometer(Refusal::NoRest));
-        calibration.sensors.extend(gyr_on_rig.or_else(without));
+        let without = wanted.map(|_| without_accelerometer(Refusal::NoRest));
+        calibration.sensors.extend(gyr_on_rig.or(without));
         return None;
     };
-    let gravity = gravity(recording, calibration);
     progress("finding rests");
-    let at_rest = Rests::new(recording, acc, integrity, gravity);
+    let at_rest = Rests::new(recording, acc, integrity, gravity(recording, calibration));
     let detector = at_rest.detector();
-    let cuts = segmentation::cuts(&detector, &options.multipliers, gravity);
+    let cuts = segmentation::cuts(&detector, &options.multipliers, at_rest.gravity);
     let Some(chosen) = segmentation::choose(&cuts) else {
         compare_gyr(calibration, &|_| None);
         calibration.sensors.extend(gyr_on_rig);
@@ -69,12 +69,10 @@ pub(crate) fn calibrate(
         at_rest.accelerometer(&cuts, chosen, &shown, options, calibration);
     let mut trials: Vec<_> = cuts.iter().map(Cut::trial).collect();
     let directions = acc_outcome.passed().map(|fit| directions(fit, chosen, shown, noise));
-    let usable = usable(integrity, SensorKind::Gyr, recording.rows());
     let shared = GyrShared {
         recording,
-        usable: &usable,
+        usable: &usable_gyr,
         interval: at_rest.interval,
-        vertical_rate: vertical_rate(recording),
         directions: directions.as_ref(),
     };
     compare_gyr(calibration, &|until| {
@@ -84,35 +82,28 @@ pub(crate) fn calibrate(
     let gyr_outcome = gyr_on_rig.or_else(|| {
         let gyr = wanted?;
         progress("fitting the gyroscope");
-        Some(match (&acc_outcome.verdict, acc_outcome.fit.as_ref()) {
-            (Ok(()), Some(fit)) => shared.outcome(gyr, chosen, &cuts, &fit.triad, &used, &mut trials),
-            (Err(refused), _) => gyr::turns::without_accelerometer(refused.refusal),
-            (Ok(()), None) => gyr::turns::without_accelerometer(Refusal::NoRest),
-        })
+        Some(shared.outcome(gyr, chosen, &cuts, (&acc_outcome, &used), &mut trials))
     });
-    if !options.skip.contains(&SensorKind::Acc) {
-        calibration.sensors.push(acc_outcome);
-    }
-    calibration.sensors.extend(gyr_outcome);
-    let spreads = calibration.sensors.iter().filter_map(|s| s.fit.as_ref()?.gain_spread);
-    let gain_spread = spreads.fold(0.0, f64::max);
-    calibration.segmentation = Some(segmentation_report(chosen, detector.noise().1, gain_spread, trials));
+    let acc_outcome = Some(acc_outcome).filter(|_| !options.skip.contains(&SensorKind::Acc));
+    calibration.sensors.extend(acc_outcome.into_iter().chain(gyr_outcome));
+    calibration.segmentation = Some(segmentation_report(chosen, &detector, &calibration.sensors, trials));
     directions
 }
 
 /// What is reported of the rests.
 fn segmentation_report(
     chosen: &Cut,
-    from_initial_rest: bool,
-    gain_spread: f64,
+    detector: &RestDetector<'_>,
+    sensors: &[SensorOutcome],
     trials: Vec<ThresholdTrial>,
 ) -> SegmentationReport {
+    let spreads = sensors.iter().filter_map(|s| s.fit.as_ref()?.gain_spread);
     SegmentationReport {
         rests: chosen.rows.clone(),
         multiplier: chosen.multiplier,
         threshold: chosen.threshold,
-        from_initial_rest,
-        gain_spread,
+        from_initial_rest: detector.noise().1,
+        gain_spread: spreads.fold(0.0, f64::max),
         trials,
     }
 }
@@ -228,7 +219,6 @@ struct GyrShared<'a> {
     recording: &'a Recording,
     usable: &'a [bool],
     interval: f64,
-    vertical_rate: f64,
     directions: Option<&'a Directions>,
 }
 
@@ -250,7 +240,7 @@ impl GyrShared<'_> {
             used,
             acc,
             directions: None,
-            vertical_rate: self.vertical_rate,
+            vertical_rate: vertical_rate(self.recording),
         }
     }
 
@@ -275,10 +265,14 @@ impl GyrShared<'_> {
         gyr: &Triple,
         chosen: &Cut,
         cuts: &[Cut],
-        acc: &Triad<f64>,
-        used: &[usize],
+        (acc, used): (&SensorOutcome, &[usize]),
         trials: &mut [ThresholdTrial],
     ) -> SensorOutcome {
+        let acc = match (&acc.verdict, &acc.fit) {
+            (Ok(()), Some(fit)) => &fit.triad,
+            (Err(refused), _) => return without_accelerometer(refused.refusal),
+            (Ok(()), None) => return without_accelerometer(Refusal::NoRest),
+        };
         let input =
             gyr::turns::GyrInput { directions: self.directions, ..self.input(gyr, chosen, acc, used) };
         let mut outcome = gyr::turns::calibrate(&input);

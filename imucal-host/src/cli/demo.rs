@@ -21,6 +21,7 @@ use crate::{
         FitEquivalence, SampleEquivalence, fits,
         samples::{self, Samples},
     },
+    file::OutputSet,
     recording::{Recording, SensorKind},
     report::{
         self,
@@ -57,16 +58,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let out = &arguments.out;
-    std::fs::create_dir_all(out).with_context(|| {
-        format!(
-            "{}: found no folder and cannot make one, expected a place to write to; give another --out",
-            out.display()
-        )
-    })?;
-    // A folder with all of them holds an earlier demo, which the next one replaces.
-    let planned: Vec<Planned> = WRITTEN.iter().map(|(file, _)| Planned::new(out.join(file))).collect();
-    let earlier = WRITTEN.iter().all(|(file, _)| out.join(file).exists());
-    let mut files = arguments.overwrite.or(earlier).plan(&[], &planned)?;
+    let mut files = planned(arguments)?;
     say!(
         "1. Record: a simulated Xsens MTx on a three-gimbal rig, at rest in 24 attitudes, six of them twice.\n   \
          One effect is in the recording that no later step knows of."
@@ -118,6 +110,20 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         say!("  {file:<24} {what}");
     }
     Ok(if found && equal && named { Ending::Done } else { Ending::Refused })
+}
+
+/// The files that are written; a folder with all of them holds an earlier demo, which the next one replaces.
+fn planned(arguments: &Arguments) -> anyhow::Result<OutputSet> {
+    let out = &arguments.out;
+    std::fs::create_dir_all(out).with_context(|| {
+        format!(
+            "{}: found no folder and cannot make one, expected a place to write to; give another --out",
+            out.display()
+        )
+    })?;
+    let planned: Vec<Planned> = WRITTEN.iter().map(|(file, _)| Planned::new(out.join(file))).collect();
+    let earlier = WRITTEN.iter().all(|(file, _)| out.join(file).exists());
+    arguments.overwrite.or(earlier).plan(&[], &planned)
 }
 
 /// Whether samples and fits through the f32 core are those of the reference; both are printed.

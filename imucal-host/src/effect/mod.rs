@@ -68,6 +68,7 @@ mod unit_error;
 mod vibration_rectification;
 mod warmup;
 mod wobble;
+mod words;
 
 use SensorKind::{Acc, Gyr, Mag};
 
@@ -77,6 +78,7 @@ pub use self::{
     part::{Free, Needs, Part, Spoils},
     sensor_run::{DataRun, SensorRun, SignalRun},
     truth::{Input, Truth},
+    words::{Confusable, Words},
 };
 
 /// Where in the chain an effect acts. The order is that of the chain.
@@ -127,26 +129,6 @@ impl Act {
             Self::Data(..) => Stage::Data,
         }
     }
-}
-
-/// Another effect that looks alike.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Confusable {
-    /// Its id.
-    pub id: String,
-    /// The experiment that parts the two.
-    pub parted_by: &'static str,
-}
-
-/// What an effect is, in words.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Words {
-    /// What causes it.
-    pub cause: &'static str,
-    /// What to do about it.
-    pub remedy: &'static str,
-    /// What a recording must hold to show it.
-    pub needs: &'static str,
 }
 
 /// One entry of the catalogue.

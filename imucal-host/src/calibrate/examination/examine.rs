@@ -23,7 +23,12 @@ use imucal_core::{
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{
-    gyr_residual, gyr_residual::Rates, norm_residual, norm_residual::Columns, residual_driver::Course,
+    gyr_residual,
+    gyr_residual::Rates,
+    norm_residual,
+    norm_residual::Columns,
+    residual_driver::Course,
+    tested::{Tested, judged},
     turning_rest::Turning,
 };
 use crate::{
@@ -32,7 +37,7 @@ use crate::{
             rows::Rows,
             score_test::{Score, ScoreTest, upper_tail},
         },
-        outcome::{Calibration, Evidence, FitSummary, KnownTurn, SensorOutcome, entry_name},
+        outcome::{Calibration, Evidence, FitSummary, KnownTurn, SensorOutcome},
         suspicion::{Follows, Status, Suspicion},
     },
     observe::{held, rest_halves},
@@ -381,54 +386,4 @@ struct Shell<'a> {
 fn entry_of(gain: &Matrix3<f64>, bias: &Vector3<f64>, entry: u8) -> f64 {
     let entry = usize::from(entry);
     if entry < 9 { gain[(entry / 3, entry % 3)] } else { bias[entry - 9] }
-}
-
-/// A test and what it came to.
-struct Tested {
-    follows: Follows,
-    name: String,
-    score: Score,
-}
-
-impl Tested {
-    fn of(columns: &Columns, score: Score) -> Self {
-        Self { follows: columns.follows, name: columns.name.clone(), score }
-    }
-
-    /// The entry that would move furthest, by how much, and in standard errors.
-    fn furthest(&self, entries: &[u8], std: &[f64]) -> Option<(u8, f64, f64)> {
-        let moved = self.score.shift.iter().zip(std).zip(entries);
-        moved
-            .filter(|((_, std), _)| **std > 0.0)
-            .map(|((shift, std), entry)| (*entry, *shift, shift.abs() / (std * self.score.tighter)))
-            .max_by(|a, b| a.2.total_cmp(&b.2))
-    }
-}
-
-/// Of each thing that is followed, the test that chance passes least, where it is material.
-fn judged(mut tests: Vec<Tested>, entries: &[u8], std: &[f64]) -> Vec<Suspicion> {
-    let count = tests.len() as f64;
-    tests.sort_by(|a, b| a.score.p.total_cmp(&b.score.p));
-    let mut found: Vec<Suspicion> = Vec::new();
-    for test in tests {
-        let chance = test.score.p * count;
-        let Some((entry, shift, errors)) = test.furthest(entries, std) else { continue };
-        if chance >= CHANCE || errors < MATERIAL || found.iter().any(|s| s.follows == test.follows) {
-            continue;
-        }
-        found.push(Suspicion {
-            follows: test.follows,
-            detail: format!(
-                "its residual follows {} (p = {:.0e}), which explains {:.0} % of the residual's square; \
-                 with it {} would change by {:.2e}, {:.0} standard errors",
-                test.name,
-                chance.max(1e-99),
-                100.0 * test.score.explained,
-                entry_name(entry),
-                shift,
-                errors
-            ),
-        });
-    }
-    found
 }

@@ -11,4 +11,5 @@ pub mod examine;
 pub mod gyr_residual;
 pub mod norm_residual;
 pub mod residual_driver;
+mod tested;
 pub mod turning_rest;

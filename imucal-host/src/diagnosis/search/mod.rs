@@ -10,6 +10,7 @@
 //! | [`refit`] | Gauss–Newton through the simulator: baseline and a set together |
 //! | [`staged_start`] | a start for it, sensor by sensor |
 //! | [`linearisation`] | the problem linearised about a fit |
+//! | [`score`] | evidence of a set, axis by axis and jointly |
 //! | [`memo`] | results that are asked for again |
 //! | [`neighbours`] | sets one addition, removal or exchange away |
 //! | [`stepwise`] | the search: neighbours are screened and scored until none is better |
@@ -21,5 +22,6 @@ pub mod linearisation;
 pub mod memo;
 pub mod neighbours;
 pub mod refit;
+pub mod score;
 pub mod staged_start;
 pub mod stepwise;
