@@ -11,7 +11,7 @@ pub const FORMAT: &str = "imucal-diagnosis/1";
 pub enum Verdict {
     /// A gap, and effects that explain it.
     Explained,
-    /// Explained by one of several effects that this recording cannot tell apart.
+    /// Explained by one of several effects that this recording cannot distinguish.
     Ambiguous,
     /// Effects explain a part; a material remainder is located, its cause unknown.
     Partly,
@@ -99,7 +99,7 @@ pub struct Cause {
     pub effect: String,
     /// Probability among the effects that could stand in its place.
     pub probability: f64,
-    /// Effects that this recording cannot tell from it, likeliest first.
+    /// Effects that this recording cannot distinguish from it, likeliest first.
     pub equivalents: Vec<String>,
     /// Its parameters.
     pub parameters: Vec<Amount>,

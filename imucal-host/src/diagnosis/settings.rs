@@ -54,7 +54,7 @@ pub struct Settings {
 pub struct Provided {
     /// Angles of three gimbals.
     pub gimbals: bool,
-    /// Something outside of the sensor turns with it, whose own errors can be told from the sensor's.
+    /// Something outside of the sensor turns with it, whose own errors can be distinguished from the sensor's.
     pub table: bool,
     /// A clock of its own, whose offset from the sensor's is always fitted.
     pub clock: bool,

@@ -31,7 +31,7 @@ pub struct Setting<'a> {
     pub calibrated: &'a [SensorKind],
     /// What the source of the movement provides.
     pub provided: Provided,
-    /// The site tells the field.
+    /// The site gives the field.
     pub field_known: bool,
 }
 

@@ -87,7 +87,7 @@ impl Projected {
             for effect in 0..effects.len() {
                 let (own, others): (Vec<usize>, Vec<usize>) =
                     (0..places.len()).partition(|at| owner[*at] == effect);
-                let Some((beside, given)) = all.given(&own, &others, &usual) else {
+                let Some((marginal, given)) = all.given(&own, &others, &usual) else {
                     return f64::NEG_INFINITY;
                 };
                 let sized = given.sized();
@@ -95,7 +95,7 @@ impl Projected {
                 own.iter().enumerate().for_each(|(k, at)| usual[*at] = best.size(k));
                 priors[effect] = best.prior;
                 breadth += sized.iter().map(|sized| (sized.value - best.value).exp()).sum::<f64>().ln();
-                log_sum = beside + best.value - best.prior + priors.iter().sum::<f64>() + breadth;
+                log_sum = marginal + best.value - best.prior + priors.iter().sum::<f64>() + breadth;
             }
         }
         if log_sum.is_nan() { f64::NEG_INFINITY } else { log_sum }
@@ -177,13 +177,13 @@ impl Columns {
         let solved = factor.solve(&scaled_score);
         let mut across = pick(&acting, own);
         across.row_iter_mut().zip(sizes.iter()).for_each(|(mut row, size)| row *= *size);
-        let beside = 0.5 * (scaled_score.dot(&solved) - factor.ln_determinant());
+        let marginal = 0.5 * (scaled_score.dot(&solved) - factor.ln_determinant());
         let given = Self {
             score: score(own) - across.tr_mul(&solved),
             information: pick(own, own) - across.tr_mul(&factor.solve(&across)),
         };
         // Eigenvalues are sought for without an end in numbers that are none.
-        given.information.iter().all(|value| value.is_finite()).then_some((beside, given))
+        given.information.iter().all(|value| value.is_finite()).then_some((marginal, given))
     }
 
     /// ln BF of each size that an effect of these columns may have.
@@ -254,7 +254,7 @@ mod tests {
         let x = DMatrix::from_fn(12, 5, |i, j| (0.7 * (i * (j + 1)) as f64 + j as f64).sin());
         let all = Columns { score: DVector::from_fn(5, |i, _| 3.0 - i as f64), information: x.tr_mul(&x) };
         let usual = DVector::from_vec(vec![0.3, 0.0, 1.0, 0.3, 1.0]);
-        let (beside, given) = all.given(&[1, 4], &[0, 2, 3], &usual).unwrap();
+        let (marginal, given) = all.given(&[1, 4], &[0, 2, 3], &usual).unwrap();
         for sized in given.sized() {
             let mut sizes = usual.clone();
             (sizes[1], sizes[4]) = (sized.size(0), sized.size(1));
@@ -263,7 +263,7 @@ mod tests {
             let scaled = &scales * &all.score;
             let explained = scaled.dot(&(grown.clone().try_inverse().unwrap() * &scaled));
             let expected = 0.5 * (explained - grown.determinant().ln());
-            assert!((beside + sized.value - sized.prior - expected).abs() < 1e-9);
+            assert!((marginal + sized.value - sized.prior - expected).abs() < 1e-9);
         }
     }
 }

@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Scans the shapes of candidates. Signatures are those about the fit it was made with: what is fitted later changes where
-/// they lie in the second order only, and they are taken anew where their size counts.
+/// they lie in the second order only, and they are computed again where their size counts.
 #[derive(Clone)]
 pub struct Grid<'s> {
     scene: &'s ForwardModel<'s>,
@@ -27,7 +27,7 @@ pub struct Grid<'s> {
     coarse: Arc<Reference<'s>>,
 }
 
-/// What candidates are shaped beside.
+/// What is fitted while candidates are shaped.
 pub struct NuisanceColumns<'a> {
     /// Effects that have their shapes.
     pub doses: &'a [Dose],
@@ -50,20 +50,20 @@ impl<'s> Grid<'s> {
     }
 
     /// The shape of each candidate that is best under a noise; that of the doses for those they hold, as widely `spread`
-    /// as it was when it was found, and what `kept` tells of others.
+    /// as it was when it was found, and what `kept` holds of others.
     pub fn shapes(
         &self,
-        beside: &NuisanceColumns<'_>,
+        nuisance: &NuisanceColumns<'_>,
         noise: &Noise,
         spread: &(dyn Fn(usize) -> f64 + Sync),
         kept: &(dyn Fn(usize) -> Option<GridPosterior> + Sync),
     ) -> Result<Vec<GridPosterior>, DiagnosisError> {
-        let (scene, design) = (self.scene, beside.design);
-        let precisions = beside.weighing.precisions(design, noise);
-        let in_quiet = || beside.weighing.precisions(design, &noise.quieter().even());
+        let (scene, design) = (self.scene, nuisance.design);
+        let precisions = nuisance.weighing.precisions(design, noise);
+        let in_quiet = || nuisance.weighing.precisions(design, &noise.quieter().even());
         let quiet = scene.settings.library.places_in_quiet_noise.then(in_quiet);
-        let backdrop = Backdrop::new(scene, design, beside.fitted, &precisions);
-        let quiet = quiet.as_ref().map(|quiet| Backdrop::new(scene, design, beside.fitted, quiet));
+        let backdrop = Backdrop::new(scene, design, nuisance.fitted, &precisions);
+        let quiet = quiet.as_ref().map(|quiet| Backdrop::new(scene, design, nuisance.fitted, quiet));
         let best = |effect: &'static Effect| match quiet.as_ref().filter(|_| nonlinear::is_episode(effect)) {
             Some(quiet) => {
                 let best = nonlinear::best(effect, &self.coarse, quiet)?;
@@ -73,7 +73,7 @@ impl<'s> Grid<'s> {
             None => nonlinear::best(effect, &self.coarse, &backdrop),
         };
         let shape = |(at, effect): (usize, &&'static Effect)| {
-            let held = beside.doses.iter().find(|dose| dose.effect == *effect);
+            let held = nuisance.doses.iter().find(|dose| dose.effect == *effect);
             let held = held.map(|dose| GridPosterior { values: dose.values.clone(), spread: spread(at) });
             match held.or_else(|| kept(at)) {
                 Some(shape) => Ok(shape),

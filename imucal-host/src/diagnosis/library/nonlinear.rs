@@ -23,7 +23,7 @@ use crate::{
 
 /// About the best instants, a menu this many times as dense.
 const CLOSER: i32 = 8;
-/// Factors of a usual duration that are scanned beside an instant; about the best of those, further ones, two of which
+/// Factors of a usual duration that are scanned with an instant; about the best of those, further ones, two of which
 /// are as far apart.
 const BROAD: [f64; 2] = [0.7, 2.0];
 const DURATIONS: [f64; 3] = [0.6, 1.0, 1.7];
@@ -295,7 +295,7 @@ fn pairs(
     })
 }
 
-/// Improves a shape by steps that are halved, and tells how far each parameter may move before the evidence falls by a
+/// Improves a shape by steps that are halved, and finds how far each parameter may move before the evidence falls by a
 /// half: its standard error. Both in the order of the effect's parameters; zero for amplitudes.
 pub fn refine(
     effect: &'static Effect,

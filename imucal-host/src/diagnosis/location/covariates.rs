@@ -1,7 +1,7 @@
 //! What a gap may follow: gimbal angles, rates, temperature, time.
 //!
 //! A driver is a handful of functions of the block, and each axis of a sensor may follow each of them in its own way.
-//! Broader and weaker than an effect: drivers tell where a gap lies, and that something is left when no effect says
+//! Broader and weaker than an effect: drivers show where a gap lies, and that something is left when no effect says
 //! what.
 
 use std::f64::consts::PI;

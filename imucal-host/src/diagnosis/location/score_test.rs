@@ -66,7 +66,7 @@ pub fn following(
 }
 
 /// As [`following`], but what would show in a quieter noise is judged again by its evidence, with a noise estimated
-/// beside it: a gap that nothing explains has been taken for drift or scatter. The odds of noise alone are a bound of the
+/// with it: a gap that nothing explains has been taken for drift or scatter. The odds of noise alone are a bound of the
 /// probability that noise would do as much.
 pub fn score_tests_refitted(
     linear: &Linearisation<'_>,
@@ -104,7 +104,7 @@ pub fn score_tests_refitted(
     Ok(found)
 }
 
-/// A driver, chosen among so many, beside a set, by the evidence that it adds with a noise of its own.
+/// A driver, chosen among so many, in addition to a set, by the evidence that it adds with a noise of its own.
 fn judged(
     linear: &Linearisation<'_>,
     set: &[&'static Effect],
@@ -122,11 +122,12 @@ fn judged(
     let products = linear.weighing.products(&design, noise, &every).with_others(others);
     let alone = noise.normal(&products.picked(None, &every[..fitted]), fitted);
     let before = log_evidence(&alone, noise, linear.baseline.len(), &groups)?;
-    let mut anew = noise.clone();
-    anew.sensors[kind as usize] = linear.weighing.fit(&products, kind, &every, noise, &NEAR);
-    let normal = anew.normal(&products, design.size);
+    let mut refitted = noise.clone();
+    refitted.sensors[kind as usize] = linear.weighing.fit(&products, kind, &every, noise, &NEAR);
+    let normal = refitted.normal(&products, design.size);
     groups.push(every[fitted..].to_vec());
-    let gain = log_evidence(&normal, &anew, linear.baseline.len(), &groups)? - before - (choices as f64).ln();
+    let gain =
+        log_evidence(&normal, &refitted, linear.baseline.len(), &groups)? - before - (choices as f64).ln();
     let gain = if driver.name == TIME { gain - linear.scene.settings.location.time_gain } else { gain };
     let projected = Projected::new(&normal, &every[..fitted], &every[fitted..])?;
     let following = follow(linear.scene, kind, driver, &projected)?;
@@ -138,7 +139,7 @@ fn sort(found: &mut [Following]) {
 }
 
 impl Following {
-    /// Its driver is as slow as drift, which an estimate of the noise cannot tell from it.
+    /// Its driver is as slow as drift, which an estimate of the noise cannot distinguish from it.
     fn is_slow(&self) -> bool {
         self.driver == TIME || self.driver.starts_with("temperature")
     }
@@ -262,7 +263,7 @@ mod tests {
         let expected = left(&dense, 2) - left(&dense, 3);
         let (statistic, rank) = score_test(&projected, &[0]);
         assert!((statistic - expected).abs() < 1e-6 * expected && rank == 1, "{statistic} {expected}");
-        // The same covariate twice tells nothing more.
+        // The same covariate twice adds nothing.
         let (twice, rank) = score_test(&projected, &[0, 1]);
         assert!((twice - expected).abs() < 1e-6 * expected && rank == 1, "{twice} {expected}");
     }

@@ -152,7 +152,7 @@ impl Normal {
         }
     }
 
-    /// Adds a channel's; `ids` tells where its columns stand.
+    /// Adds a channel's; `ids` are the places of its columns.
     pub fn add(&mut self, part: &Self, ids: &[usize]) {
         for (i, row) in ids.iter().enumerate() {
             self.score[*row] += part.score[i];
@@ -372,7 +372,7 @@ mod tests {
         let (large, rounded) = (2e7, 1e-7);
         let twins = DMatrix::from_row_slice(2, 2, &[large, large, large, large - rounded]);
         let factor = loosened(twins).expect("of real columns");
-        // Together they are told as well as one of them alone.
+        // Together they are determined as well as one of them alone.
         let sum = factor.solve(&DVector::from_element(2, large)).sum();
         assert!((sum - 1.0).abs() < 1e-9, "{sum}");
         assert!(loosened(DMatrix::from_diagonal_element(1, 1, -1.0)).is_none());

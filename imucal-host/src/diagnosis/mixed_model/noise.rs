@@ -63,7 +63,7 @@ pub struct SensorNoise {
     pub drift: [f64; 2],
     /// Correlation time of the slow drift, s.
     pub slow: f64,
-    /// Angle by which the table stands off its encoders, anew at each rest, rad.
+    /// Angle between the table and what its encoders show, another at each rest, standard deviation, rad.
     pub scatter: f64,
     /// ln of how many noises about this one are as likely.
     pub breadth: f64,
@@ -234,8 +234,8 @@ impl<'s> Weighing<'s> {
         let counts = &self.scene.counts[channel.kind as usize];
         let weight = |(at, (block, count)): (usize, (&Block, &usize))| {
             let sigma = if block.rest.is_some() { sensor.white } else { sensor.moving }[channel.axis];
-            let told = inside(at) && self.scene.tells(channel.kind, at, channel.axis);
-            if told { *count as f64 / (sigma * sigma) } else { 0.0 }
+            let measured = inside(at) && self.scene.measures(channel.kind, at, channel.axis);
+            if measured { *count as f64 / (sigma * sigma) } else { 0.0 }
         };
         self.scene.blocks.iter().zip(counts).enumerate().map(weight).collect()
     }
@@ -268,8 +268,8 @@ impl<'s> Weighing<'s> {
         let (best, least) = ends[0];
         let mut breadth = log_sum(least, ends.iter().map(|(_, end)| *end));
         for coordinate in self.coordinates(kind) {
-            let beside = [NEAR[0], 1.0 / NEAR[0]].into_iter();
-            let tried = beside.filter_map(|factor| self.scaled(best, coordinate, factor));
+            let near = [NEAR[0], 1.0 / NEAR[0]].into_iter();
+            let tried = near.filter_map(|factor| self.scaled(best, coordinate, factor));
             breadth += log_sum(least, tried.map(|tried| likelihood(&tried)).chain([least]));
         }
         SensorNoise { breadth, ..best }

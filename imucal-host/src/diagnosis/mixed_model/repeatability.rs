@@ -7,11 +7,11 @@
 //! | symbol | meaning |
 //! | --- | --- |
 //! | v | what the sensor is given at rest, mean output |
-//! | e_g | three directions at right angles: at rest nothing tells one turn from another on a single axis |
+//! | e_g | three directions at right angles: at rest a single axis cannot distinguish one turn from another |
 //! | σ | scatter, rad |
 //!
 //! A gimbal does not come to rest where its encoder says, and takes some of that along until it rests again. Axis by axis:
-//! that all sensors stand off together, and that a stretch begins where the last one ended, is told by
+//! that the error turns all sensors together, and that a stretch begins where the last one ended, is modelled by
 //! `shared_offsets`. Not modelled: that the gyroscope sees it change.
 
 use crate::noise::sparse_rows::SparseRows;

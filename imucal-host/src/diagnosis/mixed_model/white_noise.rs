@@ -16,7 +16,7 @@ use crate::{
 const PIECE: f64 = 0.1;
 
 impl Weighing<'_> {
-    /// Noise from what samples do within a tenth of a second, and drift yet to be told.
+    /// Noise from what samples do within a tenth of a second, and a first guess of the drift.
     pub fn white(&self, residual: &Means) -> Noise {
         let scatter = 100.0 * self.least_scatter();
         let sensors = SensorKind::ALL.map(|kind| {
@@ -72,7 +72,7 @@ impl Weighing<'_> {
         })
     }
 
-    /// Squared second differences of neighbouring groups of blocks, as variances of one sample; `alike` tells whether a
+    /// Squared second differences of neighbouring groups of blocks, as variances of one sample; `alike` says whether a
     /// block belongs to groups that begin with another.
     fn bends(
         &self,

@@ -2,7 +2,7 @@
 //!
 //! | goes in | comes out |
 //! | --- | --- |
-//! | a recording with encoders (`gimbal_*`), a reference attitude (`ref_q*`) or neither; a calibration made elsewhere | a movement that tells the truth at any instant; the triads that the simulator starts from, with their standard errors |
+//! | a recording with encoders (`gimbal_*`), a reference attitude (`ref_q*`) or neither; a calibration made elsewhere | a movement that gives the truth at any instant; the triads that the simulator starts from, with their standard errors |
 //!
 //! | file | what |
 //! | --- | --- |

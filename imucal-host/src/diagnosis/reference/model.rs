@@ -77,8 +77,8 @@ fn errors(kind: SensorKind, stored: &StoredTriad, nominal: Nominal) -> (Matrix3<
     (gain, Vector3::from(stored.bias_std).map(std) / nominal.per_unit)
 }
 
-/// By how much a standard error is larger since the noise was told by few residuals: √(ν/(ν − 2)), the standard deviation
-/// of Student's t; with two degrees of freedom or fewer it tells nothing.
+/// By how much a standard error is larger since the noise was estimated from few residuals: √(ν/(ν − 2)), the standard deviation
+/// of Student's t; with two degrees of freedom or fewer it says nothing.
 fn unsure(kind: SensorKind, stored: &StoredTriad) -> f64 {
     // A motion turns about three axes; a rest's or a sample's norm is one number.
     let equations = f64::from(stored.observations) * if kind == SensorKind::Gyr { 3.0 } else { 1.0 };
@@ -133,7 +133,7 @@ mod tests {
         let eight = of(17, SensorKind::Acc);
         assert!((eight - Vector3::new(0.5, 0.0, 0.2) * (8.0f64 / 6.0).sqrt()).norm() < 1e-12, "{eight}");
         assert_eq!(of(11, SensorKind::Acc), Vector3::new(f64::INFINITY, 0.0, f64::INFINITY));
-        // A motion tells three numbers.
+        // A motion gives three numbers.
         assert!(of(11, SensorKind::Gyr).x < 0.53);
     }
 

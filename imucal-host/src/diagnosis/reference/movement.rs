@@ -84,9 +84,9 @@ pub fn reference(
             })
         }
         (None, None) => {
-            let told = RestToRest::new(recording, integrity, model, temperature, place)?;
-            held = Some(told.clone());
-            Box::new(told)
+            let rests = RestToRest::new(recording, integrity, model, temperature, place)?;
+            held = Some(rests.clone());
+            Box::new(rests)
         }
     };
     let length = movement.duration() - recording.time.first().copied().unwrap_or(0.0);

@@ -1,6 +1,6 @@
-//! The movement of a hand, as the sensors themselves tell it.
+//! The movement of a hand, as the sensors themselves show it.
 //!
-//! At rest the accelerometer tells the direction of gravity; between two rests the gyroscope tells the turn, and where it
+//! At rest the accelerometer gives the direction of gravity; between two rests the gyroscope gives the turn, and where it
 //! misses the next direction, the miss is spread over the turn. The table's axes are those in which the accelerometer
 //! responds without a rotation:
 //!
@@ -8,7 +8,7 @@
 //! K = S R      S symmetric, R a rotation;      f_t = R · gain · (raw − bias)
 //! ```
 //!
-//! Heading is not told, so that Earth's rotation stays out of the movement: it is below what a hand's turns show.
+//! Heading is not known, so that Earth's rotation stays out of the movement: it is below what a hand's turns show.
 
 use std::ops::Range;
 
@@ -32,7 +32,7 @@ use crate::{
     simulator::{Motion, Place, Recorded, Tracked, recent::Recent},
 };
 
-/// Fewer rests than this do not tell an effect from the attitudes' own freedom.
+/// Fewer rests than this cannot distinguish an effect from the attitudes' own freedom.
 const LEAST: usize = 8;
 /// A turn begins so long before its first rest ends and ends so long after its second has begun, s.
 const MARGIN: f64 = 0.25;
@@ -47,7 +47,7 @@ pub struct RestToRest {
     pub rests: Vec<Range<usize>>,
     /// Attitude of each, table to a base with its third axis down.
     pub attitudes: Vec<Matrix3<f64>>,
-    /// The turn to each from the one before is told by the gyroscope.
+    /// The turn to each from the one before is known from the gyroscope.
     pub turned: Vec<bool>,
     /// Accelerometer and gyroscope, nominal SI to SI in the table's axes.
     pub triads: [Triad<f64>; 2],
@@ -262,7 +262,7 @@ impl Path {
         along: &Vector3<f64>,
     ) {
         let Some(start) = self.at_rest.last().copied() else { return };
-        let told = turn.is_some();
+        let known = turn.is_some();
         let ends = [before.end - 1, rows.start];
         let turn = turn.unwrap_or_else(|| ends.map(|row| (row, Matrix3::identity())).to_vec());
         let Some((_, whole)) = turn.last().copied() else { return };
@@ -278,7 +278,7 @@ impl Path {
             self.attitudes[row] = Some(start * relative * exp(&(miss * share)));
         }
         self.at_rest.push(end);
-        self.turned.push(told);
+        self.turned.push(known);
     }
 }
 

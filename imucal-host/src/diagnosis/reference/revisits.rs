@@ -1,4 +1,4 @@
-//! Attitudes that are held more than once: without them nothing tells how well a rest repeats.
+//! Attitudes that are held more than once: without them nothing shows how well a rest repeats.
 
 use nalgebra::{Matrix3, Rotation3};
 

@@ -25,7 +25,7 @@ const STEP: (f64, f64, f64) = (0.1, 0.02, 0.25);
 
 /// A simulated run at the nodes, to be differentiated.
 pub struct Reference<'s> {
-    /// What is simulated beside.
+    /// The problem that is simulated.
     pub scene: &'s ForwardModel<'s>,
     nodes: &'s SamplePoints,
     /// Effects of the run, the baseline among them.

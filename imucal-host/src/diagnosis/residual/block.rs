@@ -34,7 +34,7 @@ pub fn cut_at_most(time: &[f64], moves: &[bool], interval: f64, by: &ResidualSet
     cut(time, moves, interval, &ResidualSettings { moving_block, resting_block, ..by.clone() })
 }
 
-/// Cuts rows into blocks; `moves` tells where a gimbal does. `interval` is the usual one between rows, s; a gap of more than five of them ends a block.
+/// Cuts rows into blocks; `moves` says where a gimbal does. `interval` is the usual one between rows, s; a gap of more than five of them ends a block.
 pub fn cut(time: &[f64], moves: &[bool], interval: f64, by: &ResidualSettings) -> Vec<Block> {
     let mut blocks: Vec<Block> = Vec::new();
     let (mut from, mut rest, mut rest_from) = (0, 0, 0.0);

@@ -1,4 +1,4 @@
-//! A recording beside the simulator's account of it: residuals, and what each parameter would change.
+//! A recording against what the simulator makes of its movement: residuals, and what each parameter would change.
 //!
 //! Residuals are means over blocks of recorded less simulated samples, at the recording's full rate. A signature is the
 //! simulator's own derivative, from a run at nodes a few rows apart, since it need not hold what a residual must.
@@ -25,7 +25,7 @@ use crate::{
 /// What sensors put out, row by row.
 type Outputs = Vec<(SensorKind, Vec<Vector3<f64>>)>;
 
-/// What is simulated beside a recording.
+/// What is simulated for a recording.
 pub struct ForwardModel<'a> {
     /// Settings of the diagnosis.
     pub settings: &'a Settings,
@@ -55,7 +55,7 @@ pub struct ForwardModel<'a> {
 }
 
 impl<'a> ForwardModel<'a> {
-    /// Beside `recording`, the rows of each sensor that are to be used, a movement, and the triads that the simulator starts from, by [`SensorKind::ALL`].
+    /// For `recording`, the rows of each sensor that are to be used, a movement, and the triads that the simulator starts from, by [`SensorKind::ALL`].
     pub fn new(
         recording: &'a Recording,
         usable: [Vec<bool>; 3],
@@ -146,14 +146,14 @@ impl<'a> ForwardModel<'a> {
         self.settings.residual.coupled.unwrap_or(effect.sensors)
     }
 
-    /// The movement is told at a row.
+    /// The movement is known at a row.
     pub fn is_known(&self, row: usize) -> bool {
         self.motion.known().get(row).copied().unwrap_or(false)
     }
 
-    /// A block tells something on an axis of a sensor.
-    pub fn tells(&self, kind: SensorKind, block: usize, axis: usize) -> bool {
-        self.view.as_ref().is_none_or(|view| view.tells(kind, block, axis))
+    /// A block measures something on an axis of a sensor.
+    pub fn measures(&self, kind: SensorKind, block: usize, axis: usize) -> bool {
+        self.view.as_ref().is_none_or(|view| view.measures(kind, block, axis))
     }
 
     /// What an axis of a sensor is, in a table.

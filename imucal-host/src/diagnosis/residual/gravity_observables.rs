@@ -1,4 +1,4 @@
-//! What is looked at of block means where rests alone tell the attitude: a row a rest.
+//! What is looked at of block means where rests alone give the attitude: a row a rest.
 //!
 //! | sensor | component | meaning |
 //! | --- | --- | --- |
@@ -40,7 +40,7 @@ struct Rest {
     /// Direction of the specific force, table.
     along: Vector3<f64>,
     across: [Vector3<f64>; 2],
-    /// From the table's axes at the rest before to those at this one; `None` where no turn is told.
+    /// From the table's axes at the rest before to those at this one; `None` where no turn is known.
     from_before: Option<Matrix3<f64>>,
     /// Blocks of the turn: axes there to those at this rest, length in time, s, share of the way.
     turn: Vec<(usize, Matrix3<f64>, f64, f64)>,
@@ -175,8 +175,8 @@ impl GravityObservables {
         self.rests.iter().map(rest).chain([Vector3::zeros()]).collect()
     }
 
-    /// A row tells something on an axis.
-    pub fn tells(&self, kind: SensorKind, block: usize, axis: usize) -> bool {
+    /// A row measures something on an axis.
+    pub fn measures(&self, kind: SensorKind, block: usize, axis: usize) -> bool {
         let turned = |rest: &Rest| rest.from_before.is_some();
         kind != SensorKind::Acc || axis == 0 || self.rests.get(block).is_none_or(turned)
     }

@@ -11,7 +11,7 @@
 //! | [`forward_model`] | data and simulator side by side |
 //! | [`base_run`] | a simulated run and its derivatives by difference quotients |
 //! | [`gimbal_derivatives`] | what a radian of a gimbal's offset changes |
-//! | [`gravity_observables`] | what rests and turns of a hand tell whatever the heading was |
+//! | [`gravity_observables`] | what rests and turns of a hand show whatever the heading was |
 //! | [`transient`] | blocks in which a magnet is brought near or taken away are left out |
 //!
 //! Not done here: nothing is estimated; noise is weighed in `mixed_model`.

@@ -14,18 +14,18 @@ pub struct SamplePoints {
 }
 
 impl SamplePoints {
-    /// So many rows of each block, evenly over it, of those where the movement is told.
+    /// So many rows of each block, evenly over it, of those where the movement is known.
     pub fn choose(
         time: &[f64],
         blocks: &[Block],
         count: impl Fn(&Block) -> usize,
-        told: impl Fn(usize) -> bool,
+        known: impl Fn(usize) -> bool,
     ) -> Self {
         let mut nodes = Self::default();
         for (index, block) in blocks.iter().enumerate() {
             let (rows, count) = (block.rows.len(), count(block).max(1));
             let evenly = (0..count).map(|k| block.rows.start + (2 * k + 1) * rows / (2 * count));
-            for row in evenly.filter(|row| told(*row)) {
+            for row in evenly.filter(|row| known(*row)) {
                 nodes.times.push(time[row]);
                 nodes.blocks.push(index);
             }

@@ -1,7 +1,7 @@
 //! Blocks in which something is brought near a sensor or taken away: a magnet, by a hand.
 //!
 //! At rest samples then scatter far beyond their noise; and what the simulator leaves changes within half a second by far
-//! more than it usually does, at rest or in motion. The mean of such a block is no more than that of a passage, and tells
+//! more than it usually does, at rest or in motion. The mean of such a block is no more than that of a passage, and shows
 //! nothing that a step or an episode could be held to. A rig's own movement brings nothing near.
 
 use nalgebra::Vector3;
@@ -26,35 +26,35 @@ pub fn leave_out_passages(
     counts: &mut [Vec<usize>; 3],
 ) {
     for (values, counts) in residual.iter().zip(counts).filter_map(|(v, c)| Some((v.as_ref()?, c))) {
-        let told: Vec<usize> = (0..blocks.len()).filter(|k| counts[*k] > 0).collect();
-        let abrupt = abrupt(values, blocks, &told, by.passage_change);
-        let time = |at: usize| blocks[told[at]].time;
-        abrupt.iter().for_each(|at| counts[told[*at]] = 0);
+        let measured: Vec<usize> = (0..blocks.len()).filter(|k| counts[*k] > 0).collect();
+        let abrupt = abrupt(values, blocks, &measured, by.passage_change);
+        let time = |at: usize| blocks[measured[at]].time;
+        abrupt.iter().for_each(|at| counts[measured[*at]] = 0);
         for stop in abrupt.windows(2).filter(|pair| time(pair[1]) - time(pair[0]) <= STOP) {
-            told[stop[0]..stop[1]].iter().for_each(|block| counts[*block] = 0);
+            measured[stop[0]..stop[1]].iter().for_each(|block| counts[*block] = 0);
         }
     }
 }
 
-/// Places among the blocks `told` of those about which a sensor's residual changes abruptly, in their order.
-fn abrupt(values: &[Vector3<f64>], blocks: &[Block], told: &[usize], usual_times: f64) -> Vec<usize> {
+/// Places among the blocks `measured` of those about which a sensor's residual changes abruptly, in their order.
+fn abrupt(values: &[Vector3<f64>], blocks: &[Block], measured: &[usize], usual_times: f64) -> Vec<usize> {
     let change = |at: usize| -> f64 {
-        let time = blocks[told[at]].time;
-        let before = told[..at].iter().rev().take_while(|k| time - blocks[**k].time <= PASSAGE).last();
-        let after = told[at..].iter().take_while(|k| blocks[**k].time - time <= PASSAGE).last();
-        let (before, after) = (before.unwrap_or(&told[at]), after.unwrap_or(&told[at]));
+        let time = blocks[measured[at]].time;
+        let before = measured[..at].iter().rev().take_while(|k| time - blocks[**k].time <= PASSAGE).last();
+        let after = measured[at..].iter().take_while(|k| blocks[**k].time - time <= PASSAGE).last();
+        let (before, after) = (before.unwrap_or(&measured[at]), after.unwrap_or(&measured[at]));
         (values[*after] - values[*before]).norm()
     };
-    let changes: Vec<f64> = (0..told.len()).map(change).collect();
-    let rests = |at: &usize| blocks[told[*at]].rest.is_some();
+    let changes: Vec<f64> = (0..measured.len()).map(change).collect();
+    let rests = |at: &usize| blocks[measured[*at]].rest.is_some();
     let usual = [false, true].map(|resting| {
         // A block with no other near has no change.
-        let alike = (0..told.len()).filter(|at| rests(at) == resting && changes[*at] > 0.0);
+        let alike = (0..measured.len()).filter(|at| rests(at) == resting && changes[*at] > 0.0);
         median(alike.map(|at| changes[at]).collect())
     });
     let is_abrupt =
         |at: &usize| usual[usize::from(rests(at))].is_some_and(|usual| changes[*at] > usual_times * usual);
-    (0..told.len()).filter(is_abrupt).collect()
+    (0..measured.len()).filter(is_abrupt).collect()
 }
 
 /// Takes the rows of such blocks out of `counts`, usable rows of each block by sensor.

@@ -83,7 +83,7 @@ pub struct Conventions {
 }
 
 /// Share of a sensor's variance that no gain and bias explain where the row of t shows the movement of t + `offset`, s;
-/// `None` where nothing tells.
+/// `None` where nothing shows it.
 pub fn unexplained(
     recording: &Recording,
     integrity: &Integrity,
@@ -106,7 +106,7 @@ fn truth(recording: &Recording, motion: &dyn Motion, rows: &[usize], offset: f64
     rows.iter().map(|row| motion.truth(recording.time[*row] + offset, &|_| ())).collect()
 }
 
-/// Checks a recording against a movement that was told from it or besides it.
+/// Checks a recording against a movement that was reconstructed from it or recorded with it.
 pub fn check(
     recording: &Recording,
     integrity: &Integrity,

@@ -29,13 +29,13 @@ use crate::{
 /// Samples closer to a limit than this many standard deviations of their noise are not used.
 const CLIPPED: f64 = 5.0;
 /// Samples so close in time to one beyond that are left out with it, s.
-const BESIDE: f64 = 0.5;
+const NEIGHBOURHOOD: f64 = 0.5;
 
 /// What a diagnosis stands on.
 pub struct Preparation {
     /// The recorded movement.
     pub movement: Box<dyn Recorded>,
-    /// The rests that it was told from, where neither a rig nor a reference tells it.
+    /// The rests that it was reconstructed from, where there is neither a rig nor a reference.
     pub held: Option<RestToRest>,
     /// What a reference was moved by in time to follow the samples, s: see [`reference_offset::coarse`].
     pub moved: f64,
@@ -178,8 +178,8 @@ fn leave_out_clipped(finding: &Finding, time: &[f64], triple: &Triple, usable: &
     let is_beyond = |(value, _): &(&Vector3<f64>, &f64)| value.amax() >= most;
     let beyond: Vec<f64> = triple.values.iter().zip(time).filter(is_beyond).map(|(_, time)| *time).collect();
     for (usable, time) in usable.iter_mut().zip(time) {
-        let next = beyond.partition_point(|beyond| *beyond < time - BESIDE);
-        *usable &= beyond.get(next).is_none_or(|beyond| *beyond > time + BESIDE);
+        let next = beyond.partition_point(|beyond| *beyond < time - NEIGHBOURHOOD);
+        *usable &= beyond.get(next).is_none_or(|beyond| *beyond > time + NEIGHBOURHOOD);
     }
 }
 

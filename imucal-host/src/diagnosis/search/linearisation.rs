@@ -45,7 +45,7 @@ pub struct Linearisation<'s> {
     /// Where each candidate's signature was taken.
     pub shapes: Vec<GridPosterior>,
     scan: Grid<'s>,
-    /// Effects of the fit beside the baseline.
+    /// Effects of the fit besides the baseline.
     held: Vec<Dose>,
     normals: Memo<Noise, Normal>,
     products: Memo<White, DesignProducts>,
@@ -102,7 +102,7 @@ impl<'s> Linearisation<'s> {
         };
         let alone = Self::alone(&reference, scan.clone(), scene, candidates, fit)?;
         let every: Vec<usize> = (0..alone.design.columns.len()).collect();
-        let beside = NuisanceColumns {
+        let nuisance = NuisanceColumns {
             doses: &fit.doses,
             weighing: &alone.weighing,
             design: &alone.design,
@@ -112,7 +112,7 @@ impl<'s> Linearisation<'s> {
         let known = |at: usize| before.and_then(|before| before.shapes.get(at));
         let spread = |at: usize| known(at).map_or(0.0, |shape| shape.spread);
         let kept = |at: usize| known(at).filter(|_| lasts(candidates.effects[at])).cloned();
-        let shapes = scan.shapes(&beside, noise, &spread, &kept)?;
+        let shapes = scan.shapes(&nuisance, noise, &spread, &kept)?;
         let (old, new): (Vec<&'static Effect>, Vec<&'static Effect>) = candidates
             .effects
             .iter()
@@ -181,7 +181,7 @@ impl<'s> Linearisation<'s> {
         let doses: Vec<Dose> = fit.doses.iter().filter(|dose| !is_taken(dose.effect)).cloned().collect();
         let fitted: Vec<usize> = doses.iter().flat_map(|dose| self.design.of(dose.effect)).collect();
         let (design, weighing) = (&self.design, &self.weighing);
-        let beside = NuisanceColumns { doses: &doses, weighing, design, fitted: &fitted };
+        let nuisance = NuisanceColumns { doses: &doses, weighing, design, fitted: &fitted };
         let meets = |effect: &Effect| {
             let reached = |kind| without.iter().any(|taken| self.scene.reach(taken).contains(kind));
             without.is_empty() || self.scene.reach(effect).iter().any(reached)
@@ -189,7 +189,7 @@ impl<'s> Linearisation<'s> {
         let spread = |at: usize| self.shapes[at].spread;
         let kept =
             |at: usize| Some(&self.shapes[at]).filter(|_| !meets(self.candidates.effects[at])).cloned();
-        let shapes = self.scan.shapes(&beside, noise, &spread, &kept).ok()?;
+        let shapes = self.scan.shapes(&nuisance, noise, &spread, &kept).ok()?;
         let others: Vec<&'static Effect> = self
             .candidates
             .effects
@@ -272,7 +272,7 @@ impl<'s> Linearisation<'s> {
         })
     }
 
-    /// Candidates by ln BF of a set with each of them added, best first; the set itself has the value returned beside.
+    /// Candidates by ln BF of a set with each of them added, best first; the first value is that of the set itself.
     pub fn ranked(&self, set: &[&'static Effect], noise: &Noise) -> Result<(f64, Ranked), DiagnosisError> {
         // Two of a class explain each other's noise and not the gap.
         let is_new = |effect: &&'static Effect| !set.iter().any(|own| class(&own.id) == class(&effect.id));
@@ -313,7 +313,7 @@ fn white(noise: &Noise) -> White {
     noise.sensors.map(|sensor| [sensor.white, sensor.moving])
 }
 
-/// The same effect with the same parameters beside its amplitudes.
+/// The same effect with the same parameters but for its amplitudes.
 fn has_same_shape(one: &Dose, other: &Dose) -> bool {
     let mut values = one.effect.parameters.iter().zip(one.values.iter().zip(&other.values));
     one.effect == other.effect && values.all(|(p, (a, b))| p.role == Role::Amplitude || a == b)

@@ -108,7 +108,11 @@ impl Linearisation<'_> {
 
     /// The best set with one effect replaced by another, or all those of a sensor by one or two, in the shapes that are
     /// best where the first ones are not: together they may be what two others do. With the problem of these shapes.
-    pub fn changed_anew(&self, fit: &Fit, from: &Scored) -> Result<Option<(Self, Scored)>, DiagnosisError> {
+    pub fn changed_with_new_shapes(
+        &self,
+        fit: &Fit,
+        from: &Scored,
+    ) -> Result<Option<(Self, Scored)>, DiagnosisError> {
         let mut best: Option<(Self, Scored)> = None;
         let mut better = |linear: Self, sets: Vec<Reaching>| {
             let found = linear.best_of(sets, from);
@@ -131,7 +135,7 @@ impl Linearisation<'_> {
         }
         for kind in &self.scene.kinds {
             let (taken, others): (Set, Set) = from.set.iter().partition(|effect| self.reaches(effect, *kind));
-            // A step that was placed in a drift which held the half of it is placed anew where little drifts.
+            // A step that was placed in a drift which held the half of it is placed again where little drifts.
             if (taken.len() > 1 || taken.iter().any(|effect| effect.is_shaped()))
                 && let Some(linear) = self.reshaped(fit, &from.noise.quieter(), &taken)
             {
@@ -161,9 +165,9 @@ impl Linearisation<'_> {
         Ok(others.take(self.settings().replaced).map(with).collect())
     }
 
-    /// The best of some sets that may do better than another, the noise of the sensors beside each estimated anew.
+    /// The best of some sets that may do better than another, with the noise of its sensors estimated again for each.
     fn best_of(&self, sets: Vec<Reaching>, from: &Scored) -> Option<Scored> {
-        let sift = |(set, anew): &Reaching| self.screen(set, &from.noise, anew, &NEAR);
+        let sift = |(set, reached): &Reaching| self.screen(set, &from.noise, reached, &NEAR);
         let sifted: Vec<Result<Screened, _>> = sets.par_iter().map(sift).collect();
         let is_near = |sifted: &Screened| sifted.value > from.sifted - self.settings().behind;
         let mut sifted: Vec<Screened> = sifted.into_iter().flatten().filter(is_near).collect();

@@ -21,15 +21,15 @@ use crate::{
 };
 
 impl Linearisation<'_> {
-    /// Noise and evidence of a set; the noise is estimated anew for the sensors that `anew` reaches.
+    /// Noise and evidence of a set; the noise is estimated again for the sensors in `reached`.
     pub fn judge(
         &self,
         set: &[&'static Effect],
         start: &Noise,
-        anew: &[SensorKind],
+        reached: &[SensorKind],
         steps: &[f64],
     ) -> Result<Scored, DiagnosisError> {
-        let sifted = self.screen(set, start, anew, steps)?;
+        let sifted = self.screen(set, start, reached, steps)?;
         self.scored_jointly(sifted, &self.offsets(start))
     }
 
@@ -57,7 +57,7 @@ impl Linearisation<'_> {
         &self,
         set: &[&'static Effect],
         start: &Noise,
-        anew: &[SensorKind],
+        reached: &[SensorKind],
         steps: &[f64],
     ) -> Result<Screened, DiagnosisError> {
         let fitted = self.fitted(set);
@@ -69,7 +69,7 @@ impl Linearisation<'_> {
         let every: Vec<usize> = (0..known.len()).collect();
         let fit = |kind: &SensorKind| self.weighing.fit(&products, *kind, &every, start, steps);
         let asked: Vec<SensorKind> =
-            self.scene.kinds.iter().copied().filter(|kind| anew.contains(kind)).collect();
+            self.scene.kinds.iter().copied().filter(|kind| reached.contains(kind)).collect();
         let found: Vec<SensorNoise> = asked.par_iter().map(fit).collect();
         asked.into_iter().zip(found).for_each(|(kind, found)| noise.sensors[kind as usize] = found);
         let normal = noise.normal(&products.picked(None, &every[..fitted.len()]), fitted.len());

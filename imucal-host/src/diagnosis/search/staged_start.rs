@@ -1,8 +1,8 @@
 //! Where the fit of a baseline begins if no rig guides the sensor.
 //!
-//! Sensors share what a reference does not tell: its clock, its tilt, its heading. A magnet beside one of them would pull
+//! Sensors share what a reference does not show: its clock, its tilt, its heading. A magnet near one of them would pull
 //! at all that it shares, and by way of it at the others. So each is heard in turn: first the gyroscope, of which
-//! nothing but the clock is shared; then the accelerometer, which tells the tilt; the magnetometer last, once drift and
+//! nothing but the clock is shared; then the accelerometer, which shows the tilt; the magnetometer last, once drift and
 //! scatter of its own are known.
 
 use super::refit::{Fit, refit};

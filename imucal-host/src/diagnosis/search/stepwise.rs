@@ -1,8 +1,8 @@
-//! Which set of effects explains the gap: evidence, with the noise estimated anew for each set.
+//! Which set of effects explains the gap: evidence, with the noise estimated again for each set.
 //!
 //! Starting from none, effects are added, replaced and taken out while the evidence rises. Sets are judged by linear
 //! algebra first; the few best are judged again with the noise that suits them, since steps and sways hide in a drift
-//! that was estimated without them. After each change baseline and effects are fitted anew through the simulator.
+//! that was estimated without them. After each change baseline and effects are fitted again through the simulator.
 
 use super::{
     hypothesis::Scored,
@@ -112,7 +112,7 @@ impl<'s> Solution<'s> {
     /// candidates from there.
     fn advanced(&self, found_in: &Linearisation<'s>, mut next: Scored) -> Result<Self, DiagnosisError> {
         let Linearisation { scene, candidates, .. } = *found_in;
-        // An effect whose shape that problem has changed begins anew.
+        // An effect whose shape that problem has changed begins again.
         let kept = |effect: &'static Effect| {
             let is_same =
                 |dose: &&Dose| candidates.has_term(effect) || found_in.shape_of(effect) == dose.values;
@@ -201,8 +201,8 @@ fn improved<'s>(at: &Solution<'s>) -> Result<Option<Step<'s>>, DiagnosisError> {
     {
         return Ok(Some(Step { to, found_in: quiet }));
     }
-    let anew = linear.changed_anew(fit, best)?.filter(|(_, next)| gains(next, by.change_gain));
-    Ok(anew.map(|(anew, to)| Step { to, found_in: Some(anew) }))
+    let reshaped = linear.changed_with_new_shapes(fit, best)?.filter(|(_, next)| gains(next, by.change_gain));
+    Ok(reshaped.map(|(reshaped, to)| Step { to, found_in: Some(reshaped) }))
 }
 
 /// A set, whatever the order of its effects.

@@ -1,6 +1,6 @@
 //! Episodes that last as long as a hand carries the sensor about.
 //!
-//! Where it lies before and after, the field may not be that of where it is turned: such an episode is told from a change
+//! Where it lies before and after, the field may not be that of where it is turned: such an episode is distinguished from a change
 //! of place by nothing in the recording.
 
 use crate::diagnosis::{finding::Cause, residual::block::Block};

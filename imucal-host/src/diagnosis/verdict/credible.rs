@@ -27,7 +27,7 @@ pub struct Standing {
     pub set: Vec<&'static Effect>,
 }
 
-/// Effects that were not asserted where nothing was, and cannot be excluded: beside none at all, each has more than what a
+/// Effects that were not asserted where nothing was, and cannot be excluded: compared with none at all, each has more than what a
 /// credible set leaves out. Likeliest first.
 pub fn suspects(linear: &Linearisation<'_>, none: &Scored) -> Result<Vec<&'static Effect>, DiagnosisError> {
     let (own, ranked) = linear.ranked(&none.set, &none.noise)?;
@@ -58,9 +58,9 @@ pub fn standing(
     let offsets = linear.offsets(&best.noise);
     let instead = |effect: &&'static Effect| {
         let set: Vec<&'static Effect> = rest.iter().copied().chain([*effect]).collect();
-        let anew: Vec<_> =
+        let reached: Vec<_> =
             linear.scene.reach(cause).iter().chain(linear.scene.reach(effect)).copied().collect();
-        let sifted = linear.screen(&set, &best.noise, &anew, &NEAR).ok();
+        let sifted = linear.screen(&set, &best.noise, &reached, &NEAR).ok();
         // What falls behind axis by axis is not judged any further.
         let sifted = sifted.filter(|sifted| sifted.value > standard.value - BEHIND)?;
         Some((linear.scored_jointly(sifted, &offsets).ok()?.log_evidence, Some(*effect)))

@@ -3,7 +3,7 @@
 //! Where no rig guides the sensor, what hand and reference add is no noise of any kind that is estimated, and evidence
 //! alone is too sure. A cause that is not borne out may spoil what the others would foretell: the worst is taken out
 //! first, and the others are asked again. Against a calibration made elsewhere an error of a given triad is a gap as well,
-//! which nine products of rates may stand for as well as six misalignments: a cause must be borne out beside the triad's
+//! which nine products of rates may stand for as well as six misalignments: held-out data must confirm a cause together with the triad's
 //! terms, were they free.
 
 use super::{estimates, shares, shares::Share};

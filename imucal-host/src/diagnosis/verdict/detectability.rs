@@ -12,7 +12,7 @@ use crate::{
     effect::Effect,
 };
 
-/// Effects that are absent at sizes that matter, and effects that cannot be told, once baseline and `set` are fitted.
+/// Effects that are absent at sizes that matter, and effects that cannot be tested, once baseline and `set` are fitted.
 pub fn testable(
     linear: &Linearisation<'_>,
     set: &[&'static Effect],
@@ -23,11 +23,11 @@ pub fn testable(
     let projected = Projected::new(&linear.normal(noise), &fitted, &others)?;
     let seen = linear.scene.settings.verdict.detectable;
     let mut absent = Vec::new();
-    let told = |(effect, why): &(&'static Effect, &str)| NotTestable {
+    let not_testable = |(effect, why): &(&'static Effect, &str)| NotTestable {
         effect: effect.id.clone(),
         because: (*why).to_owned(),
     };
-    let mut untold: Vec<NotTestable> = linear.candidates.untestable.iter().map(told).collect();
+    let mut untestable: Vec<NotTestable> = linear.candidates.untestable.iter().map(not_testable).collect();
     for effect in &linear.candidates.effects {
         if set.contains(effect) {
             continue;
@@ -42,7 +42,7 @@ pub fn testable(
         };
         let plausible = |place: &usize| detectable(place) < parameter(place).range.1;
         if !places.iter().any(plausible) {
-            untold.push(NotTestable {
+            untestable.push(NotTestable {
                 effect: effect.id.clone(),
                 because: because(effect, &projected, &places),
             });
@@ -60,7 +60,7 @@ pub fn testable(
             });
         }
     }
-    Ok((absent, untold))
+    Ok((absent, untestable))
 }
 
 fn because(effect: &Effect, projected: &Projected, places: &[usize]) -> String {

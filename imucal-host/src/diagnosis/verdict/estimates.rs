@@ -16,7 +16,7 @@ use crate::{
 
 /// Prior standard deviation in usual sizes: so loose that it only keeps what the data do not show finite.
 const LOOSE: f64 = 1e3;
-/// An instant was looked for at least as closely as this, s, where no block tells it.
+/// An instant was looked for at least as closely as this, s, where no block determines it.
 const SCANNED: f64 = 5.0;
 
 /// Parameters of each effect of the best set, shapes among them.

@@ -1,4 +1,4 @@
-//! What a fault of the recording itself adds to the gap: rows that no fit has seen, beside what the simulator says of
+//! What a fault of the recording itself adds to the gap: rows that no fit has seen, compared with what the simulator says of
 //! them with and without it.
 //!
 //! ```text
@@ -59,7 +59,7 @@ struct Piece {
     left: [Vector3<f64>; 2],
 }
 
-/// Those findings that add a gap, about the fit that explains the rest. None in a hand, whose own samples tell what was
+/// Those findings that add a gap, about the fit that explains the rest. None in a hand, whose own samples say what was
 /// to be sensed.
 pub fn faults(recording: &Recording, findings: &[Finding], explained: &Solution<'_>) -> Vec<Fault> {
     let scene = explained.linear.scene;
@@ -219,7 +219,7 @@ pub fn cause(finding: &Finding) -> Cause {
 }
 
 /// Adds what faults have added to the gap, and what their effects close of it, to the causes that name them, to the
-/// table and to the total; `explainable` is the whitened squared size of the gap beside them.
+/// table and to the total; `explainable` is the whitened squared size of the gap without them.
 pub fn add(
     faults: &[Fault],
     explainable: f64,

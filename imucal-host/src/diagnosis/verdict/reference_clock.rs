@@ -15,7 +15,7 @@ use crate::{
     effect::{Effect, Part},
 };
 
-/// The offset as a cause, and what all causes close beside it.
+/// The offset as a cause, and what all causes close together with it.
 pub struct Clock<'s> {
     /// The cause.
     pub cause: Cause,

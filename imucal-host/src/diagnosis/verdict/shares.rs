@@ -10,7 +10,7 @@
 //!
 //! A difference of energies needs no noise floor, so that white noise known to a few per cent does no harm. The
 //! interval is that of a jackknife over the folds, widened by what no test would have seen: below it stands the share
-//! that would be closed if the gap held an effect more that just escapes the search. How much that is, is told by the
+//! that would be closed if the gap held an effect more that just escapes the search. Its size follows from the
 //! size of what is closed in the whole recording, since drift that ties one fold to the next makes a slow effect seem
 //! larger in each.
 
@@ -32,11 +32,11 @@ use crate::{
 
 /// Folds.
 pub const FOLDS: usize = 8;
-/// Standard deviation of an effect's prior, in usual sizes: what few blocks tell of it must not run away on the others.
+/// Standard deviation of an effect's prior, in usual sizes: an amplitude that few blocks determine must stay bounded on the others.
 const LARGE: f64 = 30.0;
 /// Standard deviation of a driver's statistic where there is nothing to follow: √(2·18).
 const SCATTER: f64 = 6.0;
-/// What a driver follows tells what is left within this share of it: it is another function than the one that is there.
+/// What follows a driver equals what is left to within this share of it: it is another function than the one that is there.
 const VAGUE: f64 = 0.15;
 
 /// A share of the explainable gap.
@@ -83,7 +83,7 @@ pub fn closed(
     closed_in(linear, &linear.design, set, noise, remainder)
 }
 
-/// Share that each effect closes of what its own sensors show: beside a quiet sensor's gap that of another looks small.
+/// Share that each effect closes of what its own sensors show: compared with a quiet sensor's gap that of another looks small.
 pub fn closed_of_own(
     linear: &Linearisation<'_>,
     set: &[&'static Effect],

@@ -35,7 +35,7 @@ struct Order {
     p_value: f64,
 }
 
-/// Looks at each triad by [`SensorKind::ALL`]; gives the common scales of those that could be told.
+/// Looks at each triad by [`SensorKind::ALL`]; gives the common scales of those that could be estimated.
 pub(crate) fn check(pairs: &[Option<Pairs>; 3], found: &mut Conventions) -> [Option<Scale>; 3] {
     let orders = pairs.each_ref().map(|pairs| order(&pairs.as_ref()?.trusted().moments()));
     let codes: Vec<usize> = orders.iter().flatten().map(|order| order.code).collect();

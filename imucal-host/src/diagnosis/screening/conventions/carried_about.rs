@@ -7,7 +7,7 @@
 //! y = K C_t_pᵀ g_p + b
 //! ```
 //!
-//! What is left of the samples beside any such function, while the gyroscope follows the reference, is acceleration.
+//! What is left of the samples after any such function, while the gyroscope follows the reference, is acceleration.
 
 use nalgebra::{SMatrix, SVector, Vector3};
 

@@ -17,7 +17,7 @@ use crate::{
 pub(crate) const FOLLOWS: f64 = 0.1;
 /// Rows that are replayed.
 const ROWS: usize = 250;
-/// Rates are told from readings this far before and after, s.
+/// Rates are estimated from readings this far before and after, s.
 const REACH: f64 = 0.01;
 /// Of orders that leave as much as the best, within this factor and share, the one with the fewest changes is named.
 const ALIKE: (f64, f64) = (1.5, 0.003);
@@ -26,15 +26,15 @@ const HEADINGS: usize = 5;
 
 const PERMUTATIONS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
-/// What tells the movement.
+/// Where the movement is known from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Told {
+enum Source {
     Encoders,
     Reference,
     Rests,
 }
 
-impl Told {
+impl Source {
     fn of(recording: &Recording, motion: &dyn Motion) -> Self {
         match (motion.encoders(0.0), &recording.reference) {
             (Some(_), _) => Self::Encoders,
@@ -153,10 +153,10 @@ pub(crate) fn remark(
     let compared: Vec<SensorKind> = lost.iter().chain(&followed).map(|(kind, _)| *kind).collect();
     let names: Vec<String> =
         lost.iter().map(|(kind, left)| format!("{kind} ({:.0} %)", 100.0 * left)).collect();
-    let told_by = Told::of(recording, motion);
+    let source = Source::of(recording, motion);
     let complaint = format!(
         "against {}, much of the samples' variance stays unexplained by any gain and bias: {}",
-        told_by.words(),
+        source.words(),
         names.join(", ")
     );
     if let [(SensorKind::Mag, _)] = lost[..]
@@ -180,7 +180,7 @@ pub(crate) fn remark(
             100.0 * left,
             reading.words(&axes)
         ),
-        None => format!("{complaint}; {}", told_by.remedy()),
+        None => format!("{complaint}; {}", source.remedy()),
     })
 }
 

@@ -6,7 +6,7 @@
 //!
 //! Fourth differences leave nothing of a movement. Their mean squares over windows of a second, without the largest
 //! quarter lest a jump count as noise, each axis by its own median, are compared in logarithms; how much they scatter is
-//! told from neighbouring windows. Where a movement makes noise of its own, only the windows at rest are asked. Of all stretches of windows the one is taken whose mean stands highest above that of the others,
+//! estimated from neighbouring windows. Where a movement makes noise of its own, only the windows at rest are asked. Of all stretches of windows the one is taken whose mean stands highest above that of the others,
 //! and all stretches are counted in its probability. Its ends are then moved to the rows where the likelihood is
 //! greatest.
 
@@ -22,7 +22,7 @@ use crate::recording::{Triple, check::integrity::SensorIntegrity, median};
 const WEIGHTS: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 /// Neighbouring differences are alike: so many of them count as one. 1 + 2 Σ ρ², with ρ = −56, 28, −8 and 1 of 70.
 const ALIKE: f64 = 2.6265;
-/// Standard deviation of the place of a change, in rows, times what a row tells of it (Hinkley 1970: √26 of two means a
+/// Standard deviation of the place of a change, in rows, times a row's information on it (Hinkley 1970: √26 of two means a
 /// standard deviation apart, each row telling half a nat).
 const CHANGE: f64 = 2.55;
 /// Length of a window, s, and the rows it has at least.
@@ -238,7 +238,7 @@ impl Levels {
         self.ratio.sqrt() * squares.sqrt()
     }
 
-    /// How much a row tells of the side of an end that it is on, nats: the lesser of the two divergences.
+    /// A row's information on which side of an end it is, nats: the lesser of the two divergences.
     fn information(&self) -> f64 {
         let log = self.ratio.ln();
         1.5 * f64::min(self.ratio - 1.0 - log, 1.0 / self.ratio - 1.0 + log)

@@ -1,4 +1,4 @@
-//! A triad's samples beside what it was given: y ≈ K v + b by robust linear least squares.
+//! A triad's samples against what it was given: y ≈ K v + b by robust linear least squares.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,7 +9,7 @@ use crate::{
 
 /// Least spread of inputs or samples that stands out of any sensor's noise, by [`SensorKind::ALL`]: m/s², rad/s, µT.
 const STRONG: [f64; 3] = [2.0, 0.1, 5.0];
-/// Rounds of leaving out what stands off, and how many medians off that is.
+/// Rounds of leaving out outliers, and how many medians away an outlier is.
 const ROUNDS: usize = 3;
 const FAR: f64 = 6.0;
 /// Directions in which the input varies less than this share of the largest do not count.

@@ -44,7 +44,7 @@ pub(crate) fn check(triple: &Triple, sensor: &SensorIntegrity, found: &mut Conve
         ));
         return;
     };
-    // All that is known of the limit is that it is rounded, or told by neighbours, to a step.
+    // All that is known of the limit is that it is rounded, or known from neighbours, to a step.
     let step = 1.0 / triple.nominal.per_unit.abs() / 12f64.sqrt();
     let std_error =
         if triple.unit == crate::recording::Unit::Counts { full_scale / limit / limit * step } else { 0.0 };

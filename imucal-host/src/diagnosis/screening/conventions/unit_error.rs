@@ -37,7 +37,7 @@ pub(crate) fn check(kind: SensorKind, unit: Unit, scale: &Scale, found: &mut Con
     };
     let Some(power) = power(kind, factor) else { return };
     let id = format!("{kind}.unit_error");
-    // So many standard errors off that no probability can be told from 0.
+    // So many standard errors off that no probability can be distinguished from 0.
     found.findings.extend(Finding::new(&id, &[(Some(power), Some(0.0))], 0.0));
     found.remarks.push(format!("{kind} is {factor:.6} times too large, as {is} is when taken for {said}"));
 }
