@@ -96,7 +96,7 @@ pub fn gyroscope() -> Sensor {
     }
 }
 
-/// Magnetometer beside iron, nominal µT.
+/// Magnetometer near iron, nominal µT.
 pub fn magnetometer() -> Sensor {
     Sensor {
         truth: Triad {

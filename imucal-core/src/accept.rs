@@ -90,7 +90,7 @@ pub fn check_observations<T: Scalar>(
     Ok(())
 }
 
-/// The solver stopped at a minimum, and the arithmetic tells all directions there apart.
+/// The solver stopped at a minimum, and the arithmetic distinguishes all directions there.
 ///
 /// # Errors
 /// not-finite, did-not-converge or ill-conditioned.
@@ -138,7 +138,7 @@ pub fn check_precision<T: Scalar>(error: T, limits: &Limits) -> Result<(), Refus
     Ok(())
 }
 
-/// Where the cost's rounding is a larger share of the rise that is looked for, the rise tells nothing: the residuals
+/// Where the cost's rounding is a larger share of the rise that is looked for, the rise says nothing: the residuals
 /// are hardly more than rounding themselves, and standard errors that small stay on the parabola.
 const ROUNDING_SHARE: f64 = 0.1;
 

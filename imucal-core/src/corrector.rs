@@ -51,7 +51,7 @@ impl<T: Scalar> Corrector<T> {
     }
 }
 
-/// A corrector that follows the temperature: what depends on that is computed anew only where the reading changes.
+/// A corrector that follows the temperature: what depends on that is computed again only where the reading changes.
 ///
 /// A sensor's thermometer is read less often than the sensor, and rounds to steps that it keeps for many samples. The
 /// results are those of [`Corrector::apply_at`], bit for bit, in whatever order samples come.

@@ -1,4 +1,4 @@
-//! Apply and fit IMU calibrations on the microcontroller beside the sensor.
+//! Apply and fit IMU calibrations on the microcontroller next to the sensor.
 //!
 //! No `std`, no allocation, no `unsafe`, and no panic: an image that links `firmware-example`'s gate cannot hold a path
 //! to one. The same arithmetic runs on a host (`libm` by name, nothing fused, sums in a fixed order), so that `f32`

@@ -1,4 +1,4 @@
-//! The one arithmetic path: `f32` on the device, `f64` beside it on a host, both through `libm` by name.
+//! The one arithmetic path: `f32` on the device, `f64` for comparison on a host, both through `libm` by name.
 //!
 //! Platform maths differ in the last bit (glibc's `sin` from libm's in about 1 % of arguments), so nothing here
 //! goes through `std`. Operations are never fused: `a * b + c` rounds twice on every target.

@@ -63,7 +63,7 @@ impl<T: Scalar> Triad<T> {
         Self { gain: self.gain / per_unit, bias: self.bias * per_unit + Vector3::repeat(offset) }
     }
 
-    /// The columns of the gain are dependent, as far as `T` can tell: different raw samples look alike.
+    /// The columns of the gain are dependent, as far as `T` can show: different raw samples look alike.
     ///
     /// The determinant is taken of columns scaled to a largest entry of one, so that the unit does not matter.
     pub fn is_singular(&self) -> bool {

@@ -54,7 +54,7 @@ pub enum ApplyError {
     },
 }
 
-/// Whether a calibration belongs to a recording; a warning where nobody can tell. `other_serial` turns the
+/// Whether a calibration belongs to a recording; a warning where nobody can know. `other_serial` turns the
 /// refusal of another serial into a warning.
 ///
 /// # Errors
@@ -69,7 +69,7 @@ pub fn check(
     let warning = match record.made_for(serial) {
         Ok(Match::Confirmed) => None,
         Ok(Match::Unknown) => Some(format!(
-            "{}: no serial on one side, so nobody can tell whether the calibration is this sensor's; name it below \
+            "{}: no serial on one side, so nobody can know whether the calibration is this sensor's; name it below \
              [sensor] before calibrating",
             recording.name
         )),

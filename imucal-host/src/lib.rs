@@ -1,4 +1,4 @@
-//! Calibrate IMU recordings through `imucal-core`, the code that runs beside the sensor, and compare it with a
+//! Calibrate IMU recordings through `imucal-core`, the code that runs next to the sensor, and compare it with a
 //! floating-point reference.
 //!
 //! # Architecture

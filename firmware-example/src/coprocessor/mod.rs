@@ -294,7 +294,7 @@ impl<
         self.stream = self.stream.filter(|stream| self.guard.is_current(&stream.asked));
         if let Some(stream) = &mut self.stream {
             stream.left = stream.left.saturating_sub(1);
-            // A stream never waits: what the link does not take is left out, and the number tells.
+            // A stream never waits: what the link does not take is left out, and the number shows it.
             if stream.left == 0 {
                 stream.left = stream.every;
                 let asked = stream.asked;

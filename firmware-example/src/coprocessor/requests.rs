@@ -176,7 +176,7 @@ impl<
         if index != expected {
             return Err(Fault::OutOfSequence { expected });
         }
-        // Up to the first that is not taken: the answer to whoever goes on tells the index.
+        // Up to the first that is not taken: the answer to whoever goes on has the index.
         observations.iter().try_for_each(|observation| self.fitting.take(observation))?;
         self.send(asked, &self.progress());
         Ok(())

@@ -35,7 +35,7 @@ use report::{Figures, finished};
 
 /// Blocks of a swarm's cost in one slice.
 pub const SLICE: usize = 384;
-/// Poses at least: the affine part has twelve parameters, and each pose tells three.
+/// Poses at least: the affine part has twelve parameters, and each pose gives three.
 const LEAST_POSES: usize = 6;
 /// Turns at least.
 const LEAST_TURNS: usize = 8;

@@ -92,7 +92,7 @@ impl<const POINTS: usize, const POSES: usize, const TURNS: usize, const BLOCKS: 
 
     /// Calls with the turns as the model takes them.
     ///
-    /// The list of turns is made anew each time: it points into the blocks, and cannot be kept beside them.
+    /// The list of turns is made again each time: it points into the blocks, and cannot be kept with them.
     pub(super) fn with_turns<const P: usize, R>(
         &self,
         form: Parameterisation<P>,

@@ -39,7 +39,7 @@ pub fn last() -> LastReset {
     last
 }
 
-// Both handlers: the address where it happened, if the frame that has it lies in the stack; then the whole stack anew,
+// Both handlers: the address where it happened, if the frame that has it lies in the stack; then the whole stack again,
 // since there may be nothing left of it.
 global_asm!(
     ".section .text.imucal_handlers, \"ax\", %progbits",

@@ -40,7 +40,7 @@ const MAGIC: [u8; 4] = *b"IMUS";
 pub(super) struct Slot {
     /// Its size, bytes.
     pub(super) size: usize,
-    /// A seal tells that it was whole once.
+    /// A seal shows that it was whole once.
     pub(super) sealed: bool,
 }
 

@@ -11,7 +11,7 @@
 //! * A slot is written from its start to its CRC, into erased flash: it is whole, or it is none. It is read back, and
 //!   then sealed.
 //! * A sealed slot that is not whole has lost bits since: [`Slots::lost`] says so where the record before it counts. One
-//!   without a seal was cut off while it was written, and nobody was told that it is stored.
+//!   without a seal was cut off while it was written, and nobody was informed that it is stored.
 //! * The next slot of the same block is taken while one is blank; then the next block is erased. The newest slot never
 //!   lies in the block that is erased, so a cut anywhere leaves the old record or the new one.
 //! * Blocks are used in turn: the erases of any two differ by one at the most, cuts apart.

@@ -43,7 +43,7 @@ pub enum Refusal {
         /// Parameters estimated.
         parameters: usize,
     },
-    /// The observations tell some combination of the parameters no better than the arithmetic rounds.
+    /// The observations determine some combination of the parameters no better than the arithmetic rounds.
     IllConditioned {
         /// Condition number of the normalised Jacobian.
         condition: f64,
@@ -73,7 +73,7 @@ pub enum Refusal {
     },
     /// A figure is infinite or NaN.
     NotFinite,
-    /// What the standard errors come to: the observations hardly tell some combination of the parameters.
+    /// What the standard errors come to: the observations hardly determine some combination of the parameters.
     Imprecise {
         /// Expected error of a calibrated vector, as a share of its length.
         error: f64,
@@ -135,13 +135,13 @@ impl fmt::Display for Refusal {
             ),
             Self::IllConditioned { condition, limit } => write!(
                 f,
-                "condition {condition:.1e}, at most {limit:.1e}: the observations do not tell some combination of \
+                "condition {condition:.1e}, at most {limit:.1e}: the observations do not determine some combination of \
                  the parameters"
             ),
             Self::Imprecise { error, limit } => write!(
                 f,
                 "a calibrated vector is expected to be wrong by {:.1} % of its length (at most {:.1} %): the \
-                 observations hardly tell some combination of the parameters",
+                 observations hardly determine some combination of the parameters",
                 100.0 * error,
                 100.0 * limit
             ),

@@ -139,7 +139,7 @@ pub enum Reply<'a> {
     Progress(FitProgress),
     /// To [`Request::FinishFit`].
     Report(FitReport),
-    /// Done, and nothing to tell.
+    /// Done, and nothing to say.
     Done,
     /// Not done.
     Fault(Fault),

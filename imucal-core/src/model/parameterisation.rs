@@ -15,10 +15,10 @@ pub struct Parameterisation<const P: usize> {
     entries: [u8; P],
 }
 
-/// Upper triangular gain and bias: what a norm can tell (T9). The gauge puts the sensor's x axis of the inverse
+/// Upper triangular gain and bias: what a norm can determine (T9). The gauge puts the sensor's x axis of the inverse
 /// on the frame's x, and y in its x-y plane.
 pub const UPPER_TRIANGULAR: Parameterisation<9> = Parameterisation { entries: [0, 1, 2, 4, 5, 8, 9, 10, 11] };
-/// Diagonal gain and bias: what six faces can tell (T6).
+/// Diagonal gain and bias: what six faces can determine (T6).
 pub const DIAGONAL: Parameterisation<6> = Parameterisation { entries: [0, 4, 8, 9, 10, 11] };
 /// Full gain, no bias: the gyroscope's, whose bias the rests give.
 pub const FULL_GAIN: Parameterisation<9> = Parameterisation { entries: [0, 1, 2, 3, 4, 5, 6, 7, 8] };

@@ -238,7 +238,7 @@ pub struct UnifiedModel<'a, T: Scalar, const P: usize, G: Pose<T> = GimbalPose<T
     pub base: UnifiedParameters<T>,
     /// Entries that are estimated.
     pub terms: Terms<P>,
-    /// Bit k set: parameter k is held at its base value, since the poses cannot tell it
+    /// Bit k set: parameter k is held at its base value, since the poses cannot determine it
     /// ([`crate::solver::gauge`]).
     pub held: u32,
 }

@@ -69,7 +69,7 @@ pub enum DecodeError {
     Truncated {
         /// Bytes given.
         have: usize,
-        /// Bytes the record takes, as far as can be told.
+        /// Bytes the record takes, as far as is known.
         need: usize,
     },
     /// The bytes do not begin with `IMUC`: no record, or a page that was erased.

@@ -1,4 +1,4 @@
-//! The calibration record: what a sensor carries with it, a few hundred bytes in its flash or beside its log.
+//! The calibration record: what a sensor carries with it, a few hundred bytes in its flash or next to its log.
 //!
 //! # Layout
 //!
@@ -11,7 +11,7 @@
 //! └────────┴───────┴───────┴──────────┴───────────────────┴─────────┘
 //! ```
 //!
-//! * **magic** first: an erased page (all ones or zeros) is told from a damaged record.
+//! * **magic** first: an erased page (all ones or zeros) is distinguished from a damaged record.
 //! * **major, minor** before the length: a reader knows whether the rest means what it thinks it means.
 //! * **n** frames the payload, so that an older reader can step over fields appended after its time.
 //! * **payload**: [`CalibrationRecord`] in postcard 1, fields in the order of declaration. `f32` is 4 bytes,

@@ -1,6 +1,6 @@
 //! The payload, written by postcard into an end of our own.
 //!
-//! It goes on counting where the room ends, so that one pass writes, and tells what a buffer too small would need.
+//! It goes on counting where the room ends, so that one pass writes, and gives what a buffer too small would need.
 //! Its functions stay out of line: inlined at each of a record's hundred figures they cost half a kilobyte of flash.
 
 use postcard::{Result, ser_flavors::Flavor, serialize_with_flavor};

@@ -41,7 +41,7 @@ fn condition_of<T: Scalar>(columns: &mut [T], size: usize) -> T {
 }
 
 /// The unit vector along which `|R x|` with columns at unit length is least: the combination of parameters that
-/// the rows tell worst, scaled back to the parameters; `None` where R is singular.
+/// the rows determine worst, scaled back to the parameters; `None` where R is singular.
 ///
 /// Inverse iteration: the other directions die out with the square of the singular values' ratio.
 pub fn weakest_direction<T: Scalar, const P: usize>(r: &SMatrix<T, P, P>) -> Option<SVector<T, P>> {

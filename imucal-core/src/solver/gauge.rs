@@ -1,7 +1,7 @@
-//! Which parameters the observations cannot tell from the others: found from the rows, not written down beforehand.
+//! Which parameters the observations cannot distinguish from the others: found from the rows, not written down beforehand.
 //!
 //! Columns of the Jacobian are taken class by class, and within a class the one that has most of its own left, seen
-//! against the span of those taken before. A column that is left with less than a tolerance is told by the others;
+//! against the span of those taken before. A column that is left with less than a tolerance is determined by the others;
 //! its parameter is to be held. The classes are the order of preference: what a sensor's record needs comes first,
 //! what belongs to the rig or the room last. Only the triangular factor is looked at: |R e_k| and its part across a
 //! span are those of the Jacobian itself. Source: column-pivoted orthogonalisation, Golub & Van Loan 5.4.2.
@@ -13,20 +13,20 @@ use crate::scalar::Scalar;
 /// Of a class, the first column is taken whose share is at least this part of the largest: ties go by order.
 const NEARLY_LARGEST: f64 = 0.5;
 
-/// Parameters that the rows cannot tell.
+/// Parameters that the rows cannot determine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gauge<T: Scalar, const P: usize> {
-    /// Bit k set: parameter k is told by the others.
+    /// Bit k set: parameter k is determined by the others.
     pub held: u32,
     /// For each parameter, the share of its column that was left when it was taken: 1 for a column of its own, 0 for
-    /// one that is told.
+    /// one that is determined.
     pub own_share: SVector<T, P>,
     /// For each held parameter, another that is most like it.
     pub like: [Option<u8>; P],
 }
 
 impl<T: Scalar, const P: usize> Gauge<T, P> {
-    /// From a triangular factor; a column that is left with less than `tolerance` of itself is told by the others.
+    /// From a triangular factor; a column that is left with less than `tolerance` of itself is determined by the others.
     /// `class` says the order in which parameters are taken, lowest first.
     pub fn of(r: &SMatrix<T, P, P>, tolerance: T, class: impl Fn(usize) -> u8) -> Self {
         let mut gauge = Self { held: 0, own_share: SVector::zeros(), like: [None; P] };
@@ -50,7 +50,7 @@ impl<T: Scalar, const P: usize> Gauge<T, P> {
         gauge
     }
 
-    /// Parameter `k` is told by the others.
+    /// Parameter `k` is determined by the others.
     pub fn is_held(&self, k: usize) -> bool {
         self.held & bit(k) != 0
     }

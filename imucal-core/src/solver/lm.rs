@@ -211,7 +211,7 @@ impl<T: Scalar, const P: usize> LevenbergMarquardt<T, P> {
         &self.theta
     }
 
-    /// Steps tried so far; [`report`](Self::report) tells the rest, and works for it.
+    /// Steps tried so far; [`report`](Self::report) gives the rest, at a cost.
     pub fn iterations(&self) -> u16 {
         self.iterations
     }

@@ -79,9 +79,9 @@ impl Answer {
     fn doses(&self) -> Vec<Dose> {
         let dose = |cause: &Asserted| {
             let effect = effect::find(&cause.effect)?;
-            let told =
-                |name: &str| cause.parameters.iter().find(|(told, _)| told == name).map(|(_, value)| *value);
-            let value = |parameter: &effect::Parameter| match told(&parameter.name) {
+            let asserted =
+                |name: &str| cause.parameters.iter().find(|(own, _)| own == name).map(|(_, value)| *value);
+            let value = |parameter: &effect::Parameter| match asserted(&parameter.name) {
                 Some(Some(value)) => value,
                 // An episode that has not ended.
                 Some(None) => f64::INFINITY,
@@ -155,12 +155,12 @@ pub(super) mod tests {
         seal::Nonce,
     };
 
-    /// Parameters as an answer tells them.
-    pub(in crate::blind) type Told = Vec<(String, Option<f64>)>;
+    /// Parameters as an answer gives them.
+    pub(in crate::blind) type Amounts = Vec<(String, Option<f64>)>;
 
     /// An answer that asserts these effects with these parameters.
-    pub(in crate::blind) fn asserting(verdict: Verdict, causes: &[(&str, Told)]) -> Answer {
-        let cause = |(effect, parameters): &(&str, Told)| Asserted {
+    pub(in crate::blind) fn asserting(verdict: Verdict, causes: &[(&str, Amounts)]) -> Answer {
+        let cause = |(effect, parameters): &(&str, Amounts)| Asserted {
             effect: (*effect).to_owned(),
             probability: Some(0.99),
             equivalents: Vec::new(),

@@ -96,7 +96,7 @@ pub struct Label {
     pub passed_over: Vec<String>,
 }
 
-/// What is told of the recording, for people: all of it follows from nonce and case.
+/// What a person may know of the recording: all of it follows from nonce and case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Setting {
     /// Type of the unit.
@@ -171,14 +171,14 @@ pub fn draw(nonce: &Nonce, case: Case) -> Result<Drawn, SimulationError> {
         format: "imucal-blind-label/1".to_owned(),
         salt: hex(&nonce.derive(&format!("imucal blind salt {name}"))),
         case: name,
-        setting: told(&simulation, lambda.duration()),
+        setting: setting_of(&simulation, lambda.duration()),
         effects: present(&lambda, &simulation.doses)?,
         passed_over,
     };
     Ok(Drawn { simulation, label, lambda })
 }
 
-fn told(simulation: &Simulation, duration: f64) -> Setting {
+fn setting_of(simulation: &Simulation, duration: f64) -> Setting {
     let noise = simulation.conditions.noise;
     let axes: String = simulation.axes.iter().map(|axis| format!("{axis:?}").to_lowercase()).collect();
     Setting {

@@ -35,7 +35,7 @@ pub struct Judgement {
     pub truth: Truth,
     /// The smallest λ of its effects; 0 without.
     pub lambda: f64,
-    /// The smallest λ of its effects beside the others.
+    /// The smallest λ of its effects with the others fitted.
     pub lambda_beside: f64,
     /// The asserted classes are those that are there, and none besides.
     pub classes_right: bool,
@@ -125,13 +125,13 @@ impl Judgement {
         }
     }
 
-    /// A line that tells what was there and what was answered.
+    /// A line that says what was there and what was answered.
     pub fn line(&self) -> String {
         let setting = &self.label.setting;
         let effect = |effect: &Present| {
             let [acc, gyr, mag] = effect.lambda;
             format!(
-                "{} [λ acc {acc:.0} gyr {gyr:.0} mag {mag:.0}; beside {:.0}]",
+                "{} [λ acc {acc:.0} gyr {gyr:.0} mag {mag:.0}; with the others fitted {:.0}]",
                 effect.effect, effect.lambda_beside
             )
         };

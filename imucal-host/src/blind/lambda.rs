@@ -29,7 +29,7 @@ const RATE: f64 = 25.0;
 /// Terms of the rig in the baseline, their parameters and a small value, rad.
 const RIG: [(&str, usize); 3] = [("rig.level_tilt", 0), ("rig.level_tilt", 1), ("rig.heading", 0)];
 const SMALL: f64 = 1e-4;
-/// A column of which less than this share is left beside the others is in their span.
+/// A column of which less than this share is left once the others are fitted is in their span.
 const LEFT: f64 = 1e-5;
 
 /// Block means of each sensor, by [`SensorKind::ALL`].
@@ -128,23 +128,23 @@ impl Lambda {
         BLOCK * self.healthy[0].len() as f64
     }
 
-    /// λ of a signal by sensor, with what the signals `beside` it span projected out as well.
-    pub fn of(&self, signal: &Signal, beside: &[Signal]) -> [f64; 3] {
-        self.squared(signal, &self.healthy, beside)
+    /// λ of a signal by sensor, with what the signals `others` span projected out as well.
+    pub fn of(&self, signal: &Signal, others: &[Signal]) -> [f64; 3] {
+        self.squared(signal, &self.healthy, others)
     }
 
-    /// λ of what is left of a run where another explains it and the baseline is fitted anew: K acts on the other run's
+    /// λ of what is left of a run where another explains it and the baseline is fitted again: K acts on the other run's
     /// output, so that what an effect shares with the baseline may stand in either.
     pub fn remainder(&self, run: &Signal, explanation: &Signal) -> [f64; 3] {
         self.squared(run, explanation, &[])
     }
 
-    fn squared(&self, signal: &Signal, output: &Signal, beside: &[Signal]) -> [f64; 3] {
+    fn squared(&self, signal: &Signal, output: &Signal, others: &[Signal]) -> [f64; 3] {
         std::array::from_fn(|k| {
             let Some(measure) = self.sensors.get(k) else { return 0.0 };
             let rig: Vec<&[Vector3<f64>]> = self.rig.iter().map(|signal| signal[k].as_slice()).collect();
-            let beside: Vec<&[Vector3<f64>]> = beside.iter().map(|signal| signal[k].as_slice()).collect();
-            measure.baseline(&output[k], &rig).squared(&signal[k], &beside)
+            let others: Vec<&[Vector3<f64>]> = others.iter().map(|signal| signal[k].as_slice()).collect();
+            measure.baseline(&output[k], &rig).squared(&signal[k], &others)
         })
     }
 }
@@ -190,9 +190,9 @@ impl Baseline<'_> {
         stacked
     }
 
-    fn squared(&self, signal: &[Vector3<f64>], beside: &[&[Vector3<f64>]]) -> f64 {
+    fn squared(&self, signal: &[Vector3<f64>], others: &[&[Vector3<f64>]]) -> f64 {
         let mut columns = self.all.clone();
-        for signal in beside {
+        for signal in others {
             add_orthonormal(&mut columns, self.projected(signal));
         }
         let mut left = self.projected(signal);

@@ -1,4 +1,4 @@
-//! Sealed trials of the diagnosis: recordings whose effects it is not told, and how often it is right.
+//! Sealed trials of the diagnosis: recordings whose effects it does not know, and how often it is right.
 //!
 //! A nonce draws every case: what the rig does, under what conditions, and which effects of which size are there. Labels
 //! are hashed before the recording is diagnosed. The simulator is the diagnosis' own where it has effects, since the

@@ -81,8 +81,8 @@ pub struct Score {
     pub shares: Vec<Share>,
     /// Mean of the closed share as said less the true one, its standard error and how many there are.
     pub closed_bias: Option<(f64, f64, usize)>,
-    /// Figures beside the contract's.
-    pub beside: Vec<Share>,
+    /// Figures besides the contract's.
+    pub further: Vec<Share>,
     /// Of the causes' probabilities, where all that is there is of the catalogue.
     pub calibration: Vec<Calibration>,
     /// Median and largest time of a diagnosis, s.
@@ -278,14 +278,14 @@ const FURTHER: [Figure; 13] = [
         aim: None,
     },
     Figure {
-        name: "two effects, each λ ≥ 60 beside the other, exact",
+        name: "two effects, each λ ≥ 60 with the other fitted, exact",
         of: |j| j.truth == Truth::Catalogue(2) && j.lambda_beside >= 60.0,
         hit: |j| j.classes_right,
         must: None,
         aim: None,
     },
     Figure {
-        name: "three effects, each λ ≥ 60 beside the others, exact",
+        name: "three effects, each λ ≥ 60 with the others fitted, exact",
         of: |j| j.truth == Truth::Catalogue(3) && j.lambda_beside >= 60.0,
         hit: |j| j.classes_right,
         must: None,
@@ -327,7 +327,7 @@ pub fn score(judged: &[Judgement]) -> Score {
         must: Some(AtLeast(0.90)),
         aim: Some(Within(0.93, 0.98)),
     });
-    let beside = FURTHER.iter().map(|figure| figure.of(judged)).collect();
+    let further = FURTHER.iter().map(|figure| figure.of(judged)).collect();
     let mut seconds: Vec<f64> = judged.iter().map(|j| j.seconds).collect();
     seconds.sort_by(f64::total_cmp);
     let trials_healthy = judged.iter().filter(|j| is_healthy(j)).count();
@@ -335,7 +335,7 @@ pub fn score(judged: &[Judgement]) -> Score {
         trials: [trials_healthy, judged.len() - trials_healthy],
         shares,
         closed_bias: bias(&claimed),
-        beside,
+        further,
         calibration: calibration(judged),
         seconds: [seconds.get(seconds.len() / 2), seconds.last()].map(|s| s.copied().unwrap_or(0.0)),
     }

@@ -1,4 +1,4 @@
-//! Under what a trial's recording is made: drawn anew for each, wider than the simulator's defaults.
+//! Under what a trial's recording is made: drawn for each, wider than the simulator's defaults.
 
 use nalgebra::Vector3;
 

@@ -39,8 +39,8 @@ impl Score {
                 missed(mean.abs() > CLOSED_BIAS[0])
             );
         }
-        text += "\nBeside the contract's figures:\n";
-        self.beside.iter().for_each(|share| text += &line(share));
+        text += "\nBesides the contract's figures:\n";
+        self.further.iter().for_each(|share| text += &line(share));
         text += "\nProbability of a cause, where all that is there is of the catalogue: said, and how often it was there.\n";
         for bin in self.calibration.iter().filter(|bin| bin.causes > 0) {
             let [low, high] = clopper_pearson(bin.hits, bin.causes);

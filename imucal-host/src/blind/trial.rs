@@ -163,7 +163,7 @@ impl Folder {
         Ok(finished)
     }
 
-    /// Runs those of the cases that are not over yet, so many at a time; `heard` is told how many of all are over.
+    /// Runs those of the cases that are not over yet, so many at a time; `heard` is given how many of all are over.
     ///
     /// # Errors
     ///

@@ -67,7 +67,7 @@ impl Default for Options {
     }
 }
 
-/// Calibrates every sensor the recording allows. `progress` is told of each stage.
+/// Calibrates every sensor the recording allows. `progress` is called at each stage.
 pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&str) + Sync)) -> Calibration {
     progress("checking the samples");
     let integrity = integrity::inspect(recording);
@@ -155,7 +155,7 @@ fn counted_once(
     held::once(&mag.values, usable)
 }
 
-/// Turns a magnetometer into the accelerometer's axes, where there is one that passed and the rests tell the rotation.
+/// Turns a magnetometer into the accelerometer's axes, where there is one that passed and the rests determine the rotation.
 fn align(
     fit: &mut FitSummary,
     recording: &Recording,

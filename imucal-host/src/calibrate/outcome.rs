@@ -163,7 +163,7 @@ pub struct FitSummary {
     pub bias_wander: Option<BiasWander>,
     /// What belongs to the rig and not to the sensor, where there was one.
     pub rig: Option<RigFindings>,
-    /// Rotation of a magnetometer into the accelerometer's axes, where the rests told it.
+    /// Rotation of a magnetometer into the accelerometer's axes, where the rests determine it.
     pub alignment: Option<Alignment>,
     /// How a gyroscope's fit was reached.
     pub search: Option<Search>,
@@ -178,7 +178,7 @@ pub struct RigFindings {
     pub sources: Option<[(Vector3<f64>, Vector3<f64>); 2]>,
     /// Earth's field in n, µT, where it was estimated.
     pub field_n: Option<Vector3<f64>>,
-    /// Parameters that the poses cannot tell, and what each is like.
+    /// Parameters that the poses cannot determine, and what each is like.
     pub not_told: Vec<String>,
     /// How a fit against attitudes was made, in words.
     pub notes: Vec<String>,

@@ -37,7 +37,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let out = arguments.out.clone().unwrap_or_else(|| beside(&arguments.recording));
+    let out = arguments.out.clone().unwrap_or_else(|| default_output(&arguments.recording));
     let mut inputs = files_of(&arguments.recording);
     inputs.push(arguments.calibration.clone());
     let mut files = arguments.overwrite.plan(&inputs, &Planned::recording(&out))?;
@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
 }
 
 /// `NAME-calibrated.csv.gz` for `NAME.csv.gz`.
-fn beside(path: &Path) -> PathBuf {
+fn default_output(path: &Path) -> PathBuf {
     let name = path.file_name().and_then(OsStr::to_str).unwrap_or("recording.csv");
     let lower = name.to_ascii_lowercase();
     let ending = [".csv.gz", ".csv", ".parquet"].into_iter().find(|ending| lower.ends_with(ending));

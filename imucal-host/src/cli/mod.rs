@@ -91,20 +91,20 @@ pub fn run() -> ExitCode {
         Ok(Ending::Done) => ExitCode::SUCCESS,
         Ok(Ending::Refused) => ExitCode::from(1),
         Err(error) => {
-            output::tell("error", &format_args!("{error:#}"));
+            output::report("error", &format_args!("{error:#}"));
             ExitCode::from(2)
         }
     }
 }
 
-/// Tells the user of something on standard error.
+/// Warns the user on standard error.
 fn warn(message: &dyn std::fmt::Display) {
-    output::tell("warning", message);
+    output::report("warning", message);
 }
 
-/// Tells the user on standard error why the answer is no.
+/// Says on standard error why the answer is no.
 fn refuse(refusal: &dyn std::fmt::Display) -> Ending {
-    output::tell("refused", refusal);
+    output::report("refused", refusal);
     Ending::Refused
 }
 
@@ -116,7 +116,7 @@ fn load(path: &Path, reading: Reading) -> anyhow::Result<Result<StoredCalibratio
     }
 }
 
-/// Reads a recording and tells of what was odd in it.
+/// Reads a recording and warns of what is odd in it.
 fn read(path: &Path, reading: Reading) -> anyhow::Result<Recording> {
     let recording = Recording::read_within(path, &reading.limits())?;
     for warning in &recording.warnings {

@@ -28,7 +28,7 @@ pub(super) fn text(text: &str) -> anyhow::Result<()> {
     line(format_args!("{}", text.strip_suffix('\n').unwrap_or(text)))
 }
 
-/// A line for the user on standard error; where nobody can read it, there is nobody to tell.
-pub(super) fn tell(what: &str, message: &dyn Display) {
+/// A line for the user on standard error; where nobody can read it, nobody is there to read.
+pub(super) fn report(what: &str, message: &dyn Display) {
     let _ = writeln!(std::io::stderr(), "imucal: {what}: {message}");
 }

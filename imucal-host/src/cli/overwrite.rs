@@ -37,13 +37,13 @@ impl Planned {
         Self { path: path.into(), own: Some(form) }
     }
 
-    /// The samples of a recording and the manifest beside them.
+    /// The samples of a recording and the manifest next to them.
     pub(super) fn recording(samples: &Path) -> Vec<Self> {
         files_of(samples).into_iter().map(Self::new).collect()
     }
 }
 
-/// The samples of a recording and the manifest beside them.
+/// The samples of a recording and the manifest next to them.
 pub(super) fn files_of(recording: &Path) -> Vec<PathBuf> {
     let manifest = Manifest::path_beside(recording);
     std::iter::once(recording.to_path_buf()).chain(manifest).collect()

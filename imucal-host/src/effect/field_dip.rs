@@ -1,4 +1,4 @@
-//! The field in the room is steeper than told: `mag.field_dip`, a term of recordings whose site does not tell the field.
+//! The field in the room is steeper than given: `mag.field_dip`, a term of recordings whose site does not give the field.
 
 use imucal_core::rotation;
 use nalgebra::Vector3;

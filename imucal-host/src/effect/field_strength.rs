@@ -1,5 +1,5 @@
-//! The field in the room is stronger than told: `mag.field_strength`, a term of recordings whose site does not tell the
-//! field, beside a calibration made elsewhere.
+//! The field in the room is stronger than given: `mag.field_strength`, a term of recordings whose site does not give the
+//! field, with a calibration made elsewhere.
 
 use super::{Act, Effect, Free, Parameter, Part, SensorKind, Truth, Words};
 

@@ -1,4 +1,4 @@
-//! A triad that is read later than the others: `P.lag`, a term of recordings whose movement no rig's clock tells.
+//! A triad that is read later than the others: `P.lag`, a term of recordings whose movement no rig's clock gives.
 //!
 //! ```text
 //! y(t) → y(t − lag)      straight between rows, held before the first and behind the last

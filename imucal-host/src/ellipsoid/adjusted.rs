@@ -7,7 +7,7 @@
 //! ψ = eigenvector of the least eigenvalue of Ψ(σ²), with σ² such that it is zero
 //! ```
 //!
-//! Source: Markovsky, Kukush & Van Huffel 2004, with the noise estimated beside the ellipsoid; models.md 5. The
+//! Source: Markovsky, Kukush & Van Huffel 2004, with the noise estimated together with the ellipsoid; models.md 5. The
 //! ordinary algebraic fit (σ² = 0) is off by several times its noise where a part of the sphere is unseen. Where
 //! the noise is known, [`with_noise`] is the textbook estimator, consistent under it. Not modelled: noise that
 //! differs between axes, or that is correlated in time.

@@ -45,7 +45,7 @@ impl Model<f64, 9> for CalibratedNorm<'_> {
     }
 }
 
-/// Fits from a start; `None` where the points do not tell one quadric, or it does not converge to a
+/// Fits from a start; `None` where the points do not determine one quadric, or it does not converge to a
 /// gain that can be inverted.
 pub fn fit(points: &[ShellPoint<f64>], norm: f64, start: &Triad<f64>) -> Option<Triad<f64>> {
     quadric::factor(points, &Frame::of(points)?)?;

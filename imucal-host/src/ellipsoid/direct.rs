@@ -12,7 +12,7 @@ use imucal_core::{observation::ShellPoint, triad::Triad};
 
 use super::quadric::{self, Frame};
 
-/// The triad of the cloud, in its own [`Frame`]; `None` where the points do not tell one quadric, or it is no ellipsoid.
+/// The triad of the cloud, in its own [`Frame`]; `None` where the points do not determine one quadric, or it is no ellipsoid.
 pub fn start(points: &[ShellPoint<f64>], norm: f64) -> Option<Triad<f64>> {
     in_frame(points, norm, &Frame::of(points)?)
 }

@@ -23,7 +23,7 @@ use super::quadric::{self, Frame};
 /// Rounds of expecting the noise's excess.
 const ROUNDS: usize = 3;
 
-/// Fits from a start; `None` where the points do not tell one quadric, or it does not converge to a
+/// Fits from a start; `None` where the points do not determine one quadric, or it does not converge to a
 /// gain that can be inverted.
 pub fn fit(points: &[ShellPoint<f64>], norm: f64, start: &Triad<f64>) -> Option<Triad<f64>> {
     quadric::factor(points, &Frame::of(points)?)?;

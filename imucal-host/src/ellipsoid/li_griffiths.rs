@@ -40,7 +40,7 @@ fn constraint() -> Block {
     })
 }
 
-/// The triad of the cloud; `None` where the points do not tell one quadric.
+/// The triad of the cloud; `None` where the points do not determine one quadric.
 pub fn start(points: &[ShellPoint<f64>], norm: f64) -> Option<Triad<f64>> {
     let frame = Frame::of(points)?;
     let r = quadric::factor(points, &frame)?;

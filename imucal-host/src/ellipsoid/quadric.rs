@@ -142,7 +142,7 @@ pub(super) mod tests {
     /// Asserts that a triad is that of [`cap`], as exact as `tolerance` relative to the field.
     pub fn assert_found(triad: &Triad<f64>, tolerance: f64) {
         assert!((triad.bias - CENTRE).norm() < 475.0 * tolerance, "{}", triad.bias);
-        // A rotation is left open: K Kᵀ is what an ellipsoid tells.
+        // A rotation is left open: K Kᵀ is what an ellipsoid determines.
         let k = triad.sensitivity().unwrap();
         let difference = k * k.transpose() - sensitivity() * sensitivity().transpose();
         assert!(difference.amax() < 10.0 * tolerance, "{difference}");

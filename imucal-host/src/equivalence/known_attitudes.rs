@@ -21,7 +21,7 @@ use crate::{
     recording::SensorKind,
 };
 
-/// More poses than this are thinned for both: what a few thousand tell alike, ten times as many do.
+/// More poses than this are thinned for both: ten times as many determine no more than a few thousand.
 const MOST: usize = 3000;
 
 /// Poses on a rig.

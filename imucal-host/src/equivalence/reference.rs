@@ -115,7 +115,7 @@ pub fn fit_motions(motions: &[MotionData], weights: &[f64], start: &[f64]) -> Op
         let errors = motions.iter().zip(weights).flat_map(|(motion, weight)| {
             let [before, after] = motion.ends().map(UnitQuaternion::from_quaternion);
             let carried = motion.samples.iter().fold(before, |attitude, (rate, held, block)| {
-                let (earth, force) = motion.beside(*block);
+                let (earth, force) = motion.surroundings(*block);
                 let rate = gain * (rate - bias - sensitivity * force) - earth;
                 attitude * UnitQuaternion::from_scaled_axis(rate * *held)
             });

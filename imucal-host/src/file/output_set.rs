@@ -1,6 +1,6 @@
 //! Files that belong together: all of them are replaced, or none.
 //!
-//! Each is written beside its target first. Then all are renamed; where one rename fails, those before it are taken
+//! Each is written next to its target first. Then all are renamed; where one rename fails, those before it are taken
 //! back. A former file is kept under another name (`.imucal-PROCESS-NUMBER.old`) until the last rename is done, so
 //! that a power cut between two renames loses neither.
 
@@ -50,7 +50,7 @@ impl OutputSet {
             Target::Stream(stream) => Destination::Stream { stream, bytes: Vec::new() },
             Target::File { path: target, found } => {
                 part::sweep(folder_of(&target));
-                let part = Part::beside(&target, found.as_ref()).map_err(OutputError::system(path))?;
+                let part = Part::next_to(&target, found.as_ref()).map_err(OutputError::system(path))?;
                 let spared = self.replaceable.as_ref().is_some_and(|files| !files.contains(&target));
                 Destination::File { target, spared, part }
             }
@@ -74,7 +74,7 @@ impl OutputSet {
     ///
     /// # Errors
     ///
-    /// [`OutputError`]; then every file is as it was and nothing is left beside it.
+    /// [`OutputError`]; then every file is as it was and nothing is left next to it.
     pub fn commit(mut self) -> Result<(), OutputError> {
         for output in &mut self.outputs {
             if let Destination::File { part, .. } = &mut output.to {

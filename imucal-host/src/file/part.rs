@@ -38,7 +38,7 @@ pub(super) struct Part {
 
 impl Part {
     /// Starts a file in the target's folder, with owner and mode of the one that it is to replace.
-    pub(super) fn beside(target: &Path, replaced: Option<&Metadata>) -> io::Result<Self> {
+    pub(super) fn next_to(target: &Path, replaced: Option<&Metadata>) -> io::Result<Self> {
         loop {
             let path = name_beside(target, SUFFIX);
             // Held until the part is known, so that a signal between finds it.
@@ -167,7 +167,7 @@ mod tests {
         for name in others.into_iter().chain([".imucal-4194304-0.part"]) {
             fs::write(folder.path().join(name), "left").unwrap();
         }
-        let mine = Part::beside(&folder.path().join("a.csv"), None).unwrap();
+        let mine = Part::next_to(&folder.path().join("a.csv"), None).unwrap();
         sweep(folder.path());
         let kept = |name: &str| folder.path().join(name).exists();
         assert!(!kept(".imucal-4194304-0.part"));

@@ -8,12 +8,12 @@
 //!
 //! The restricted likelihood (Patterson & Thompson 1971), in which the fit's parameters have been integrated out: a
 //! bias takes the slow part of a drift with it, and its residuals alone would show too little of it. A posterior mean,
-//! since a single recording tells a drift badly, and the likeliest one is too small as often as too large, where only
+//! since a single recording determines a drift badly, and the likeliest one is too small as often as too large, where only
 //! too small is false precision. Scatter is none, or of any size: means are no quieter than the noise within them.
 //! Where that noise is not known, p(s²) ∝ 1/s².
 //!
 //! ρ goes from a drift no larger than what the white noise of all observations averages to, to 4000 times its
-//! variance. That there is none at all, a recording cannot tell: without any, the error of a bias is said to be up to
+//! variance. That there is none at all, a recording cannot show: without any, the error of a bias is said to be up to
 //! twice as large as it is (`tests/recovery_rig`).
 
 use std::sync::Arc;

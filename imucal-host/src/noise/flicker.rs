@@ -4,8 +4,8 @@
 //! F(s, t) = 1/n Σ_τ exp(−|s − t| / τ),   τ = 10, 100, … s, the last no shorter than the recording
 //! ```
 //!
-//! A recording cannot tell how a sensor drifts beyond its own length, nor how far its own mean is from the mean that a
-//! longer one would have: that much is assumed, on the pattern of what it can tell. Source: models of flicker by
+//! A recording cannot show how a sensor drifts beyond its own length, nor how far its own mean is from the mean that a
+//! longer one would have: that much is assumed, on the pattern of what it can show. Source: models of flicker by
 //! relaxations, van der Ziel 1950; here one a decade, which departs from 1/f by some percent.
 
 use nalgebra::DMatrix;
@@ -27,7 +27,7 @@ pub fn times(spans: &[Span]) -> Vec<f64> {
     times
 }
 
-/// The processes of flicker of so large a variance, of a speed as observations tell it.
+/// The processes of flicker of so large a variance, of a length of time as the observations have.
 pub fn processes(spans: &[Span], variance: f64) -> Vec<Process> {
     of_times(&times(spans), variance)
 }

@@ -147,7 +147,7 @@ impl Parts<'_> {
         let log = |w: &Weighed| w.log_prior + telling.iter().map(|c| w.columns[*c].0).sum::<f64>();
         let most = weighed.iter().map(log).fold(f64::NEG_INFINITY, f64::max);
         let sum: f64 = weighed.iter().map(|w| (log(w) - most).exp()).sum();
-        let told = |column: usize| {
+        let errors = |column: usize| {
             let components = weighed.iter().flat_map(|w| {
                 let share = (log(w) - most).exp() / sum;
                 w.columns[column].1.iter().map(move |(size, probability)| Component {
@@ -158,9 +158,9 @@ impl Parts<'_> {
                 })
             });
             let components: Vec<Component<'_>> = components.filter(|c| c.weight > LEAST).collect();
-            self.told(&components, freedom)
+            self.errors_from(&components, freedom)
         };
-        Some((0..residuals.ncols()).map(told).collect())
+        Some((0..residuals.ncols()).map(errors).collect())
     }
 
     /// Evidence and sizes of each column at one ratio; `None` where that makes no covariance.
@@ -210,7 +210,7 @@ impl Parts<'_> {
     }
 
     /// The posterior's covariance, its standard errors set by its quantiles.
-    fn told(&self, components: &[Component<'_>], freedom: usize) -> Errors {
+    fn errors_from(&self, components: &[Component<'_>], freedom: usize) -> Errors {
         let count = components.first().map_or(0, |c| c.unscaled.nrows());
         let mut covariance = DMatrix::zeros(count, count);
         let (mut log_scale, mut ratio) = (0.0, 0.0);

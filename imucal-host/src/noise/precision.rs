@@ -212,7 +212,7 @@ pub(crate) mod tests {
         fn covariance(&self, drifts: &[Process]) -> (DMatrix<f64>, Vec<usize>) {
             let blocks = self.times.len();
             let at = |row: usize| (row / blocks, row % blocks);
-            let told: Vec<usize> = (0..blocks * self.channels.len())
+            let measured: Vec<usize> = (0..blocks * self.channels.len())
                 .filter(|row| self.channels[at(*row).0].weights[at(*row).1] > 0.0)
                 .collect();
             let knots = ((self.times[blocks - 1] / SPACING).ceil() as usize + 1).max(2);
@@ -224,10 +224,10 @@ pub(crate) mod tests {
                 let row = self.channels[channel].offsets.row(block);
                 row.iter().find(|(own, _)| *own == offset).map_or(0.0, |(_, u)| *u)
             };
-            let sigma = DMatrix::from_fn(told.len(), told.len(), |i, j| {
-                let ((one, a), (other, b)) = (at(told[i]), at(told[j]));
+            let sigma = DMatrix::from_fn(measured.len(), measured.len(), |i, j| {
+                let ((one, a), (other, b)) = (at(measured[i]), at(measured[j]));
                 let mut sum: f64 = (0..2)
-                    .map(|offset| SIGMA * SIGMA * shared(told[i], offset) * shared(told[j], offset))
+                    .map(|offset| SIGMA * SIGMA * shared(measured[i], offset) * shared(measured[j], offset))
                     .sum();
                 for drift in drifts.iter().filter(|_| one == other) {
                     for (p, q) in (0..knots).flat_map(|p| (0..knots).map(move |q| (p, q))) {
@@ -237,14 +237,14 @@ pub(crate) mod tests {
                 }
                 if i == j { sum + 1.0 / self.channels[one].weights[a] } else { sum }
             });
-            (sigma, told)
+            (sigma, measured)
         }
 
         /// Xᵀ Σ⁻¹ X and ln |Σ|, by their definition.
         pub fn products(&self, x: &[DMatrix<f64>], drifts: &[Process]) -> (DMatrix<f64>, f64) {
-            let (sigma, told) = self.covariance(drifts);
+            let (sigma, measured) = self.covariance(drifts);
             let blocks = self.times.len();
-            let rows: Vec<_> = told.iter().map(|row| x[row / blocks].row(row % blocks)).collect();
+            let rows: Vec<_> = measured.iter().map(|row| x[row / blocks].row(row % blocks)).collect();
             let all = DMatrix::from_rows(&rows);
             let factor = sigma.cholesky().unwrap();
             (all.tr_mul(&factor.solve(&all)), factor.ln_determinant())
@@ -290,10 +290,10 @@ pub(crate) mod tests {
     fn a_weighted_column_is_that_of_the_inverse_covariance() {
         let toy = Toy::new(40, 1);
         let precision = Precision::new(toy.effects(2), SIGMA, &[&DRIFTS]);
-        let (sigma, told) = toy.covariance(&DRIFTS);
+        let (sigma, measured) = toy.covariance(&DRIFTS);
         let x = DVector::from_fn(40, |k, _| ((k * k) as f64).sin());
-        let found = DVector::from_vec(precision.apply(x.as_slice())).select_rows(&told);
-        assert!((sigma * found - x.select_rows(&told)).amax() < 1e-9);
+        let found = DVector::from_vec(precision.apply(x.as_slice())).select_rows(&measured);
+        assert!((sigma * found - x.select_rows(&measured)).amax() < 1e-9);
     }
 
     #[test]

@@ -12,7 +12,7 @@
 //! | r | variance of each of the Gauss–Markov processes that 1/f noise is the sum of, over S, 1/s |
 //! | K_T | covariance of the means of a process of correlation time T, a decade apart ([`flicker`]) |
 //!
-//! A fit has few residuals, a rest has many samples: where noise is 1/f, what it does within seconds tells how far it goes
+//! A fit has few residuals, a rest has many samples: where noise is 1/f, what it does within seconds shows how far it goes
 //! in minutes. Likelihood: restricted, μ and S integrated out (Patterson & Thompson 1971). Not modelled: drift that begins
 //! beyond a rest's length; a share of the prior is kept for that (`KEPT`).
 
@@ -22,7 +22,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 
 use super::{Span, flicker, white};
 
-/// The shortest correlation time that means over half a second tell from white noise, s.
+/// The shortest correlation time that means over half a second distinguish from white noise, s.
 const SHORTEST: f64 = 1.0;
 /// Means of one stretch at most: a longer rest is several.
 const LONGEST: usize = 40;
@@ -135,7 +135,7 @@ impl Factor {
 
     /// Sum of squares about the best mean, whitened.
     fn left(&self, stretch: &[Vector3<f64>], axis: usize) -> f64 {
-        // About one of them first: a mean may be far from zero beside its noise.
+        // About one of them first: a mean may be far from zero compared with its noise.
         let values = DVector::from_fn(stretch.len(), |k, _| stretch[k][axis] - stretch[0][axis]);
         let mean = self.weight.0.dot(&values) / self.weight.1;
         let about = values.add_scalar(-mean);

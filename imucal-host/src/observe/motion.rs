@@ -81,7 +81,7 @@ pub fn later(time: &[f64], attitudes: &[Option<Matrix3<f64>>], lag: f64) -> Atti
         .collect()
 }
 
-/// The gyroscope's samples and what is known beside them.
+/// The gyroscope's samples and what else is known.
 #[derive(Clone, Copy, Debug)]
 pub struct MotionInput<'a> {
     /// Time, s.
@@ -143,7 +143,7 @@ impl MotionData {
     }
 
     /// Earth's rotation, rad/s, and specific force, m/s², over a block, table axes.
-    pub fn beside(&self, block: usize) -> (Vector3<f64>, Vector3<f64>) {
+    pub fn surroundings(&self, block: usize) -> (Vector3<f64>, Vector3<f64>) {
         let at = |all: &[Vector3<f64>]| all.get(block).copied().unwrap_or_default();
         (at(&self.earth), at(&self.force))
     }

@@ -74,7 +74,7 @@ pub struct Poses {
     pub axes: RigAxes,
     /// When each was held.
     pub spans: Vec<Span>,
-    /// White noise within them, nominal unit²·s, where they are long enough to tell.
+    /// White noise within them, nominal unit²·s, where they are long enough to show it.
     pub density: Option<Vector3<f64>>,
 }
 

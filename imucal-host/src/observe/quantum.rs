@@ -26,7 +26,7 @@ pub fn quantum(values: &[Vector3<f64>], usable: &[bool]) -> Vector3<f64> {
 ///
 /// A value that moves by much less than a step is put out as one code, and lies within half a step of it: q²/12. Of
 /// two codes or more, noise of a size σ ≪ q has the value near the edge between them, and noise of σ ≳ q/2 makes the
-/// mean exact (dither; Widrow & Kollár 2008, 5). Which it is the codes' counts tell, those of all rests together: this is
+/// mean exact (dither; Widrow & Kollár 2008, 5). Which it is follows from the codes' counts, those of all rests together: this is
 /// the mean over values and σ, log-uniform, weighed by the counts' likelihood, of the squared difference between the mean
 /// of the codes and the value. Some samples may be of a rest's end that moves. Not modelled: noise that is not normal.
 pub fn variances_of_means<I: Iterator<Item = f64>>(step: f64, rests: impl Iterator<Item = I>) -> Vec<f64> {

@@ -31,7 +31,7 @@ const INITIAL_EXCESS: f64 = 8.0;
 const NOISIEST: f64 = 0.25;
 /// Rows further apart than this are single shots, each a rest of its own, s.
 const SHOT_INTERVAL: f64 = 0.2;
-/// A window tells something while this share of its rows is usable: dropouts are common, clipping is long.
+/// A window is used while this share of its rows is usable: dropouts are common, clipping is long.
 const USABLE_SHARE: f64 = 0.8;
 /// A gap longer than this many usual intervals ends a rest.
 const GAP: f64 = 5.0;
@@ -198,7 +198,7 @@ fn mean_of_measured(values: &[f64]) -> f64 {
 
 /// Cuts out what turns so smoothly that the accelerometer does not notice: about the vertical, or creeping.
 fn without_turning(quiet: Vec<bool>, rate: &[Vector3<f64>]) -> Vec<bool> {
-    // Windows overlap, so every tenth tells as much as all.
+    // Windows overlap, so every tenth says as much as all.
     let chosen: Vec<&Vector3<f64>> =
         quiet.iter().zip(rate).filter(|(still, _)| **still).map(|(_, w)| w).step_by(10).collect();
     let of_axis = |value: &dyn Fn(&Vector3<f64>) -> f64| median(chosen.iter().map(|w| value(w)).collect());

@@ -77,7 +77,7 @@ pub enum TurnGap {
         /// Row after the jump.
         row: usize,
     },
-    /// No encoder or reference tells the attitude in it.
+    /// No encoder or reference gives the attitude in it.
     NoAttitude {
         /// First row without one.
         row: usize,

@@ -36,8 +36,8 @@ impl Fixture {
 
     /// The texts of the warnings of a reading, but for the units that most of these recordings leave out.
     pub(crate) fn warnings(&self) -> Vec<String> {
-        let told = |warning: &&Warning| !matches!(warning, Warning::UnitsAssumed { .. });
-        self.read().warnings.iter().filter(told).map(ToString::to_string).collect()
+        let stated = |warning: &&Warning| !matches!(warning, Warning::UnitsAssumed { .. });
+        self.read().warnings.iter().filter(stated).map(ToString::to_string).collect()
     }
 }
 

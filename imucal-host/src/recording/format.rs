@@ -1,4 +1,4 @@
-//! File formats of the samples, told by the name's ending.
+//! File formats of the samples, known by the name's ending.
 
 use std::path::Path;
 

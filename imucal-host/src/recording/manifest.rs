@@ -196,7 +196,7 @@ impl Default for Manifest {
 }
 
 impl Manifest {
-    /// The manifest's path beside a samples file: `NAME.toml` for `NAME.csv`, `NAME.csv.gz` and
+    /// The manifest's path next to a samples file: `NAME.toml` for `NAME.csv`, `NAME.csv.gz` and
     /// `NAME.parquet`; `None` for a file of another ending.
     #[must_use]
     pub fn path_beside(samples: &Path) -> Option<PathBuf> {

@@ -98,12 +98,12 @@ impl Recording {
     }
 
     /// Reads `NAME.csv`, `NAME.csv.gz` or, when built with the feature `parquet`, `NAME.parquet`, and
-    /// the manifest `NAME.toml` beside it. What is odd but harmless is in [`Recording::warnings`].
+    /// the manifest `NAME.toml` next to it. What is odd but harmless is in [`Recording::warnings`].
     ///
     /// # Errors
     ///
     /// [`ReadError`], when a file is missing, damaged or not what the contract says, or when its
-    /// samples are clearly in another unit than its manifest tells.
+    /// samples are clearly in another unit than its manifest says.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
         Self::read_within(path, &Limits::default())
     }
@@ -143,7 +143,7 @@ impl Recording {
     }
 
     /// Writes the samples, in the units of the manifest, as the ending of `path` says, and the manifest
-    /// beside them, over former files of these names. Both files are replaced, or none.
+    /// next to them, over former files of these names. Both files are replaced, or none.
     ///
     /// # Errors
     ///

@@ -89,7 +89,7 @@ impl Unit {
     }
 
     /// How many of this unit make one of the SI side (m/s², rad/s, µT); `None` for counts, which only
-    /// the manifest's `[counts]` can tell. Arbitrary units count one for one.
+    /// the manifest's `[counts]` can say. Arbitrary units count one for one.
     #[must_use]
     pub fn per_si(self) -> Option<f64> {
         Some(match self {

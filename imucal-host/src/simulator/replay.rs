@@ -3,9 +3,9 @@
 //! Angle, rate and acceleration of each gimbal are those of a cubic through the readings about a row, by least squares:
 //! a movement whose angle is a cubic over that time stays as it is. The cubic is short: a mean over many rows rids their
 //! rates of nearly all the readings' noise, since what one has too much its neighbour lacks, but of no bend that the
-//! cubic has cut. What must not be noisy row by row, as the movement of which an effect's size is told, comes from
+//! cubic has cut. What must not be noisy row by row, as the movement of which an effect's size follows, comes from
 //! longer cubics, the longer the noisier the readings ([`Recorded::steady`]).
-//! Where a wider cubic tells another rate, the gimbal has jerked, and its rate there is not known.
+//! Where a wider cubic gives another rate, the gimbal has jerked, and its rate there is not known.
 //! Between rows the nearest row's swing goes on with constant acceleration. Where readings change no more than their
 //! noise would make them, the cubic goes through those of a fifth of a second. Not modelled: readings that lag the gimbal.
 
@@ -26,7 +26,7 @@ use crate::{
     recording::manifest::{Axis, Rig, RigKind},
 };
 
-/// Readings within so long of a row tell its swing, s: least and most.
+/// Readings within so long of a row give its swing, s: least and most.
 const REACH: (f64, f64) = (0.03, 0.12);
 /// A rate may be as noisy as this, rad/s.
 const RATE_NOISE: f64 = 5e-4;
@@ -58,7 +58,7 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// The movement that encoders tell, rad, wrapped or not; rows without a reading follow their neighbours.
+    /// The movement that encoders show, rad, wrapped or not; rows without a reading follow their neighbours.
     /// `temperature` in °C, one a row. Times strictly increase. `None` where no row has a reading of all three.
     pub fn new(
         time: &[f64],
@@ -152,7 +152,7 @@ impl Recorded for Replay {
         &self.moving
     }
 
-    /// All readings that tell a row's swing were measured, and no gimbal jerked.
+    /// All readings that give a row's swing were measured, and no gimbal jerked.
     fn known(&self) -> &[bool] {
         &self.known
     }
@@ -195,7 +195,7 @@ fn unwrapped(encoders: &[[f64; 3]]) -> Option<Vec<[f64; 3]>> {
     Some(encoders.iter().map(unwrap).collect())
 }
 
-/// How far the readings that tell a swing reach, s. The slope of a cubic through n readings of noise σ has the variance
+/// How far the readings that give a swing reach, s. The slope of a cubic through n readings of noise σ has the variance
 /// 75 σ² / (n³ Δt²).
 fn reach(noise: &[f64; 3], interval: f64) -> f64 {
     let sigma = noise.iter().fold(0.0f64, |most, sigma| most.max(*sigma));
@@ -255,7 +255,7 @@ fn swings(
     reach: usize,
 ) -> (Vec<[Swing; 3]>, Vec<bool>) {
     let interval = (time[time.len() - 1] - time[0]) / (time.len().max(2) - 1) as f64;
-    // What hardly moves does so slowly: more readings tell its rate.
+    // What hardly moves does so slowly: more readings give its rate.
     let patient = ((WINDOW / interval).round() as usize).max(reach);
     let of = |row: usize| {
         if !moving[row] {

@@ -30,7 +30,7 @@ use crate::{
     },
 };
 
-/// Attitudes within this time of a row tell its rate, s: short against a hand's swings.
+/// Attitudes within this time of a row give its rate, s: short against a hand's swings.
 const REACH: f64 = 0.045;
 /// Where it hardly moves, so many times as long.
 const SLOW: usize = 6;
@@ -65,7 +65,7 @@ pub struct Tracked {
 }
 
 impl Tracked {
-    /// The movement that attitudes table → base tell, one a row, `None` where there is none. `temperature` in °C, one a
+    /// The movement that attitudes table → base give, one a row, `None` where there is none. `temperature` in °C, one a
     /// row. Times strictly increase. `None` where no row has an attitude.
     pub fn new(
         time: &[f64],
@@ -84,7 +84,7 @@ impl Tracked {
                 if moving[row] {
                     return near;
                 }
-                // A reference wanders by more than its noise tells: what turns slowly is told from longer.
+                // A reference drifts by more than its noise: a slow turn is estimated over a longer time.
                 let slow = state(time, &filled, row, SLOW * reach);
                 State { w_pt_t: slow.w_pt_t, dw_pt_t: Vector3::zeros(), ..near }
             })

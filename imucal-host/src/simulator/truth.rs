@@ -43,7 +43,7 @@ pub trait Recorded: Motion {
     /// Whether it moves, row by row.
     fn moving(&self) -> &[bool];
 
-    /// Whether the recording tells the attitude, row by row.
+    /// Whether the recording gives the attitude, row by row.
     fn known(&self) -> &[bool];
 
     /// Swings of the gimbals at each row, outermost first, those of [`steady`](Self::steady); `None` without gimbals.
@@ -51,7 +51,7 @@ pub trait Recorded: Motion {
         None
     }
 
-    /// The same movement told from more readings at a time, where they are noisy: less noise row by row, and bends cut.
+    /// The same movement estimated from more readings at a time, where they are noisy: less noise row by row, and bends cut.
     fn steady(&self) -> &dyn Motion;
 }
 

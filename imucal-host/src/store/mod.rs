@@ -298,7 +298,7 @@ impl StoredCalibration {
         let wrong = |reason: String| LoadError::Toml { path: path.into(), reason };
         let text = std::str::from_utf8(bytes).map_err(|e| wrong(e.to_string()))?;
         let explain = |e: toml::de::Error| wrong(explained(text, &e));
-        // The format first: what another one lacks is beside the point.
+        // The format first: what another one lacks does not matter.
         let form::Head { format } = toml::from_str(text).map_err(explain)?;
         if format != FORMAT {
             return Err(LoadError::Format { path: path.into(), found: format });

@@ -5,9 +5,9 @@
 //! many clouds. Gain and centre are all estimated, nine parameters; the radius is given, which for nine parameters
 //! is a choice of unit and no knowledge.
 //!
-//! Source: the figures of models.md 5, of which number of points, soft iron and frame of the SVD are not told. The
+//! Source: the figures of models.md 5, of which number of points, soft iron and frame of the SVD are not given. The
 //! bias is of the second order in the noise and does not depend on the number of points, as long as the scatter is
-//! small beside it.
+//! small compared with it.
 
 use std::fmt::Write;
 

@@ -2,7 +2,7 @@
 //!
 //! Every recording is a multi-position programme of a unit of its own, MTx and 3DM-GX2 in turn, on a base of its own.
 //! Standard errors that are right give scores of mean 0 and standard deviation 1. Sources on the gimbals are scored
-//! against none, as the simulator has none here. Parameters that the poses cannot tell are held and have no score.
+//! against none, as the simulator has none here. Parameters that the poses cannot determine are held and have no score.
 
 use std::fmt::Write;
 
@@ -113,8 +113,8 @@ pub fn scores(seed: u64, noise: Noise, base: Base) -> Result<Scores, SimulationE
             scores[2] = (0..2).map(|k| (found[k] - tilt[k]) / std[k]).collect();
         }
         let sources = rig.sources.iter().flatten();
-        let told = sources.flat_map(|(d, std)| d.iter().zip(std.iter()).filter(|(_, std)| **std > 0.0));
-        scores[7].extend(told.map(|(d, std)| d / std));
+        let determined = sources.flat_map(|(d, std)| d.iter().zip(std.iter()).filter(|(_, std)| **std > 0.0));
+        scores[7].extend(determined.map(|(d, std)| d / std));
     }
     Ok(scores)
 }

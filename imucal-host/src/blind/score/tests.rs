@@ -146,7 +146,7 @@ fn every_figure_can_be_missed_alone_or_with_those_that_follow_from_it() {
 fn a_weak_outside_effect_counts_below_the_figure_at_200() {
     let weak = judged(&[("outside.gyr.ripple", 150.0)], naming(Verdict::None, &[]), None);
     let score = score(&[weak]);
-    let of = |name: &str| score.shares.iter().chain(&score.beside).find(|share| share.name == name).unwrap();
+    let of = |name: &str| score.shares.iter().chain(&score.further).find(|share| share.name == name).unwrap();
     assert_eq!(of("outside the catalogue, flagged, λ ≥ 200").trials, 0);
     assert_eq!(of("outside the catalogue, flagged, λ < 200").trials, 1);
 }
@@ -170,7 +170,7 @@ fn a_diagnosis_that_came_to_no_end_is_an_alarm_and_a_miss() {
     assert!(crashed.alarmed && crashed.is_missed());
     let crashed = judged(&ONE, Answer::of(None), None);
     assert!(!crashed.classes_right && !crashed.credible && crashed.is_missed());
-    assert_eq!(score(&[crashed]).beside.last().unwrap().hits, 1);
+    assert_eq!(score(&[crashed]).further.last().unwrap().hits, 1);
 }
 
 #[test]

@@ -33,7 +33,7 @@ pub enum AccModel {
     /// Bias, scale and non-orthogonality (9).
     #[default]
     T9,
-    /// Bias and scale (6): what six faces can tell.
+    /// Bias and scale (6): what six faces can determine.
     T6,
 }
 
@@ -63,7 +63,7 @@ pub struct AccResult {
     pub outcome: SensorOutcome,
     /// Indices of the rests that were used.
     pub used: Vec<usize>,
-    /// Noise of the rests' means, nominal SI, where the fit tells it.
+    /// Noise of the rests' means, nominal SI, where the fit gives it.
     pub noise: Option<Noise>,
 }
 

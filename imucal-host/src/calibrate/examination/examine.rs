@@ -325,7 +325,7 @@ impl Scene<'_> {
         judged(tests, FULL_GAIN.entries(), &std).into_iter().chain(excess).chain(turning).collect()
     }
 
-    /// How well rests tell the bias: no better than a step of the converter allows, rad/s.
+    /// How well rests determine the bias: no better than a step of the converter allows, rad/s.
     fn bias_errors(&self, values: &[Vector3<f64>], fit: &FitSummary) -> Vector3<f64> {
         let noise = rest_halves::mean_variance(values, self.usable(SensorKind::Gyr), self.rests, 1.0);
         let of_mean = noise.map_or_else(Vector3::zeros, |(variance, _)| variance);

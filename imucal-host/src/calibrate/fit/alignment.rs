@@ -58,7 +58,7 @@ pub struct FieldAtRest {
 }
 
 /// Finds the rotation from what was seen at rests, with errors that follow from those of both sensors' means and of the
-/// accelerometer's calibration; `triad` is the magnetometer's. `None` where the rests cannot tell it.
+/// accelerometer's calibration; `triad` is the magnetometer's. `None` where the rests cannot determine it.
 pub fn align_at_rests(
     directions: &Directions,
     at_rest: &[FieldAtRest],
@@ -102,7 +102,7 @@ pub fn align_at_rests(
 }
 
 /// Finds the rotation from calibrated pairs (specific force, field) alone, each as good as the next; `None` where the
-/// rests cannot tell it.
+/// rests cannot determine it.
 pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Alignment> {
     align_with(pairs, &|_, _| None)
 }
@@ -182,7 +182,7 @@ fn best(model: &DipModel<'_, f64>) -> LevenbergMarquardt<f64, 4> {
     for rotation in relabellings() {
         let phi = nalgebra::Rotation3::from_matrix_unchecked(rotation).scaled_axis();
         let other = fit(SVector::<f64, 4>::new(phi.x, phi.y, phi.z, 0.0));
-        // The nearest to no rotation wins a tie: only rounding tells them apart.
+        // The nearest to no rotation wins a tie: only rounding distinguishes them.
         if other.report().cost < 0.99 * chosen.report().cost {
             chosen = other;
         }

@@ -16,7 +16,7 @@ pub struct Step {
     pub adds: &'static str,
     /// Entries estimated, by index: a model contains another whose entries are all among its own.
     pub entries: Vec<u8>,
-    /// Parameters estimated and told by the observations.
+    /// Parameters estimated and determined by the observations.
     pub free: usize,
     /// Independent residuals.
     pub residuals: usize,

@@ -11,7 +11,7 @@ const STEP: f64 = 0.008;
 /// Halvings of the step: the last is an eighth of a millisecond.
 const HALVINGS: usize = 6;
 /// To either side of the least, s, where the squares are looked at again: they are a parabola there.
-const BESIDE: f64 = 0.002;
+const NEAR: f64 = 0.002;
 
 /// What was found of a lag.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,14 +40,14 @@ impl Lag {
         let mut step = STEP;
         for _ in 0..HALVINGS {
             step *= 0.5;
-            let beside = least(vec![best.1 - step, best.1 + step]).filter(|other| other.0 < best.0);
-            best = beside.unwrap_or(best);
+            let near = least(vec![best.1 - step, best.1 + step]).filter(|other| other.0 < best.0);
+            best = near.unwrap_or(best);
         }
-        let beside = [-BESIDE, 0.0, BESIDE].into_par_iter().map(|aside| fine(best.1 + aside).powi(2));
-        let [below, least, above] = beside.collect::<Vec<_>>()[..] else { return Self::Found(best.1) };
-        let vertex = 0.5 * BESIDE * (below - above) / (below - 2.0 * least + above);
+        let near = [-NEAR, 0.0, NEAR].into_par_iter().map(|aside| fine(best.1 + aside).powi(2));
+        let [below, least, above] = near.collect::<Vec<_>>()[..] else { return Self::Found(best.1) };
+        let vertex = 0.5 * NEAR * (below - above) / (below - 2.0 * least + above);
         // Flat, or bent the other way: no vertex near by.
-        Self::Found(best.1 + if vertex.abs() <= BESIDE { vertex } else { 0.0 })
+        Self::Found(best.1 + if vertex.abs() <= NEAR { vertex } else { 0.0 })
     }
 
     /// In words.

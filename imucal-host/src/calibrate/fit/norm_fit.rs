@@ -133,7 +133,7 @@ impl<const P: usize> NormProblem<'_, P> {
         Residuals::of(&self.model(points), theta).iter().map(|r| r * r).sum()
     }
 
-    /// Rms residual of observations left out of the fit, `folds` contiguous parts in turn, each time fitted anew;
+    /// Rms residual of observations left out of the fit, `folds` contiguous parts in turn, each time fitted again;
     /// `None` where a fit does not converge.
     pub fn held_out_rms(&self, fit: &NormFit<P>, folds: usize) -> Option<f64> {
         let count = fit.points.len();

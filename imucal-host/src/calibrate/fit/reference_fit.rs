@@ -8,10 +8,10 @@
 //! ```
 //!
 //! linear in W and b. W, nine rows of three, has rank one; its leading singular vectors are K and the direction of e.
-//! What is told then: K with the mounting in it, b and the direction of e, but of K's size and the length of e their
+//! What is determined then: K with the mounting in it, b and the direction of e, but of K's size and the length of e their
 //! product alone. K's determinant is taken as positive: a left-handed sensor would show the field reversed.
 //!
-//! How far the sensor is behind the reference ([`super::lag`]) is one more parameter that K is hardly told apart from,
+//! How far the sensor is behind the reference ([`super::lag`]) is one more parameter that K is hardly distinguished from,
 //! since a hand turns about one axis more than about others. Standard errors allow for it: what a lag does to each output
 //! is taken out of the Jacobian's columns, which leaves the covariance of the others whatever the lag is.
 
@@ -42,7 +42,7 @@ const ROUNDS: usize = 3;
 const FOLDS: usize = 5;
 /// Coefficients of the start for each axis: nine of W, one of b.
 const LINEAR: usize = 10;
-/// A singular value below this share of the largest tells nothing.
+/// A singular value below this share of the largest says nothing.
 const SINGULAR: f64 = 1e-6;
 
 /// A fit along a reference.
@@ -57,7 +57,7 @@ pub struct ReferenceFit {
 }
 
 /// Parameters to start from, by the module's equation, the field's length such that K's determinant is one; `None`
-/// where the samples do not tell them.
+/// where the samples do not determine them.
 pub fn start(poses: &[ReferencePose<f64>]) -> Option<UnifiedParameters<f64>> {
     let mut normal = SMatrix::<f64, LINEAR, LINEAR>::zeros();
     let mut right = SMatrix::<f64, LINEAR, 3>::zeros();
@@ -145,8 +145,8 @@ fn summarise<const P: usize>(solved: &Solved<'_, P, ReferencePose<f64>>, by_lag:
     take_out(&mut rows, &lagging.collect::<Vec<_>>());
     let mut factor = Triangular::default();
     rows.residuals.iter().zip(&rows.jacobian).for_each(|(r, j)| factor.push(*r, j));
-    let told = factor.covariance(1.0).zip(solver.variance());
-    let (inflation, covariance) = match told {
+    let unscaled = factor.covariance(1.0).zip(solver.variance());
+    let (inflation, covariance) = match unscaled {
         Some((unscaled, variance)) => {
             let inflation = autocorrelation::inflation(&rows, &unscaled, 3);
             let scale = SMatrix::from_diagonal(&inflation);
@@ -172,7 +172,7 @@ fn take_out<const P: usize>(rows: &mut Rows<P>, direction: &[f64]) {
     }
 }
 
-/// Rms residual of an axis in contiguous parts left out in turn, each time fitted anew; `None` where one does not
+/// Rms residual of an axis in contiguous parts left out in turn, each time fitted again; `None` where one does not
 /// converge.
 fn held_out<const P: usize>(solved: &Solved<'_, P, ReferencePose<f64>>) -> Option<f64> {
     let (model, poses) = (&solved.model, solved.model.poses);

@@ -1,4 +1,4 @@
-//! A gyroscope's bias: the mean of its rests, and how well they tell it.
+//! A gyroscope's bias: the mean of its rests, and how well they determine it.
 //!
 //! ```text
 //! m_k = b + Ω sin λ u_k + e_k
@@ -60,7 +60,7 @@ pub fn errors(rests: &[Rest<f64>], means: &[Vector3<f64>], at_rest: &AtRest<'_>)
         if root[axis] > 0.0 { (means[k][axis] - bias[axis]) / root[axis] } else { 0.0 }
     });
     let errors = parts.errors_of(carried, &scaled, &DMatrix::repeat(count, 1, 1.0));
-    // One rest does not tell how it differs from others: its own noise has to do.
+    // One rest does not show how it differs from others: its own noise has to do.
     let alone = (0..count).map(|k| influence[k] * influence[k] / length(k)).sum::<f64>();
     let of_axis = |axis: usize| errors.as_ref().map_or(alone, |errors| errors[axis].covariance[(0, 0)]);
     let step = quantum::quantum(at_rest.values, at_rest.usable);

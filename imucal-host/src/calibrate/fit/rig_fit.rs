@@ -23,7 +23,7 @@ use crate::{
     observe::pose::Poses,
 };
 
-/// A column that its predecessors leave less than this share of is told by them: far below what noise leaves of an
+/// A column that its predecessors leave less than this share of is determined by them: far below what noise leaves of an
 /// observable one, far above rounding.
 const TOLERANCE: f64 = 1e-5;
 
@@ -34,7 +34,7 @@ pub struct RigFit {
     pub parameters: UnifiedParameters<f64>,
     /// Entries estimated.
     pub entries: Vec<u8>,
-    /// Those of them that the poses cannot tell, with the entry each is like.
+    /// Those of them that the poses cannot determine, with the entry each is like.
     pub held: Vec<(u8, Option<u8>)>,
     /// Its figures: three residuals a pose, held out three at a time.
     pub report: FitReport,
@@ -42,13 +42,13 @@ pub struct RigFit {
     pub covariance: DMatrix<f64>,
 }
 
-/// Where a fit ended, and what the poses told of it.
+/// Where a fit ended, and what the poses determine of it.
 pub(crate) struct Solved<'a, const P: usize, G: Pose<f64>> {
     /// The model, with what is held.
     pub model: UnifiedModel<'a, f64, P, G>,
     /// The solver at its end.
     pub solver: LevenbergMarquardt<f64, P>,
-    /// What the poses do not tell.
+    /// What the poses do not determine.
     pub gauge: Gauge<f64, P>,
 }
 
@@ -58,7 +58,7 @@ pub fn fit<const P: usize>(poses: &Poses, base: &UnifiedParameters<f64>, terms: 
     summarise(poses, &solve(&poses.poses, poses.axes, base, terms, Some(outer)))
 }
 
-/// Solves for `terms` from `base`, holds what the poses do not tell, and keeps a field that is known at its length.
+/// Solves for `terms` from `base`, holds what the poses do not determine, and keeps a field that is known at its length.
 /// `outer` is the rig's outer axis.
 pub(crate) fn solve<'a, const P: usize, G: Pose<f64>>(
     poses: &'a [G],
@@ -83,7 +83,7 @@ pub(crate) fn solve<'a, const P: usize, G: Pose<f64>>(
     let Some(field) = of_known_length(outer, base, &found, &terms, &gauge) else {
         return Solved { model, solver, gauge };
     };
-    // Held anew where the field has its length: K and sources are then those of the field that is known.
+    // Held again where the field has its length: K and sources are then those of the field that is known.
     let model = UnifiedModel { base: UnifiedParameters { vector_n: field, ..*base }, ..model };
     let start = terms.theta(&UnifiedParameters { vector_n: field, ..found });
     let solver = least_squares::solve(&model, start);
@@ -92,10 +92,10 @@ pub(crate) fn solve<'a, const P: usize, G: Pose<f64>>(
 
 /// The field that is known, where what was found of it allows; `None` where nothing of it is held.
 ///
-/// Its length is told by K alone, so that one entry is held; with a source on the outer gimbal, its component along
+/// Its length is determined by K alone, so that one entry is held; with a source on the outer gimbal, its component along
 /// the outer axis as well. The entries that are held are not these, and in a base that points elsewhere they are off,
 /// K and the sources with them: by 8e-4 for half a degree at a declination of 5°. So the field keeps its length, and
-/// where its direction is told but in part, that part by a heading of the base.
+/// where its direction is determined only in part, that part by a heading of the base.
 fn of_known_length<const P: usize>(
     outer: Option<Vector3<f64>>,
     base: &UnifiedParameters<f64>,
@@ -180,11 +180,11 @@ fn covariance<const P: usize>(poses: &Poses, rows: &Rows<P>, held: &[usize]) -> 
         jacobian: &jacobian,
     })?;
     let influence = influence(&jacobian)?;
-    let told = noise.propagated(&poses.spans, &influence);
+    let propagated = noise.propagated(&poses.spans, &influence);
     let mut covariance = DMatrix::zeros(P, P);
     for (i, row) in free.iter().enumerate() {
         for (j, column) in free.iter().enumerate() {
-            covariance[(*row, *column)] = told[(i, j)];
+            covariance[(*row, *column)] = propagated[(i, j)];
         }
     }
     covariance.iter().all(|x| x.is_finite()).then_some(covariance)

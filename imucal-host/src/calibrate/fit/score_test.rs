@@ -22,7 +22,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::rows::influence;
 
-/// A column is told from the model's own where this share of its length is left by their projection.
+/// A column is distinguished from the model's own where this share of its length is left by their projection.
 const LEAST_LEFT: f64 = 1e-4;
 
 /// A fit's residuals and derivatives, made ready for tests.
@@ -121,10 +121,10 @@ impl ScoreTest {
     /// The columns without what the model takes of them, and their coefficients.
     fn regress(&self, columns: &DMatrix<f64>) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let projected = columns - &self.jacobian * self.influence.tr_mul(columns);
-        let told =
+        let distinguished =
             projected.column_iter().zip(columns.column_iter()).all(|(a, b)| a.norm() > LEAST_LEFT * b.norm());
         let length: Vec<f64> = projected.column_iter().map(|column| column.norm()).collect();
-        if !told {
+        if !distinguished {
             return None;
         }
         let mut unit = projected.clone();

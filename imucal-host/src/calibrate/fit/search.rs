@@ -147,7 +147,7 @@ mod tests {
 
     use super::*;
 
-    /// A sine with a slope: Levenberg–Marquardt from zero stops in the dip beside it, below is another.
+    /// A sine with a slope: Levenberg–Marquardt from zero stops in the dip next to it, below is another.
     struct Dips;
 
     impl Model<f64, 1> for Dips {
@@ -162,7 +162,7 @@ mod tests {
         }
     }
 
-    /// What cannot draw together: the cost does not tell where.
+    /// What cannot draw together: the cost does not say where.
     struct Flat;
 
     impl Cost<f64, 1> for Flat {

@@ -9,7 +9,7 @@
 //!
 //! with the white noise S and the converter's steps q that rests show ([`RestNoise`]), and F the covariance of unit
 //! flicker ([`flicker`]). The samples of a cloud are too many for that. Those of a block see one drift e, of which they
-//! tell z = Σ n r = N e + white noise of covariance N, N = Σ n nᵀ: with N = Q Λ Qᵀ the rows Λ^−½ Qᵀ z have white noise of
+//! give z = Σ n r = N e + white noise of covariance N, N = Σ n nᵀ: with N = Q Λ Qᵀ the rows Λ^−½ Qᵀ z have white noise of
 //! unit variance, whatever is alike within a block included, flicker of covariance (Λ^½Qᵀ) F (Λ^½Qᵀ)ᵀ, and of a rest's
 //! points the steps of the converter, alike: (Λ^½Qᵀ) diag(q) (Λ^½Qᵀ)ᵀ. What the solver's classical covariance lacks is
 //! then a ratio for each parameter.
@@ -38,7 +38,7 @@ use crate::noise::{
 
 /// Blocks of a cloud at most, and points of a block at least.
 const BLOCKS: (usize, usize) = (100, 10);
-/// A direction of which a block sees less than this share of what it sees of all tells nothing but rounding.
+/// A direction of which a block sees less than this share of what it sees of all says nothing but rounding.
 const SEEN: f64 = 1e-3;
 /// Correlation times of a cloud's flicker, in lengths of the cloud.
 const TIMES: [f64; 4] = [0.01, 0.1, 1.0, 10.0];
@@ -152,10 +152,10 @@ fn block<const P: usize>(
     points: Range<usize>,
 ) -> Block<P> {
     let mut seen = Matrix3::zeros();
-    let (mut told, mut by) = (Vector3::zeros(), SMatrix::<f64, 3, P>::zeros());
+    let (mut weighed, mut by) = (Vector3::zeros(), SMatrix::<f64, 3, P>::zeros());
     for k in points.clone() {
         seen += normals[k] * normals[k].transpose();
-        told += normals[k] * rows.residuals[k];
+        weighed += normals[k] * rows.residuals[k];
         by += normals[k] * rows.jacobian[k].transpose();
     }
     let eigen = seen.symmetric_eigen();
@@ -165,7 +165,7 @@ fn block<const P: usize>(
     Block {
         span: at[points.start]..at[points.end - 1],
         sees: DMatrix::from_fn(kept.len(), 3, |row, axis| root(kept[row]) * along(kept[row])[axis]),
-        residuals: DVector::from_fn(kept.len(), |row, _| along(kept[row]).dot(&told) / root(kept[row])),
+        residuals: DVector::from_fn(kept.len(), |row, _| along(kept[row]).dot(&weighed) / root(kept[row])),
         jacobian: DMatrix::from_fn(kept.len(), P, |row, k| {
             along(kept[row]).dot(&by.column(k)) / root(kept[row])
         }),
@@ -251,7 +251,7 @@ fn blocked<const P: usize>(
         scale: Scale::Free,
         five: !shown.within.is_empty(),
     };
-    // The points' own white noise, of which blocks tell but a part.
+    // The points' own white noise, of which blocks show only a part.
     let all = DMatrix::from_fn(P, P, |i, j| unscaled[(i, j)]);
     let influence = &jacobian * &all;
     let drifting = influence.tr_mul(&(&drift * &influence));

@@ -22,7 +22,7 @@ use crate::{
 
 /// How far into a still stretch a motion reaches, s; to its middle where that is nearer.
 const MARGIN: f64 = 1.0;
-/// Fewer motions do not tell a lag beside the gain.
+/// Fewer motions do not distinguish a lag from the gain.
 const LEAST_FOR_LAG: usize = 16;
 /// Length of a motion between optical references, s.
 pub const OPTICAL: f64 = 1.5;
@@ -31,7 +31,7 @@ pub const OPTICAL: f64 = 1.5;
 pub struct Observations {
     /// The motions.
     pub data: Vec<MotionData>,
-    /// Static bias, where there is a rest to tell it, rad/s.
+    /// Static bias, where there is a rest to measure it, rad/s.
     pub bias: Vector3<f64>,
     /// How the bias moved from one still stretch to another, where there are any.
     pub wander: Option<BiasWander>,
@@ -111,7 +111,7 @@ fn still(input: &MotionInput<'_>, rows: &Range<usize>, attitude: &Matrix3<f64>) 
     })
 }
 
-/// What the mean rates of the still stretches show of noise, beside one constant bias.
+/// What the mean rates of the still stretches show of noise, with one constant bias.
 fn noise(
     input: &MotionInput<'_>,
     stretches: &[(Range<usize>, Matrix3<f64>)],

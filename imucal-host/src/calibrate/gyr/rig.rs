@@ -41,7 +41,7 @@ pub const MODELS: [(&str, &str); 2] = [(G12, "gain and bias"), (G21, "g-sensitiv
 
 /// Motions at least, per nine parameters of the gain.
 const LEAST_MOTIONS: usize = 8;
-/// A motion tells something of the gain once it turns by this much, rad (5°).
+/// A motion counts for the gain once it turns by this much, rad (5°).
 const LEAST_ANGLE: f64 = 0.087;
 
 /// Calibrates against attitudes, and gives what it is calibrated from; `None` where the recording has none, or the field form is asked for.
@@ -142,7 +142,7 @@ fn refused(model: &'static str, refusal: Refusal, fit: Option<FitSummary>) -> Se
 }
 
 /// Of a fit to motions whose errors are independent, and of the bias's drift: that from one motion to the next is a
-/// part of those errors, and a bias is not told better than the mean of its drift is.
+/// part of those errors, and a bias is not known better than the mean of its drift is.
 fn covariance(fit: &MotionFit, observations: &Observations) -> DMatrix<f64> {
     let Some(noise) = &observations.noise else { return fit.covariance.clone() };
     let drift = noise.without_white();

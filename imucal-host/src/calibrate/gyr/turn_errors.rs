@@ -74,7 +74,7 @@ fn linear(between: &Between<'_>, gain: &Matrix3<f64>) -> Linear {
     let rows = Rows::of(&TurnModel { turns: &turn, form: FULL }, &FULL.theta(&triad));
     let across = across(&turn[0].after);
     let jacobian = SMatrix::<f64, 3, 12>::from_fn(|row, k| rows.jacobian[row][k]);
-    let told = &across * jacobian;
+    let moved = &across * jacobian;
     let c = attitude(&triad, &turn[0]);
     let residual = Vector3::from_column_slice(&rows.residuals);
     let residual = &across * residual;
@@ -82,8 +82,8 @@ fn linear(between: &Between<'_>, gain: &Matrix3<f64>) -> Linear {
         rests: between.rests,
         duration: (0..turn[0].blocks.len()).map(|k| turn[0].durations.get(k)).sum(),
         residual: [residual[0], residual[1]],
-        by_gain: DMatrix::from_fn(2, 9, |row, k| told[(row, k)]),
-        by_bias: told.fixed_columns::<3>(9).into(),
+        by_gain: DMatrix::from_fn(2, 9, |row, k| moved[(row, k)]),
+        by_bias: moved.fixed_columns::<3>(9).into(),
         by_before: &across * c.transpose(),
         by_after: -across,
     }

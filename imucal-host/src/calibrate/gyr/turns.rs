@@ -46,7 +46,7 @@ use crate::{
 pub const MODEL: &str = "K9";
 /// Turns at least: nine parameters from two residuals a turn, and some to check them.
 const LEAST_TURNS: usize = 8;
-/// A turn tells something once a direction moves by this much, rad (15°).
+/// A turn counts once a direction moves by this much, rad (15°).
 const LEAST_ANGLE: f64 = 0.26;
 /// The bias wanders where the rests' means spread this many times wider than their own noise explains.
 const WANDER: f64 = 1.5;
@@ -362,7 +362,7 @@ fn gain_covariance(
     turn_errors::errors(&between, gain, input.directions?, &rates).map(|errors| turn_errors::fixed(&errors))
 }
 
-/// The axis that carries one direction of gravity to the next, both senses: a turn and its reverse tell the same.
+/// The axis that carries one direction of gravity to the next, both senses: a turn and its reverse say the same.
 fn turn_axis(turn: &Turn<'_, f64>) -> impl Iterator<Item = Vector3<f64>> + Clone + use<> {
     let axis = turn.before.cross(&turn.after).try_normalize(1e-6);
     axis.into_iter().flat_map(|a| [a, -a])

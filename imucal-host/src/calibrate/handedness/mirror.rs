@@ -1,8 +1,8 @@
 //! Whether the triads have the axes they are said to have: none mirrored, negated or swapped.
 //!
-//! Norms are blind to it. What is there to tell it, by hand and with the accelerometer's axes as the frame:
+//! Norms are blind to it. What shows it, by hand and with the accelerometer's axes as the frame:
 //!
-//! | relation | told by | means |
+//! | relation | known from | means |
 //! | --- | --- | --- |
 //! | A, gyroscope to accelerometer | gravity over the turns, see [`super::turn_sense`] | improper: the gyroscope is mirrored |
 //! | M, magnetometer to accelerometer, proper | the dip's constancy, see [`crate::calibrate::fit::alignment`] | a mirrored one of the two is like one turned by M in a field reversed |
@@ -12,7 +12,7 @@
 //! right. Nothing is undone here, since the guess may be wrong: what contradicts is refused, and what would mend it is
 //! named. On a rig attitudes are known, the gain takes the order of the axes up, and it is said.
 //!
-//! Not told: two sensors turned alike, which is how they are mounted; without a site, all axes of the magnetometer or of
+//! Not seen: two sensors turned alike, which is how they are mounted; without a site, all axes of the magnetometer or of
 //! the accelerometer reversed.
 
 use imucal_core::{
@@ -36,17 +36,17 @@ use crate::{
 /// A mount turned by more than this from every order of the axes has none, rad (30°).
 const OBLIQUE: f64 = 0.52;
 
-/// What is known of a magnetometer beside an accelerometer.
+/// What is known of a magnetometer next to an accelerometer.
 struct Aligned {
     /// M, where it is an order of the axes.
     order: Option<Matrix3<f64>>,
-    /// The dip is reversed against the site's; `None` where the site or the dip does not tell it.
+    /// The dip is reversed against the site's; `None` where the site or the dip does not say.
     reversed: Option<bool>,
     /// Dip, rad.
     dip: f64,
 }
 
-/// Looks at what was calibrated; refuses what contradicts, and warns of what cannot be told.
+/// Looks at what was calibrated; refuses what contradicts, and warns of what cannot be decided.
 pub fn check(recording: &Recording, calibration: &mut Calibration) {
     let sense = sense(recording, calibration);
     if let Some(sense) = sense.filter(|sense| sense.factor != 1.0) {
@@ -112,9 +112,9 @@ fn wrong_unit(recording: &Recording, calibration: &mut Calibration, factor: f64)
 /// On a rig a gain has the order of the axes in it.
 fn undone(calibration: &mut Calibration) {
     for kind in SensorKind::ALL {
-        // Along a reference the field's direction is told beside the gain, up to both reversed: see `along_reference`.
-        let told = |outcome: &&SensorOutcome| !matches!(outcome.evidence, Some(Evidence::Reference(..)));
-        let fit = calibration.sensor(kind).filter(told).and_then(SensorOutcome::passed);
+        // Along a reference the field's direction is determined with the gain, up to both reversed: see `along_reference`.
+        let directed = |outcome: &&SensorOutcome| !matches!(outcome.evidence, Some(Evidence::Reference(..)));
+        let fit = calibration.sensor(kind).filter(directed).and_then(SensorOutcome::passed);
         let Some((code, _)) = fit.filter(|fit| fit.rig.is_some()).map(order).filter(|(code, _)| *code != 0)
         else {
             continue;
@@ -133,7 +133,7 @@ fn order(fit: &FitSummary) -> (usize, f64) {
     nearest(&fit.triad.gain.transpose())
 }
 
-/// A gyroscope that was refused on a rig whose accelerometer tells the table's axes.
+/// A gyroscope that was refused on a rig whose accelerometer gives the table's axes.
 fn rig_gyroscope(calibration: &mut Calibration, turned: Option<usize>) {
     let mount = calibration.sensor(SensorKind::Acc).and_then(SensorOutcome::passed).map(|fit| order(fit).0);
     let refused = calibration.sensor(SensorKind::Gyr).is_some_and(|gyr| gyr.verdict.is_err());
@@ -182,7 +182,7 @@ fn aligned(recording: &Recording, calibration: &Calibration) -> Option<Aligned> 
 }
 
 /// The same of a magnetometer that was calibrated along a reference attitude. However its frame stands, and the sensors
-/// on its body: each fit takes its sensor for right-handed, and tells its axes and the direction of what it measures.
+/// on its body: each fit takes its sensor for right-handed, and gives its axes and the direction of what it measures.
 fn along_reference(recording: &Recording, calibration: &Calibration) -> Option<Aligned> {
     let outcome = calibration.sensor(SensorKind::Mag)?;
     let (fit, Evidence::Reference(_, found)) = (outcome.passed()?, outcome.evidence.as_ref()?) else {
@@ -352,7 +352,7 @@ fn refuse_axes(calibration: &mut Calibration, kind: SensorKind, code: usize, adv
     refuse(calibration, kind, refusal, advice);
 }
 
-/// Refuses a sensor; a gyroscope's refusal gets its true cause, and any other stays with a warning beside it.
+/// Refuses a sensor; a gyroscope's refusal gets its true cause, and any other stays, with a warning.
 fn refuse(calibration: &mut Calibration, kind: SensorKind, refusal: Refusal, advice: String) {
     let Some(outcome) = calibration.sensors.iter_mut().find(|outcome| outcome.kind == kind) else { return };
     if outcome.verdict.is_err() && kind != SensorKind::Gyr {

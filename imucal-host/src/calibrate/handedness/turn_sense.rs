@@ -14,7 +14,7 @@
 //! With an accelerometer whose axes read Q f, Q orthogonal, gravity turns by `det(Q) Q ω`: where the gyroscope is right P
 //! is always proper, `+Q` or `−Q`. So an improper P says that the gyroscope is mirrored, and a proper one other than 1
 //! that either sensor is turned, or the accelerometer mirrored. Reversing all axes of the accelerometer (f taken for
-//! gravity) does not show. Not modelled: misalignment, since P is told from others by much more.
+//! gravity) does not show. Not modelled: misalignment, since P differs from others by much more.
 
 use std::ops::Range;
 
@@ -31,7 +31,7 @@ use crate::{
     recording::{Recording, median},
 };
 
-/// A turn tells something once a direction moves by this much, rad (15°).
+/// A turn counts once a direction moves by this much, rad (15°).
 const LEAST_ANGLE: f64 = 0.26;
 /// Multiple of the initial rest's variance up to which the accelerometer alone is at rest.
 const MULTIPLIER: f64 = 5.0;

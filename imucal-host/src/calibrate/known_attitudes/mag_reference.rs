@@ -42,7 +42,7 @@ use crate::{
 
 /// To either side of the lag, s, where attitudes are looked at for how they turn with it.
 const ASIDE: f64 = 0.004;
-/// Samples that the search for a lag looks at: it is told by a thousand as well as by all.
+/// Samples that the search for a lag looks at: a thousand determine it as well as all.
 const FOR_LAG: usize = 1500;
 
 /// What a magnetometer is calibrated from.
@@ -169,7 +169,7 @@ fn outcome(
     }
 }
 
-/// What the fit is made of and what it does not tell, in words.
+/// What the fit is made of and what it does not determine, in words.
 fn note(summary: &mut FitSummary, samples: &Samples, found: &ReferenceFit, known: bool) {
     let direction = found.fit.parameters.vector_n.normalize();
     let Some(rig) = &mut summary.rig else { return };

@@ -22,10 +22,10 @@ use crate::{
     recording::{Recording, SensorKind, Triple, Unit},
 };
 
-/// Poses at least: the affine part has twelve parameters, and each pose tells three.
+/// Poses at least: the affine part has twelve parameters, and each pose gives three.
 const LEAST_POSES: usize = 6;
 
-/// A tilt with a larger standard error is not told, rad: a spirit level knows it to 0.2°.
+/// A tilt with a larger standard error is not determined, rad: a spirit level knows it to 0.2°.
 const LEVELLED: f64 = 3.5e-3;
 /// A tilt is one from so many standard errors on.
 const SIGNIFICANT_TILT: f64 = 4.0;
@@ -62,7 +62,7 @@ pub fn accelerometer(
     Some(outcome(SensorKind::Acc, &rung, &poses, sensor, gravity))
 }
 
-/// The poses tell the base's tilt, where it was asked for. Held is the exact case; noise, scatter of the stops and a
+/// The poses determine the base's tilt, where it was asked for. Held is the exact case; noise, scatter of the stops and a
 /// tilted base leave poses that ought to be exact a little of their own, and an error far beyond any base.
 fn tells_tilt(fit: &RigFit) -> bool {
     [12, 13].iter().all(|entry| {
@@ -76,7 +76,7 @@ fn tilt(calibration: &Calibration) -> Option<([f64; 2], [f64; 2])> {
     calibration.sensor(SensorKind::Acc)?.passed()?.rig.as_ref()?.tilt
 }
 
-/// The base's tilt; `None` where it is none or hardly told: an error of its own would pass for one of the field.
+/// The base's tilt; `None` where it is none or hardly determined: an error of its own would pass for one of the field.
 fn known_tilt(calibration: &Calibration) -> Option<[f64; 2]> {
     let (tilt, std) = tilt(calibration)?;
     tilt.iter().zip(std).any(|(tilt, std)| tilt.abs() > SIGNIFICANT_TILT * std).then_some(tilt)
@@ -94,7 +94,7 @@ pub fn magnetometer(
     let field = Vector3::from(recording.manifest.site.field_ned_ut?);
     let poses = poses(recording, sensor, usable, calibration)?;
     // The base stands for both sensors: a tilt of 0.05° is 0.1 % of the horizontal field, and of K where that alone
-    // tells its scale.
+    // determines its scale.
     let mut base = UnifiedParameters::nominal(field);
     if let Some(tilt) = known_tilt(calibration) {
         base.tilt = tilt;
@@ -164,7 +164,7 @@ fn poses(
             (2 * locked > all).then(|| {
                 format!(
                     "{locked} of {all} poses are in gimbal lock: outer and inner gimbal turn about one axis there, and \
-                     two angles tell what one does; turn the middle gimbal away from it"
+                     two angles say what one does; turn the middle gimbal away from it"
                 )
             })
         }

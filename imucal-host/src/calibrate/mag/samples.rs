@@ -222,7 +222,7 @@ fn advice(refusal: &Refusal) -> String {
     .into()
 }
 
-/// Turns an accepted magnetometer alone into the accelerometer's axes, where the rests tell the rotation.
+/// Turns an accepted magnetometer alone into the accelerometer's axes, where the rests determine the rotation.
 /// `at_rest` is its nominal output at rests, of which `directions` knows the specific force.
 pub fn align_with(fit: &mut FitSummary, directions: &Directions, at_rest: &[FieldAtRest]) {
     let Some(alignment) = alignment::align_at_rests(directions, at_rest, &fit.triad) else { return };

@@ -15,7 +15,7 @@ pub struct Saturation {
     pub rows: Range<usize>,
     /// The value of the first of them, m/s², rad/s or µT.
     pub value: f64,
-    /// Whether it is the manifest's full scale; else the limit was told from the samples or the
+    /// Whether it is the manifest's full scale; else the limit was estimated from the samples or the
     /// converter's width.
     pub declared: bool,
 }
@@ -116,8 +116,8 @@ impl<'a> AxisSamples<'a> {
             let here = &self.triple.values[row];
             let differs =
                 |near: &Vector3<f64>| (0..3).any(|axis| axis != self.axis && near[axis] != here[axis]);
-            let beside = [row.checked_sub(1), Some(row + 1)].into_iter().flatten();
-            beside.filter_map(|row| self.triple.values.get(row)).any(differs)
+            let neighbours = [row.checked_sub(1), Some(row + 1)].into_iter().flatten();
+            neighbours.filter_map(|row| self.triple.values.get(row)).any(differs)
         };
         let at = || (0..self.values.len()).filter(|row| self.values[*row] == extreme);
         let moving = at().filter(|row| others_move(*row)).count();

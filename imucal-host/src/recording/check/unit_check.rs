@@ -134,7 +134,7 @@ fn looks_like_counts(triple: &Triple, median: f64) -> bool {
     median * triple.nominal.per_unit > 500.0 && triple.values.iter().all(|value| value.iter().all(integer))
 }
 
-/// Looks for one axis in `g` or `mg` beside others in m/s² or the like: only if rescaling that axis
+/// Looks for one axis in `g` or `mg` next to others in m/s² or the like: only if rescaling that axis
 /// makes a length that varies steady, and steady at gravity.
 fn check_axes(recording: &Recording, triple: &Triple) -> Result<(), ReadError> {
     let Some(own) = triple.unit.per_si() else {

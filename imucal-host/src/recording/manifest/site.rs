@@ -36,7 +36,7 @@ impl Site {
         })
     }
 
-    /// Whether Earth's field points down here: by the field, else by the hemisphere; `None` where neither tells it, near
+    /// Whether Earth's field points down here: by the field, else by the hemisphere; `None` where neither says so, near
     /// the magnetic equator too.
     #[must_use]
     pub fn field_points_down(&self) -> Option<bool> {

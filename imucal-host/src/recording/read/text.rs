@@ -32,7 +32,7 @@ pub(crate) struct Text<'a> {
     ended: bool,
     /// The last byte that was consumed.
     last: Option<u8>,
-    /// How long the text probably is, where the file tells.
+    /// How long the text probably is, where the file says.
     pub(crate) expected: u64,
     /// The compressed stream ended early.
     pub(crate) truncated: bool,

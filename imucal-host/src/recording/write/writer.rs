@@ -17,7 +17,7 @@ use crate::{
     },
 };
 
-/// Writes the samples to `path` and the manifest beside it.
+/// Writes the samples to `path` and the manifest next to it.
 pub(crate) fn write(recording: &Recording, path: &Path, files: &mut OutputSet) -> Result<(), WriteError> {
     let format =
         Format::of(path).map_err(|found| WriteError::UnknownFormat { path: path.to_path_buf(), found })?;

@@ -120,7 +120,7 @@ impl Programme {
         Ok(Schedule::new(axes, plan.into_segments(), climate, place))
     }
 
-    /// Warms and cools, so that temperature and time are told apart; strongly where that is the point.
+    /// Warms and cools, so that temperature and time are distinguished; strongly where that is the point.
     fn climate(self, duration: f64, random: &mut Random) -> Climate {
         let swing = match self {
             Self::Thermal | Self::Full => random.between(5.0, 8.0),

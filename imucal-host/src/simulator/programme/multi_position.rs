@@ -14,7 +14,7 @@ use crate::{
     },
 };
 
-/// Attitudes beside the six faces.
+/// Attitudes besides the six faces.
 const OBLIQUE: usize = 18;
 /// Attitudes that come twice.
 const REVISITS: usize = 6;
@@ -27,7 +27,7 @@ pub(super) fn add(plan: &mut Plan, axes: [Axis; 3], random: &mut Random) {
         poses.push(oblique(axes, &poses, random));
     }
     random.shuffle(&mut poses);
-    // Revisits come late, so that they tell of time.
+    // Revisits come late, so that they show what time does.
     let revisits: Vec<[f64; 3]> = poses.iter().take(REVISITS).copied().collect();
     let late = poses.len() / 2;
     for revisit in revisits {

@@ -71,7 +71,7 @@ impl Schedule {
         self
     }
 
-    /// Gimbals that come to rest some thousandths of a degree off their encoders, anew at each rest: `sigma` in rad.
+    /// Gimbals that come to rest some thousandths of a degree off their encoders, by another angle at each rest: `sigma` in rad.
     #[must_use]
     pub fn scattered(mut self, sigma: f64, random: &mut Random) -> Self {
         let mut here = [0.0; 3];

@@ -121,8 +121,8 @@ mod tests {
             for (one, other) in [(60, 60), (20, 60), (5, 8)] {
                 let products = courses.iter().map(|course| course[one].dot(&course[other]) / 3.0);
                 let found = products.sum::<f64>() / courses.len() as f64;
-                let told = drift.covariance(2.0 * one as f64, 2.0 * other as f64);
-                assert!((found - told).abs() < 0.1 * 2.25, "{kind:?} {one} {other}: {found} {told}");
+                let stated = drift.covariance(2.0 * one as f64, 2.0 * other as f64);
+                assert!((found - stated).abs() < 0.1 * 2.25, "{kind:?} {one} {other}: {found} {stated}");
             }
         }
     }

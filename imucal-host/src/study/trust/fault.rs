@@ -273,7 +273,7 @@ fn swap(recording: &mut Recording, hand: &mut Hand, kind: SensorKind, random: &m
 const CYCLE: Matrix3<f64> = Matrix3::new(0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0);
 
 /// Puts an orthogonal matrix before a sensor's output. The truth is what leads back, so that a norm, which sees neither
-/// order nor signs, is right where nothing else could tell them.
+/// order nor signs, is right where nothing else could show them.
 fn rearrange(recording: &mut Recording, hand: &mut Hand, kind: SensorKind, axes: &Matrix3<f64>) {
     let triple = match kind {
         Acc => &mut recording.acc,

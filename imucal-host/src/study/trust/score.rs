@@ -64,7 +64,7 @@ fn errors(fit: &FitSummary, truth: &Triad<f64>) -> Vec<f64> {
     entries.map(error).map(|(error, std)| if error == 0.0 { 0.0 } else { error / std }).collect()
 }
 
-/// The truth in the axes that the fit is in: a norm alone tells an upper triangular gain.
+/// The truth in the axes that the fit is in: a norm alone determines an upper triangular gain.
 pub(super) fn in_gauge_of(fit: &FitSummary, truth: &Triad<f64>) -> Triad<f64> {
     let upper = fit.covariance_of.iter().all(|entry| ![3, 6, 7].contains(entry));
     if !upper {

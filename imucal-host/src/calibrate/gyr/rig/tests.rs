@@ -148,7 +148,7 @@ fn a_comparison_stops_at_the_gain_without_further_cause() {
     let second: Vec<f64> = found.rungs.iter().filter_map(|(step, _)| step.second_half_rms).collect();
     println!("{second:?}");
     let [nominal, bias, field, full, with_force] = second[..] else { panic!("{second:?}") };
-    // Of a sound sensor gravity's direction tells as much as attitudes do, to within the second half's own noise; what
+    // Of a sound sensor gravity's direction determines as much as attitudes do, to within the second half's own noise; what
     // is not there to be found does not help.
     assert!(nominal > bias && bias > 5.0 * field && (field / full - 1.0).abs() < 0.15, "{second:?}");
     assert!(with_force > 0.95 * full, "{second:?}");
