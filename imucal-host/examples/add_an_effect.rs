@@ -40,6 +40,7 @@ static OWN: LazyLock<Effect> = LazyLock::new(|| Effect {
     part: Part::Candidate,
     needs: Needs::NOTHING,
     absorbed: false,
+    changes: None,
 });
 
 /// A parameter that the effect is linear in.

@@ -73,7 +73,7 @@ pub fn omission(effect: &Effect) -> Option<Omission> {
     match effect.part {
         _ if effect.absorbed => Some(Omission::Baseline),
         Part::TriadTerm | Part::RigTerm(_) | Part::Nuisance(_) => Some(Omission::Baseline),
-        Part::Fault(Spoils::Nothing) => Some(Omission::Convention),
+        Part::Fault(Spoils::Nothing | Spoils::Scale) => Some(Omission::Convention),
         Part::Fault(Spoils::Passage | Spoils::Repeats) => Some(Omission::NoMean),
         Part::Fault(Spoils::BeyondLimit) | Part::Candidate | Part::ClockTerm => None,
     }

@@ -2,7 +2,7 @@
 
 use imucal_core::triad::Triad;
 
-use super::{Act, Effect, Parameter, Part, SensorKind, Words, XYZ, member_id, of, si, vector};
+use super::{Act, Effect, Parameter, Part, SensorKind, TriadEntries, Words, XYZ, member_id, of, si, vector};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -18,7 +18,8 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         Parameter::amplitudes(&XYZ, &si(kind), of(kind, 0.1, 0.01, 1.0)),
         words,
     )
-    .part(Part::TriadTerm);
+    .part(Part::TriadTerm)
+    .changing(TriadEntries::Bias);
     match kind {
         SensorKind::Mag => effect.like("mag.hard_iron", "none: the two are the same"),
         _ => effect.like(&member_id(kind, "bias_drift"), "the same attitude at the beginning and at the end"),

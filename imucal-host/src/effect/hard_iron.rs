@@ -1,6 +1,6 @@
 //! A magnet fixed to the sensor: `mag.hard_iron`.
 
-use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, XYZ, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, TriadEntries, Words, XYZ, vector};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -16,6 +16,7 @@ pub(super) fn effect() -> Effect {
     )
     .needing(Needs::OTHER_CALIBRATION)
     .absorbed()
+    .changing(TriadEntries::Bias)
     .like("mag.bias", "none: the two are the same")
     .like("mag.gimbal_hard_iron_middle", "turns of the inner gimbal; along its axis the two are the same")
 }

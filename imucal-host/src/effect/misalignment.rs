@@ -3,7 +3,7 @@
 use imucal_core::triad::Triad;
 use nalgebra::Matrix3;
 
-use super::{Act, Effect, Parameter, Part, SensorKind, Words, member_id};
+use super::{Act, Effect, Parameter, Part, SensorKind, TriadEntries, Words, member_id};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -20,6 +20,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         words,
     )
     .part(Part::TriadTerm)
+    .changing(TriadEntries::OffDiagonal)
     .like(&member_id(kind, "cross_axis_product"), "inputs of both signs on each pair of axes");
     match kind {
         SensorKind::Mag => effect.like("mag.soft_iron", "none: its symmetric part is the same"),

@@ -63,6 +63,7 @@ mod temp_bias_quadratic;
 mod temp_scale;
 mod time_offset;
 mod transient;
+mod triad_entries;
 mod truth;
 mod unit_error;
 mod vibration_rectification;
@@ -77,6 +78,7 @@ pub use self::{
     parameter::{Parameter, Role},
     part::{Free, Needs, Part, Spoils},
     sensor_run::{DataRun, SensorRun, SignalRun},
+    triad_entries::TriadEntries,
     truth::{Input, Truth},
     words::{Confusable, Words},
 };
@@ -152,6 +154,8 @@ pub struct Effect {
     pub needs: Needs,
     /// A calibration made of the recording itself takes it up wholly.
     pub absorbed: bool,
+    /// Entries of a triad that its parameters change.
+    pub changes: Option<TriadEntries>,
 }
 
 /// Effects are the same if they bear the same name.
@@ -179,6 +183,7 @@ impl Effect {
             part: Part::Candidate,
             needs: Needs::NOTHING,
             absorbed: false,
+            changes: None,
         }
     }
 
@@ -189,6 +194,11 @@ impl Effect {
 
     fn on(mut self, kind: SensorKind) -> Self {
         self.sensors = only(kind);
+        self
+    }
+
+    fn changing(mut self, entries: TriadEntries) -> Self {
+        self.changes = Some(entries);
         self
     }
 

@@ -39,6 +39,8 @@ pub enum Free {
 pub enum Spoils {
     /// The samples are a linear function of the right ones, which can be undone.
     Nothing,
+    /// Likewise, but of another size, so that any may seem to lie beyond the range.
+    Scale,
     /// Rows that repeat the one before.
     Repeats,
     /// Rows beyond the limit.

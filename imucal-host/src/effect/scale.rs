@@ -3,7 +3,7 @@
 use imucal_core::triad::Triad;
 use nalgebra::Matrix3;
 
-use super::{Act, Effect, Parameter, Part, SensorKind, Words, XYZ, member_id, vector};
+use super::{Act, Effect, Parameter, Part, SensorKind, TriadEntries, Words, XYZ, member_id, vector};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -14,6 +14,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     let act = Act::Triad(kind, alter);
     let effect = Effect::member(kind, "scale", act, Parameter::amplitudes(&XYZ, "-", 5e-3), words)
         .part(Part::TriadTerm)
+        .changing(TriadEntries::Diagonal)
         .like(&member_id(kind, "scale_cubic"), "inputs at several levels");
     match kind {
         SensorKind::Acc => effect.like("acc.gravity_error", "a known centripetal acceleration"),

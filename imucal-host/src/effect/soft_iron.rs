@@ -1,6 +1,8 @@
 //! Soft iron fixed to the sensor: `mag.soft_iron`.
 
-use super::{Act, Effect, Needs, Parameter, SYMMETRIC, SensorKind, SensorRun, Words, symmetric};
+use super::{
+    Act, Effect, Needs, Parameter, SYMMETRIC, SensorKind, SensorRun, TriadEntries, Words, symmetric,
+};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -12,6 +14,7 @@ pub(super) fn effect() -> Effect {
     Effect::new("mag.soft_iron", act, Parameter::amplitudes(&SYMMETRIC, "-", 0.01), words)
         .needing(Needs::OTHER_CALIBRATION)
         .absorbed()
+        .changing(TriadEntries::Symmetric)
         .like("mag.scale", "none: it is part of this")
         .like("mag.misalignment", "none: its symmetric part is the same")
 }

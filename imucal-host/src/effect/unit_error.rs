@@ -22,7 +22,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         ),
     );
     Effect::member(kind, "unit_error", act, vec![power], words)
-        .part(Part::Fault(Spoils::Nothing))
+        .part(Part::Fault(Spoils::Scale))
         .like(&member_id(kind, "scale"), "its size: a wrong unit is off by a known factor")
 }
 

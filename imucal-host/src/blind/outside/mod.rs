@@ -68,6 +68,7 @@ fn mechanism(
         part: Part::Candidate,
         needs: Needs::NOTHING,
         absorbed: false,
+        changes: None,
     }
 }
 

@@ -135,8 +135,10 @@ fn usable_rows(
     let (Some(sensor), Some(triple)) = (integrity.sensor(kind), recording.sensor(kind)) else {
         return Vec::new();
     };
-    let id = format!("{kind}.unit_error");
-    if !conventions.findings.iter().any(|finding| finding.effect.id == id) {
+    let is_rescaled = |finding: &Finding| {
+        finding.effect.spoils() == Some(Spoils::Scale) && finding.effect.sensors.contains(&kind)
+    };
+    if !conventions.findings.iter().any(is_rescaled) {
         return sensor.usable.clone();
     }
     let mut usable: Vec<bool> =
@@ -148,7 +150,7 @@ fn usable_rows(
 /// What the samples of a data effect are of those before it, where that is linear: a column an axis.
 fn response(effect: &Effect, values: &[f64]) -> Option<Matrix3<f64>> {
     let Act::Data(_, alter) = effect.act else { return None };
-    (effect.spoils() == Some(Spoils::Nothing)).then(|| {
+    matches!(effect.spoils(), Some(Spoils::Nothing | Spoils::Scale)).then(|| {
         let mut samples = [Vector3::x(), Vector3::y(), Vector3::z()];
         alter(values, &mut DataRun { samples: &mut samples });
         Matrix3::from_columns(&samples)
@@ -166,7 +168,7 @@ pub fn leave_out(finding: &Finding, recording: &Recording, kind: SensorKind, usa
         }
         Some(Spoils::BeyondLimit) => leave_out_clipped(finding, &recording.time, triple, usable),
         Some(Spoils::Passage) => leave_out_passage(finding, &recording.time, usable),
-        Some(Spoils::Nothing) | None => {}
+        Some(Spoils::Nothing | Spoils::Scale) | None => {}
     }
 }
 
