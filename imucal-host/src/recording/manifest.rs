@@ -4,6 +4,7 @@ pub mod check;
 pub mod fault;
 pub mod gravity;
 mod keys;
+mod reference;
 mod rig;
 pub(crate) mod site;
 pub(crate) mod spelling;
@@ -18,6 +19,7 @@ use serde::{Deserialize, Serialize};
 
 pub use self::{
     fault::FORMAT,
+    reference::{ReferenceInfo, ReferenceKind},
     rig::{Axis, Rig, RigKind},
     site::Site,
 };
@@ -45,6 +47,9 @@ pub struct Manifest {
     /// What turned the sensor; `None` is a field recording without a reference attitude.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rig: Option<Rig>,
+    /// What the reference columns are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<ReferenceInfo>,
     /// Full scales.
     #[serde(default, skip_serializing_if = "PerSensor::is_empty")]
     pub ranges: PerSensor<f64>,
@@ -188,6 +193,7 @@ impl Default for Manifest {
             units: Units::default(),
             site: Site::default(),
             rig: None,
+            reference: None,
             ranges: PerSensor::default(),
             counts: PerSensor::default(),
             sensor: Identity::default(),
@@ -353,6 +359,11 @@ mod tests {
         manifest.counts.acc = Some(Counts { offset: 32768.0, per_unit: 415.0 });
         manifest.site.field_ned_ut = Some([25.3, 2.6, 40.1]);
         manifest.rig = Some(Rig { kind: RigKind::FlightMotionSimulator, axes: Some(vec![Axis::Z, Axis::Y]) });
+        manifest.reference = Some(ReferenceInfo {
+            kind: ReferenceKind::Simulator,
+            noise: Some(1e-3),
+            name: Some("gazebo".to_owned()),
+        });
         manifest.sensor.serial = Some("00300512".to_owned());
         for manifest in [manifest, Manifest::default()] {
             let text = manifest.to_toml().unwrap();

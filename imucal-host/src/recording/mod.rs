@@ -6,6 +6,7 @@
 use std::path::{Path, PathBuf};
 
 pub mod check;
+mod epoch;
 #[cfg(test)]
 mod fixture;
 mod format;
@@ -15,6 +16,7 @@ mod place;
 pub mod read;
 mod read_error;
 mod sensor_kind;
+pub mod simulated;
 mod triple;
 pub mod unit;
 mod warning;
@@ -23,11 +25,13 @@ mod write_error;
 
 use self::format::Format;
 pub use self::{
+    epoch::Epoch,
     manifest::{Manifest, site::LEAST_DIP},
     order_statistics::median,
     place::Place,
     read_error::ReadError,
     sensor_kind::SensorKind,
+    simulated::{Simulated, Stream},
     triple::{Nominal, Triple},
     unit::Unit,
     warning::Warning,
@@ -46,6 +50,9 @@ pub struct Recording {
     pub manifest: Manifest,
     /// Sample times on the sensor's clock, s, strictly increasing, finite.
     pub time: Vec<f64>,
+    /// What of an absolute clock `time` was counted from: the first row as it was read, where that is beyond 1e6 s.
+    /// `None`: from the clock's own zero. The file has the sum of both.
+    pub epoch: Option<Epoch>,
     /// Accelerometer: specific force, m/s².
     pub acc: Option<Triple>,
     /// Gyroscope: rate, rad/s.
@@ -58,6 +65,10 @@ pub struct Recording {
     pub gimbal: Option<Vec<[f64; 3]>>,
     /// Reference attitude table → n as quaternion w, x, y, z, as the file has it; NaN where not measured.
     pub reference: Option<Vec<[f64; 4]>>,
+    /// Position of the reference point in n, m; NaN where not measured. Of no use without an attitude.
+    pub position: Option<Vec<[f64; 3]>>,
+    /// What a simulator says that ideal sensors would read.
+    pub simulated: Option<Simulated>,
     /// Labels of rests and motions.
     pub segment: Option<Vec<Option<i64>>>,
     /// Columns the contract does not know.
@@ -85,12 +96,15 @@ impl Recording {
             name,
             manifest,
             time,
+            epoch: None,
             acc: None,
             gyr: None,
             mag: None,
             temperature: None,
             gimbal: None,
             reference: None,
+            position: None,
+            simulated: None,
             segment: None,
             extra: Vec::new(),
             warnings: Vec::new(),
@@ -122,10 +136,11 @@ impl Recording {
         }
         let manifest_path = Manifest::path_beside(path).unwrap_or_else(|| path.with_extension("toml"));
         let (manifest, warnings) = Manifest::read_within(&manifest_path, limits)?;
+        let unit = manifest.units.t;
         let mut table = match format {
-            Format::Csv | Format::CsvGz => read::csv::read(path, limits)?,
+            Format::Csv | Format::CsvGz => read::csv::read(path, unit, limits)?,
             #[cfg(feature = "parquet")]
-            Format::Parquet => read::parquet::read(path, limits)?,
+            Format::Parquet => read::parquet::read(path, unit, limits)?,
             #[cfg(not(feature = "parquet"))]
             Format::Parquet => {
                 return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() });

@@ -106,7 +106,7 @@ pub enum ReadError {
     #[error(
         "{path}, {place}, column `t`: found {found} after {before}, expected strictly increasing times; {remedy}"
     )]
-    TimeOrder { path: PathBuf, place: Place, found: f64, before: f64, remedy: String },
+    TimeOrder { path: PathBuf, place: Place, found: String, before: String, remedy: String },
     /// Two files of one recording disagree about a sample's time.
     #[error(
         "{path}, {place}: found the time {found} s against {other_time} s in {other}, expected them within half an interval ({tolerance:.6} s); give two files of one run, or interpolate one onto the other's times"

@@ -148,6 +148,14 @@ pub enum Warning {
         /// How many others there are in the column.
         more: usize,
     },
+    /// A position of the reference without an attitude.
+    #[error(
+        "{path}, column `ref_px`: a position without an attitude is kept and not used; add ref_qw, ref_qx, ref_qy, ref_qz of the same body"
+    )]
+    PositionAlone {
+        /// Samples file.
+        path: PathBuf,
+    },
     /// The file holds no sensor.
     #[error(
         "{path}: no sensor columns found, expected acc_x, acc_y, acc_z or those of gyr or mag; nothing can be calibrated from it"

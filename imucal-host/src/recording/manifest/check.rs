@@ -9,6 +9,9 @@ pub(crate) fn check(manifest: &Manifest) -> Result<(), ManifestFault> {
         check_sensor(manifest, kind)?;
     }
     check_site(manifest)?;
+    if let Some(noise) = manifest.reference.as_ref().and_then(|reference| reference.noise) {
+        number("reference", "noise", noise, "a finite rms above zero", |v| v.is_finite() && v > 0.0)?;
+    }
     match manifest.rig.as_ref().and_then(|rig| rig.axes.as_ref()) {
         Some(axes) if axes.is_empty() || axes.len() > 3 => Err(ManifestFault::Axes { found: axes.len() }),
         _ => Ok(()),
@@ -106,6 +109,8 @@ mod tests {
             ),
             ("[counts]\nacc = { per_unit = inf }\n", "counts.acc = inf"),
             ("[ranges]\nmag = -2\n", "ranges.mag = -2, expected a finite full scale above zero"),
+            ("[reference]\nnoise = 0\nkind = \"pose\"\n", "reference.noise = 0, expected a finite rms"),
+            ("[reference]\nnoise = inf\nkind = \"pose\"\n", "reference.noise = inf"),
             ("[site]\nlatitude_deg = 91\n", "site.latitude_deg = 91, expected −90 to 90"),
             ("[site]\nheight_m = 1e6\n", "site.height_m"),
             ("[site]\ngravity = 0\n", "site.gravity = 0"),

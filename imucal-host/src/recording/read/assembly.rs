@@ -5,7 +5,10 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::{
-    columns::{GIMBAL, REFERENCE, SEGMENT, TEMPERATURE, TIME, Table, slot_of},
+    columns::{
+        GIMBAL, POSITION, REFERENCE, SEGMENT, SIM_TEMPERATURE, SIMULATED, TEMPERATURE, TIME, Table,
+        simulated_slot_of, slot_of,
+    },
     interval,
 };
 use crate::recording::{
@@ -13,9 +16,9 @@ use crate::recording::{
     check::{absurd, unit_check},
     manifest::Manifest,
     order_statistics::median,
-    place::Places,
     read_error::ReadError,
     sensor_kind::SensorKind,
+    simulated::Simulated,
     triple::{Nominal, Triple},
     unit::TimeUnit,
     warning::Warning,
@@ -23,12 +26,11 @@ use crate::recording::{
 
 /// Makes a recording of a table, or says what is wrong with it.
 pub(crate) fn assemble(path: &Path, manifest: Manifest, mut table: Table) -> Result<Recording, ReadError> {
-    let unit = manifest.units.t;
     let time = std::mem::take(&mut table.columns[TIME]);
     if time.is_empty() {
         return Err(ReadError::NoRows { path: path.to_path_buf() });
     }
-    check_time(path, &time, unit, &table.places)?;
+    check_time(path, &time, &table, manifest.units.t)?;
     let segment = segments(path, &table)?;
     let mut sensors = Vec::with_capacity(3);
     for kind in SensorKind::ALL {
@@ -39,13 +41,16 @@ pub(crate) fn assemble(path: &Path, manifest: Manifest, mut table: Table) -> Res
     let mut recording = Recording {
         name: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
         path: path.to_path_buf(),
-        time: scaled(time, unit.per_si()),
+        time: scaled(time, table.clock.per_si()),
+        epoch: table.clock.epoch,
         acc,
         gyr,
         mag,
         gimbal: rows::<3>(&table.columns[GIMBAL..REFERENCE])
             .map(|rows| rows.into_iter().map(|row| row.map(|value| value * angle)).collect()),
-        reference: rows::<4>(&table.columns[REFERENCE..SEGMENT]),
+        reference: rows::<4>(&table.columns[REFERENCE..POSITION]),
+        position: rows::<3>(&table.columns[POSITION..SIMULATED]),
+        simulated: simulated(&mut table),
         temperature: Some(std::mem::take(&mut table.columns[TEMPERATURE]))
             .filter(|column| !column.is_empty()),
         segment,
@@ -54,14 +59,15 @@ pub(crate) fn assemble(path: &Path, manifest: Manifest, mut table: Table) -> Res
         manifest,
     };
     keep_assumed(&mut recording);
-    note_extra(&mut recording);
+    note_columns(&mut recording);
     interval::check(&mut recording)?;
     unit_check::check(&mut recording)?;
     absurd::mask(&mut recording, &table.places);
     Ok(recording)
 }
 
-fn check_time(path: &Path, time: &[f64], unit: TimeUnit, places: &Places) -> Result<(), ReadError> {
+fn check_time(path: &Path, time: &[f64], table: &Table, unit: TimeUnit) -> Result<(), ReadError> {
+    let (places, clock) = (&table.places, &table.clock);
     if let Some(row) = time.iter().position(|t| t.is_nan()) {
         return Err(ReadError::TimeMissing { path: path.to_path_buf(), place: places.of(row) });
     }
@@ -71,20 +77,20 @@ fn check_time(path: &Path, time: &[f64], unit: TimeUnit, places: &Places) -> Res
     Err(ReadError::TimeOrder {
         path: path.to_path_buf(),
         place: places.of(at + 1),
-        found: time[at + 1],
-        before: time[at],
-        remedy: order_remedy(time, at, unit),
+        found: clock.text(time[at + 1]),
+        before: clock.text(time[at]),
+        remedy: order_remedy(time, at, clock.per_si(), unit),
     })
 }
 
-fn order_remedy(time: &[f64], at: usize, unit: TimeUnit) -> String {
+fn order_remedy(time: &[f64], at: usize, per_si: f64, unit: TimeUnit) -> String {
     let mut remedy = if time[at + 1] < time[at] {
         "sort the rows by time, or split the file where the clock was reset".to_owned()
     } else {
         "remove the duplicate row, or export the times with more decimals".to_owned()
     };
     let steps = time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
-    let interval = median(steps).map(|step| step / unit.per_si());
+    let interval = median(steps).map(|step| step / per_si);
     if interval.is_some_and(interval::is_unusual) {
         remedy.push_str(&format!("; check the unit of t too, with `{unit}` most intervals are unusual"));
     }
@@ -119,6 +125,18 @@ fn triple(
         raw.map(|value| value.map(|component| nominal.to_si(component))).collect()
     };
     manifest.triple(kind, values).map(Some).map_err(fault)
+}
+
+/// The simulator's columns, which are in SI units whatever the sensors' are in.
+fn simulated(table: &mut Table) -> Option<Simulated> {
+    let values = |kind| {
+        let first = simulated_slot_of(kind);
+        rows::<3>(&table.columns[first..first + 3]).map(|rows| rows.into_iter().map(Vector3::from).collect())
+    };
+    let [acc, gyr, mag] = SensorKind::ALL.map(values);
+    let temperature = std::mem::take(&mut table.columns[SIM_TEMPERATURE]);
+    let temperature = Some(temperature).filter(|column| !column.is_empty());
+    Some(Simulated { acc, gyr, mag, temperature }).filter(|simulated| !simulated.is_empty())
 }
 
 fn rows<const N: usize>(columns: &[Vec<f64>]) -> Option<Vec<[f64; N]>> {
@@ -164,13 +182,18 @@ fn keep_assumed(recording: &mut Recording) {
     });
 }
 
-fn note_extra(recording: &mut Recording) {
+fn note_columns(recording: &mut Recording) {
     for column in &recording.extra {
         recording
             .warnings
             .push(Warning::UnknownColumn { path: recording.path.clone(), column: column.name.clone() });
     }
-    if SensorKind::ALL.iter().all(|kind| recording.sensor(*kind).is_none()) {
+    if recording.position.is_some() && recording.reference.is_none() && recording.gimbal.is_none() {
+        recording.warnings.push(Warning::PositionAlone { path: recording.path.clone() });
+    }
+    // A simulator's file is one of its own.
+    let sensors = SensorKind::ALL.iter().any(|kind| recording.sensor(*kind).is_some());
+    if !sensors && recording.simulated.is_none() {
         recording.warnings.push(Warning::NoSensor { path: recording.path.clone() });
     }
 }

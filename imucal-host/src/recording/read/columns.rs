@@ -3,15 +3,17 @@
 use std::{collections::HashMap, ops::Range, path::Path};
 
 use super::{
+    clock::Clock,
     column_guess::meant,
     header_fault::{HeaderFault, MisspeltColumn, names_listed},
 };
 use crate::recording::{
-    ExtraColumn, place::Places, read_error::ReadError, sensor_kind::SensorKind, warning::Warning,
+    ExtraColumn, place::Places, read_error::ReadError, sensor_kind::SensorKind, unit::TimeUnit,
+    warning::Warning,
 };
 
 /// Number of columns the contract knows.
-pub(crate) const KNOWN: usize = 19;
+pub(crate) const KNOWN: usize = 32;
 
 /// Their names; an index into this is a column's slot.
 pub(crate) const NAMES: [&str; KNOWN] = [
@@ -33,6 +35,19 @@ pub(crate) const NAMES: [&str; KNOWN] = [
     "ref_qx",
     "ref_qy",
     "ref_qz",
+    "ref_px",
+    "ref_py",
+    "ref_pz",
+    "sim_acc_x",
+    "sim_acc_y",
+    "sim_acc_z",
+    "sim_gyr_x",
+    "sim_gyr_y",
+    "sim_gyr_z",
+    "sim_mag_x",
+    "sim_mag_y",
+    "sim_mag_z",
+    "sim_temp",
     "segment",
 ];
 
@@ -40,10 +55,25 @@ pub(crate) const TIME: usize = 0;
 pub(crate) const TEMPERATURE: usize = 10;
 pub(crate) const GIMBAL: usize = 11;
 pub(crate) const REFERENCE: usize = 14;
-pub(crate) const SEGMENT: usize = 18;
+pub(crate) const POSITION: usize = 18;
+pub(crate) const SIM_TEMPERATURE: usize = 30;
+pub(crate) const SEGMENT: usize = 31;
+
+/// First slot of the simulator's sensors, which stand in the order of the real ones.
+pub(crate) const SIMULATED: usize = 21;
 
 /// Slots that are there all or not at all.
-const GROUPS: [Range<usize>; 5] = [1..4, 4..7, 7..10, GIMBAL..REFERENCE, REFERENCE..SEGMENT];
+const GROUPS: [Range<usize>; 9] = [
+    1..4,
+    4..7,
+    7..10,
+    GIMBAL..REFERENCE,
+    REFERENCE..POSITION,
+    POSITION..SIMULATED,
+    SIMULATED..24,
+    24..27,
+    27..SIM_TEMPERATURE,
+];
 
 /// First slot of a sensor.
 pub(crate) fn slot_of(kind: SensorKind) -> usize {
@@ -52,6 +82,16 @@ pub(crate) fn slot_of(kind: SensorKind) -> usize {
         SensorKind::Gyr => 4,
         SensorKind::Mag => 7,
     }
+}
+
+/// First slot of what a simulator says that a sensor would read.
+pub(crate) fn simulated_slot_of(kind: SensorKind) -> usize {
+    slot_of(kind) - 1 + SIMULATED
+}
+
+/// Whether an infinite number in a slot is one that was not measured. Trackers write so where they lost the body.
+pub(crate) fn infinite_is_missing(slot: usize) -> bool {
+    (POSITION..SIMULATED).contains(&slot)
 }
 
 /// Where a column of the file goes.
@@ -80,6 +120,8 @@ pub(crate) struct Table {
     pub(crate) columns: Vec<Vec<f64>>,
     pub(crate) extra: Vec<ExtraColumn>,
     pub(crate) places: Places,
+    /// What the column `t` counts.
+    pub(crate) clock: Clock,
     pub(crate) warnings: Vec<Warning>,
 }
 
@@ -126,8 +168,8 @@ impl Layout {
         layout
     }
 
-    /// A table with room for `rows` rows in the columns that are there.
-    pub(crate) fn table(&self, rows: usize, places: Places) -> Table {
+    /// A table with room for `rows` rows in the columns that are there, and times in `unit`.
+    pub(crate) fn table(&self, rows: usize, places: Places, unit: TimeUnit) -> Table {
         let room = |present: &bool| {
             if *present { Vec::with_capacity(rows) } else { Vec::new() }
         };
@@ -139,6 +181,7 @@ impl Layout {
                 .map(|name| ExtraColumn { name: name.clone(), values: Vec::new() })
                 .collect(),
             places,
+            clock: Clock::new(unit),
             warnings: Vec::new(),
         }
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{
-    columns::{Layout, Table, Target},
+    columns::{Layout, TIME, Table, Target, infinite_is_missing},
     csv_rows::Rows,
     number::{self, NotANumber},
 };
@@ -12,21 +12,22 @@ use crate::{
     recording::{
         place::{Place, Places},
         read_error::ReadError,
+        unit::TimeUnit,
         warning::Warning,
     },
 };
 
-/// Reads the samples of a CSV file in file units.
-pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Table, ReadError> {
+/// Reads the samples of a CSV file in file units, `t` in `unit`.
+pub(crate) fn read(path: &Path, unit: TimeUnit, limits: &Limits) -> Result<Table, ReadError> {
     let mut rows = Rows::open(path, limits)?;
-    table(path, &mut rows, limits).map_err(|error| {
+    table(path, unit, &mut rows, limits).map_err(|error| {
         // Of a damaged stream nothing that is wrong in its text says more.
         let damage = if error.is_limit() { None } else { rows.text.damage() };
         damage.unwrap_or(error)
     })
 }
 
-fn table(path: &Path, rows: &mut Rows<'_>, limits: &Limits) -> Result<Table, ReadError> {
+fn table(path: &Path, unit: TimeUnit, rows: &mut Rows<'_>, limits: &Limits) -> Result<Table, ReadError> {
     let blank = |rows: &Rows<'_>| rows.fields().all(|field| field.trim_ascii().is_empty()) && rows.len() == 1;
     if !rows.advance()? || (blank(rows) && !rows.advance()?) {
         return Err(ReadError::Empty { path: path.to_path_buf() });
@@ -35,11 +36,12 @@ fn table(path: &Path, rows: &mut Rows<'_>, limits: &Limits) -> Result<Table, Rea
     let names = names.map_err(|_| ReadError::NotUtf8 { path: path.to_path_buf(), line: rows.line })?;
     let layout = Layout::new(&names, path)?;
     let names: Vec<String> = names.iter().map(|name| name.trim().to_owned()).collect();
-    CsvReader { path, layout, names, limit: limits.size, taken: 0 }.read(rows)
+    CsvReader { path, unit, layout, names, limit: limits.size, taken: 0 }.read(rows)
 }
 
 struct CsvReader<'a> {
     path: &'a Path,
+    unit: TimeUnit,
     layout: Layout,
     names: Vec<String>,
     /// Bytes that the samples may take in memory, and those they take.
@@ -59,7 +61,7 @@ impl CsvReader<'_> {
         let row = (self.layout.row_size() + size_of::<u64>()) as u64;
         let guess =
             (rows.text.expected / (self.names.len() * 7).max(1) as u64).min(self.limit / row) as usize;
-        let mut table = self.layout.table(guess, Places::Lines(Vec::new()));
+        let mut table = self.layout.table(guess, Places::Lines(Vec::new()), self.unit);
         let mut lines = Vec::with_capacity(guess);
         while rows.advance()? {
             let last = rows.cut;
@@ -102,7 +104,14 @@ impl CsvReader<'_> {
         for (column, (field, target)) in rows.fields().zip(&self.layout.targets).enumerate() {
             match *target {
                 Target::Known(slot) => {
-                    let value = number::parse(field).map_err(|problem| BadField { column, problem })?;
+                    let value = match slot {
+                        TIME => table.clock.take_text(field),
+                        _ => number::parse(field),
+                    };
+                    let value = match value {
+                        Err(NotANumber::Infinite) if infinite_is_missing(slot) => f64::NAN,
+                        value => value.map_err(|problem| BadField { column, problem })?,
+                    };
                     table.columns[slot].push(value);
                 }
                 Target::Extra(extra) => {

@@ -38,14 +38,14 @@ pub fn read_pair(
 ) -> Result<Recording, ReadError> {
     manifest.check().map_err(|fault| ReadError::Manifest { path: acc.to_path_buf(), line: 1, fault })?;
     let header = [["t"].as_slice(), &SensorKind::Acc.columns(), &SensorKind::Gyr.columns()].concat();
-    let mut table = Layout::new(&header, acc)?.table(0, Places::Rows);
+    let mut table = Layout::new(&header, acc)?.table(0, Places::Rows, manifest.units.t);
     let acc_file = TextFile::read(acc, limits)?;
     let gyr_file = TextFile::read(gyr, limits)?;
     compare_times(acc, &acc_file, gyr, &gyr_file, manifest.units.t.per_si())?;
     place_axes(&mut table, SensorKind::Acc, &acc_file);
     place_axes(&mut table, SensorKind::Gyr, &gyr_file);
     let [time, ..] = acc_file.columns;
-    table.columns[TIME] = time;
+    table.columns[TIME] = time.into_iter().map(|time| table.clock.take_number(time)).collect();
     table.places = Places::Lines(acc_file.lines);
     assemble(acc, manifest, table)
 }

@@ -5,6 +5,7 @@
 //! | CSV (gzipped or not), Parquet, IMU-TK text; a manifest | a recording in SI, or an error with file, line and column |
 
 pub(crate) mod assembly;
+pub(crate) mod clock;
 mod column_guess;
 pub(crate) mod columns;
 pub(crate) mod csv;

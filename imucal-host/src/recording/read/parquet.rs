@@ -16,14 +16,17 @@ use ::parquet::{
     schema::types::{ColumnDescriptor, Type},
 };
 
-use super::columns::{KNOWN, Layout, NAMES, Table, Target};
+use super::{
+    clock::Clock,
+    columns::{KNOWN, Layout, NAMES, TIME, Table, Target, infinite_is_missing},
+};
 use crate::{
     file::{Limits, limits::Size},
-    recording::{place::Places, read_error::ReadError},
+    recording::{place::Places, read_error::ReadError, unit::TimeUnit},
 };
 
 /// Reads the samples of a Parquet file in file units; columns may be doubles, floats or integers.
-pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Table, ReadError> {
+pub(crate) fn read(path: &Path, unit: TimeUnit, limits: &Limits) -> Result<Table, ReadError> {
     let file = File::open(path)
         .map_err(|cause| ReadError::Unreadable { path: path.to_path_buf(), found: cause.to_string() })?;
     let damaged = |cause: ParquetError| damaged(path, &cause);
@@ -36,17 +39,24 @@ pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Table, ReadError> {
     let memory = Memory { path, limit: limits.size, taken: Cell::new(0) };
     memory.take(rows.saturating_mul(layout.row_size() as u64));
     memory.check()?;
-    let mut table = layout.table(rows as usize, Places::Rows);
+    let mut table = layout.table(rows as usize, Places::Rows, unit);
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group).map_err(damaged)?;
         for (at, target) in layout.targets.iter().enumerate() {
             let descriptor = &schema.column(at);
             let column = ColumnOfGroup { path, at, group: group.as_ref(), descriptor, memory: &memory };
             match *target {
+                Target::Known(TIME) => column.append_times(&mut table.columns[TIME], &mut table.clock)?,
                 Target::Known(slot) => column.append_numbers(&mut table.columns[slot])?,
                 Target::Extra(extra) => column.append_texts(&mut table.extra[extra].values)?,
             }
         }
+    }
+    for column in (0..KNOWN).filter(|slot| infinite_is_missing(*slot)) {
+        table.columns[column]
+            .iter_mut()
+            .filter(|value| value.is_infinite())
+            .for_each(|value| *value = f64::NAN);
     }
     refuse_infinite(path, &table)?;
     Ok(table)
@@ -134,6 +144,28 @@ impl ColumnOfGroup<'_> {
         }
     }
 
+    /// As [`Self::append_numbers`], but integers are exact: those since 1970 in nanoseconds are beyond a double.
+    fn append_times(&self, out: &mut Vec<f64>, clock: &mut Clock) -> Result<(), ReadError> {
+        if self.descriptor.converted_type() == ConvertedType::DECIMAL {
+            return Err(self.type_error());
+        }
+        match self.reader()? {
+            ColumnReader::DoubleColumnReader(column) => {
+                self.append(column, out, |v| clock.take_number(v), f64::NAN)
+            }
+            ColumnReader::FloatColumnReader(column) => {
+                self.append(column, out, |v| clock.take_number(f64::from(v)), f64::NAN)
+            }
+            ColumnReader::Int32ColumnReader(column) => {
+                self.append(column, out, |v| clock.take_integer(i64::from(v)), f64::NAN)
+            }
+            ColumnReader::Int64ColumnReader(column) => {
+                self.append(column, out, |v| clock.take_integer(v), f64::NAN)
+            }
+            _ => Err(self.type_error()),
+        }
+    }
+
     fn append_texts(&self, out: &mut Vec<String>) -> Result<(), ReadError> {
         let none = String::new();
         match self.reader()? {
@@ -179,7 +211,7 @@ impl ColumnOfGroup<'_> {
         &self,
         mut column: ColumnReaderImpl<T>,
         out: &mut Vec<V>,
-        convert: impl Fn(T::T) -> V,
+        mut convert: impl FnMut(T::T) -> V,
         none: V,
     ) -> Result<(), ReadError> {
         let rows = usize::try_from(self.group.metadata().num_rows()).unwrap_or(0);
@@ -204,7 +236,7 @@ impl ColumnOfGroup<'_> {
         let mut values = values.into_iter();
         out.extend(levels.iter().map(|level| {
             let value = if *level == whole { values.next() } else { None };
-            value.map_or_else(|| none.clone(), &convert)
+            value.map_or_else(|| none.clone(), &mut convert)
         }));
         Ok(())
     }
@@ -319,7 +351,7 @@ mod tests {
         assert_says(&message, &["run.parquet", "damaged", "expected an intact Parquet file", "copy"]);
 
         let layout = Layout::new(&["t", "speed"], Path::new("a")).unwrap();
-        let mut table = layout.table(1, Places::Rows);
+        let mut table = layout.table(1, Places::Rows, TimeUnit::Second);
         table.columns[0].push(0.0);
         table.extra[0].name = "temp".to_owned();
         table.extra[0].values.push("warm".to_owned());
@@ -341,7 +373,7 @@ mod tests {
             &["more than 3 columns", "--max-columns"],
         );
         let layout = Layout::new(&["t", "note"], Path::new("a")).unwrap();
-        let mut table = layout.table(0, Places::Rows);
+        let mut table = layout.table(0, Places::Rows, TimeUnit::Second);
         table.columns[0] = (0..300).map(f64::from).collect();
         table.extra[0].values = vec!["long ".repeat(300); 300];
         let mut bytes = Vec::new();

@@ -3,7 +3,7 @@
 use std::io;
 
 use crate::recording::read::{
-    columns::{KNOWN, NAMES, Table},
+    columns::{KNOWN, NAMES, TIME, Table},
     number,
 };
 
@@ -17,7 +17,11 @@ pub(crate) fn write(table: &Table, rows: usize, out: &mut impl io::Write) -> io:
     for row in 0..rows {
         for slot in &present {
             field.clear();
-            number::print(table.columns[*slot][row], &mut field);
+            let value = table.columns[*slot][row];
+            match *slot {
+                TIME if table.clock.epoch.is_some() => field.push_str(&table.clock.text(value)),
+                _ => number::print(value, &mut field),
+            }
             writer.write_field(&field)?;
         }
         for column in &table.extra {

@@ -4,7 +4,11 @@ use crate::recording::{
     Recording,
     place::Places,
     read::{
-        columns::{GIMBAL, KNOWN, REFERENCE, SEGMENT, TEMPERATURE, TIME, Table, slot_of},
+        clock::Clock,
+        columns::{
+            GIMBAL, KNOWN, POSITION, REFERENCE, SEGMENT, SIM_TEMPERATURE, SIMULATED, TEMPERATURE, TIME,
+            Table, simulated_slot_of, slot_of,
+        },
         number::round_to_digits,
     },
     sensor_kind::SensorKind,
@@ -20,7 +24,8 @@ const TIME_DIGITS: usize = 16;
 pub(crate) fn table_of(recording: &Recording) -> Table {
     let units = &recording.manifest.units;
     let mut columns = vec![Vec::new(); KNOWN];
-    columns[TIME] = converted(recording.time.iter().copied(), units.t.per_si(), TIME_DIGITS);
+    let clock = Clock::of(units.t, recording.epoch);
+    columns[TIME] = converted(recording.time.iter().copied(), clock.per_si(), TIME_DIGITS);
     for kind in SensorKind::ALL {
         if let Some(triple) = recording.sensor(kind) {
             for axis in 0..3 {
@@ -33,13 +38,28 @@ pub(crate) fn table_of(recording: &Recording) -> Table {
         let angles = recording.gimbal.iter().flatten().map(|row| row[axis]);
         *column = converted(angles, units.gimbal.per_si(), DIGITS);
     }
-    for (part, column) in columns[REFERENCE..SEGMENT].iter_mut().enumerate() {
+    for (part, column) in columns[REFERENCE..POSITION].iter_mut().enumerate() {
         *column = recording.reference.iter().flatten().map(|row| row[part]).collect();
     }
+    for (axis, column) in columns[POSITION..SIMULATED].iter_mut().enumerate() {
+        *column = recording.position.iter().flatten().map(|row| row[axis]).collect();
+    }
+    put_simulated(recording, &mut columns);
     let label = |label: &Option<i64>| label.map_or(f64::NAN, |label| label as f64);
     columns[SEGMENT] = recording.segment.iter().flatten().map(label).collect();
     let extra = recording.extra.clone();
-    Table { columns, extra, places: Places::Rows, warnings: Vec::new() }
+    Table { columns, extra, places: Places::Rows, clock, warnings: Vec::new() }
+}
+
+fn put_simulated(recording: &Recording, columns: &mut [Vec<f64>]) {
+    let Some(simulated) = &recording.simulated else { return };
+    for kind in SensorKind::ALL {
+        let values = simulated.sensor(kind).unwrap_or_default();
+        for axis in 0..3 {
+            columns[simulated_slot_of(kind) + axis] = values.iter().map(|value| value[axis]).collect();
+        }
+    }
+    columns[SIM_TEMPERATURE] = simulated.temperature.clone().unwrap_or_default();
 }
 
 fn converted(values: impl Iterator<Item = f64>, per_si: f64, digits: usize) -> Vec<f64> {

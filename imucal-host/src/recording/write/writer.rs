@@ -11,7 +11,10 @@ use crate::{
         Recording,
         format::Format,
         manifest::Manifest,
-        read::columns::{GIMBAL, NAMES, REFERENCE, SEGMENT, TEMPERATURE, TIME, Table},
+        read::columns::{
+            GIMBAL, NAMES, POSITION, REFERENCE, SEGMENT, SIM_TEMPERATURE, TEMPERATURE, TIME, Table,
+            simulated_slot_of,
+        },
         sensor_kind::SensorKind,
         write_error::WriteError,
     },
@@ -79,6 +82,15 @@ fn lengths(recording: &Recording) -> Vec<(String, usize)> {
     lengths.extend(recording.temperature.as_ref().map(|column| (named(TEMPERATURE), column.len())));
     lengths.extend(recording.gimbal.as_ref().map(|column| (named(GIMBAL), column.len())));
     lengths.extend(recording.reference.as_ref().map(|column| (named(REFERENCE), column.len())));
+    lengths.extend(recording.position.as_ref().map(|column| (named(POSITION), column.len())));
+    if let Some(simulated) = &recording.simulated {
+        for kind in SensorKind::ALL {
+            lengths
+                .extend(simulated.sensor(kind).map(|values| (named(simulated_slot_of(kind)), values.len())));
+        }
+        let temperature = simulated.temperature.as_ref();
+        lengths.extend(temperature.map(|column| (named(SIM_TEMPERATURE), column.len())));
+    }
     lengths.extend(recording.segment.as_ref().map(|column| (named(SEGMENT), column.len())));
     lengths.extend(recording.extra.iter().map(|column| (column.name.clone(), column.values.len())));
     lengths
