@@ -75,7 +75,7 @@ pub fn omission(effect: &Effect) -> Option<Omission> {
         Part::TriadTerm | Part::RigTerm(_) | Part::Nuisance(_) => Some(Omission::Baseline),
         Part::Fault(Spoils::Nothing | Spoils::Scale) => Some(Omission::Convention),
         Part::Fault(Spoils::Passage | Spoils::Repeats) => Some(Omission::NoMean),
-        Part::Fault(Spoils::BeyondLimit) | Part::Candidate | Part::ClockTerm => None,
+        Part::Fault(Spoils::BeyondLimit) | Part::Candidate | Part::ClockTerm | Part::ClockRateTerm => None,
     }
 }
 

@@ -1,6 +1,6 @@
 //! `imucal diagnose`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
@@ -18,6 +18,7 @@ use crate::{
     diagnosis::{Diagnosis, Options, Verdict, diagnose},
     effect::{self, CATALOGUE},
     file::OutputSet,
+    recording::Stream,
     report,
 };
 
@@ -29,6 +30,10 @@ pub(super) struct Arguments {
     /// The unit's present model, as `imucal calibrate` wrote it (default: calibrated from the recording)
     #[arg(long, value_name = "CAL")]
     model: Option<PathBuf>,
+    /// A simulator's ideal stream of the same movement, on its own clock: columns sim_* (or acc_*, gyr_*, mag_*) of a
+    /// recording
+    #[arg(long, value_name = "SIM")]
+    sim: Option<PathBuf>,
     /// Exclude effects from the candidates, or terms (such as acc.misalignment) from the baseline
     #[arg(long, value_name = "EFFECT_OR_TERM", num_args = 1.., value_parser = known)]
     without: Vec<String>,
@@ -58,6 +63,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let json = arguments.json.iter().filter(|path| path.as_os_str() != "-");
     let mut inputs = files_of(path);
     inputs.extend(arguments.model.clone());
+    inputs.extend(arguments.sim.iter().flat_map(|path| files_of(path)));
     let files = arguments.overwrite.plan(&inputs, &json.map(Planned::new).collect::<Vec<_>>())?;
     let recording = read(path, arguments.reading)?;
     let model = arguments.model.as_deref().map(|path| load(path, arguments.reading)).transpose()?;
@@ -65,12 +71,25 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Some(Err(damaged)) => return Ok(refuse(&damaged)),
         model => model.and_then(Result::ok),
     };
-    let options = Options { without: arguments.without.clone(), model, settings: None };
+    let stream = arguments.sim.as_deref().map(|path| stream(path, arguments.reading)).transpose()?;
+    let options = Options { without: arguments.without.clone(), model, stream, ..Options::default() };
     let progress = Progress::start();
     let diagnosis = diagnose(&recording, &options, &|stage| progress.stage(stage));
     drop(progress);
     print(arguments, &diagnosis, files)?;
     Ok(if diagnosis.verdict == Verdict::NotTestable { Ending::Refused } else { Ending::Done })
+}
+
+/// A simulator's stream.
+fn stream(path: &Path, reading: Reading) -> anyhow::Result<Stream> {
+    let simulated = read(path, reading)?;
+    Stream::of(&simulated).with_context(|| {
+        format!(
+            "{}: found no stream of a simulator, expected columns sim_acc_*, sim_gyr_* or sim_mag_*; export what an ideal \
+             sensor would read",
+            path.display()
+        )
+    })
 }
 
 fn print(arguments: &Arguments, diagnosis: &Diagnosis, mut files: OutputSet) -> anyhow::Result<()> {

@@ -20,11 +20,14 @@ use self::{
     library::candidates::{Candidates, Setting},
     residual::forward_model::ForwardModel,
     screening::preparation::Preparation,
-    search::stepwise,
+    search::{motion_mismatch, stepwise},
     settings::{Settings, Source},
     verdict::answer::{answer, untestable},
 };
-use crate::{recording::Recording, store::StoredCalibration};
+use crate::{
+    recording::{Recording, Stream},
+    store::StoredCalibration,
+};
 
 /// What is known before a diagnosis.
 #[derive(Clone, Debug, Default)]
@@ -33,6 +36,8 @@ pub struct Options {
     pub without: Vec<String>,
     /// The simulator's present model of the unit; without it, the baseline is calibrated from the recording.
     pub model: Option<StoredCalibration>,
+    /// A simulator's stream for the recording, on a clock of its own; without it, the recording's own reference.
+    pub stream: Option<Stream>,
     /// Settings; without them, the preset of the source of the movement.
     pub settings: Option<Settings>,
 }
@@ -52,8 +57,11 @@ pub fn try_diagnose(
     options: &Options,
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis, DiagnosisError> {
-    let settings = options.settings.clone().unwrap_or_else(|| Settings::preset(Source::of(recording)));
-    let preparation = Preparation::new(recording, options.model.as_ref(), &settings)?;
+    let source = Source::of(recording, options.stream.as_ref());
+    let own = if source == Source::Simulator && options.stream.is_none() { Stream::of(recording) } else { None };
+    let stream = options.stream.as_ref().or(own.as_ref());
+    let settings = options.settings.clone().unwrap_or_else(|| Settings::preset(source));
+    let mut preparation = Preparation::new(recording, stream, options.model.as_ref(), &settings)?;
     let (usable, movement) = (preparation.usable.clone(), &*preparation.movement);
     let mut scene = ForwardModel::new(recording, usable, movement, preparation.triads, &settings);
     if let Some(held) = &preparation.held {
@@ -65,9 +73,12 @@ pub fn try_diagnose(
         thermometer: recording.temperature.is_some(),
         calibrated: &preparation.model.calibrated,
         provided: settings.source,
-        field_known: recording.manifest.site.field_ned_ut.is_some(),
+        // A stream holds the field itself.
+        field_known: recording.manifest.site.field_ned_ut.is_some() || stream.is_some(),
     };
     let candidates = Candidates::new(&setting, &options.without);
+    let (scene, stretches) = motion_mismatch::left_out(scene, &candidates)?;
+    preparation.findings.extend(motion_mismatch::finding(&stretches));
     let explained = stepwise::search(&scene, &candidates, progress)?;
     answer(recording, &preparation, &explained, progress)
 }

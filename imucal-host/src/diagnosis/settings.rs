@@ -59,6 +59,10 @@ pub struct ResidualSettings {
     /// Sensors that one effect may alter by way of a movement that is reconstructed from them; those of the effect
     /// otherwise.
     pub coupled: Option<&'static [SensorKind]>,
+    /// Samples count the less the more the machine shakes the sensor, block by block.
+    pub weighs_vibration: bool,
+    /// Stretches in which all sensors agree on a movement that the source does not have are left out and named.
+    pub leaves_out_mismatch: bool,
 }
 
 /// How noise is estimated.
@@ -73,6 +77,8 @@ pub struct NoiseSettings {
     pub sway: &'static [usize],
     /// Groups are compared only where all their blocks hold as many rows: on a rig, one with fewer has just left a rest.
     pub whole_blocks: bool,
+    /// The table does not stand exactly as the source says: rests and movements have pointing errors.
+    pub scatters: bool,
 }
 
 /// Where nonlinear parameters are looked for.
@@ -114,6 +120,8 @@ pub struct SearchSettings {
     pub replaced: usize,
     /// Effects of a sensor tried in pairs.
     pub paired: usize,
+    /// Two effects at once are tried to be taken out: each may stand for a part of the other.
+    pub removes_pairs: bool,
 }
 
 /// Score tests against covariates.
@@ -184,6 +192,8 @@ impl Default for ResidualSettings {
             passage_change: 8.0,
             keeps_sensors_without_rows: true,
             coupled: None,
+            weighs_vibration: false,
+            leaves_out_mismatch: false,
         }
     }
 }
@@ -191,7 +201,7 @@ impl Default for ResidualSettings {
 impl Default for NoiseSettings {
     /// That of a rig.
     fn default() -> Self {
-        Self { least_scatter: 1e-7, longest_stretch: 20.0, sway: &[], whole_blocks: true }
+        Self { least_scatter: 1e-7, longest_stretch: 20.0, sway: &[], whole_blocks: true, scatters: true }
     }
 }
 
@@ -218,6 +228,7 @@ impl Default for SearchSettings {
             behind: 25.0,
             replaced: 5,
             paired: 8,
+            removes_pairs: false,
         }
     }
 }

@@ -44,6 +44,7 @@ mod level_tilt;
 mod lever_arm;
 mod machine;
 mod misalignment;
+pub mod motion_mismatch;
 mod motor_current;
 mod mounting;
 mod noise_burst;
@@ -322,6 +323,7 @@ pub static CATALOGUE: LazyLock<Vec<Effect>> = LazyLock::new(|| {
         wobble::effect(),
         time_offset::effect(),
         rate_error::effect(),
+        motion_mismatch::effect(),
         gravity_error::effect(),
         lever_arm::effect(),
         earth_rate::effect(),

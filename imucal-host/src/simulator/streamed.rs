@@ -113,11 +113,6 @@ impl Streamed {
         Some(streamed)
     }
 
-    /// Whether a sensor has a stream.
-    pub fn has(&self, kind: SensorKind) -> bool {
-        self.channels[kind as usize].is_some()
-    }
-
     /// The clock that rows are read by.
     pub fn clock(&self) -> StreamClock {
         self.clock
@@ -178,6 +173,10 @@ impl Motion for Streamed {
         let row = super::replay::nearest(&self.rows, time);
         truth.temperature = self.temperature.get(row).copied().unwrap_or(truth.temperature);
         truth
+    }
+
+    fn gives(&self, kind: SensorKind) -> bool {
+        self.channels[kind as usize].is_some()
     }
 
     fn rig(&self) -> Rig {

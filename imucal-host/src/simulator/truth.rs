@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     effect::{Machine, Swing, Truth},
-    recording::manifest::Rig,
+    recording::{SensorKind, manifest::Rig},
 };
 
 /// A movement: a source of truth.
@@ -29,6 +29,11 @@ pub trait Motion: Sync {
     /// Angles that exact encoders would show, rad, outermost first, not wrapped; `None` without a rig.
     fn encoders(&self, _time: f64) -> Option<[f64; 3]> {
         None
+    }
+
+    /// Whether it says what a sensor of a kind is given.
+    fn gives(&self, _kind: SensorKind) -> bool {
+        true
     }
 
     /// What turns the sensor.

@@ -41,8 +41,9 @@ impl Setting<'_> {
         let is_there = |shown_by: &[SensorKind]| shown_by.iter().any(|kind| self.kinds.contains(kind));
         match effect.part {
             Part::TriadTerm => is_there(effect.sensors),
-            Part::RigTerm(shown_by) => is_there(shown_by),
+            Part::RigTerm(shown_by) => self.provided.base && is_there(shown_by),
             Part::ClockTerm => self.provided.clock,
+            Part::ClockRateTerm => self.provided.clock_rate,
             Part::Candidate | Part::Nuisance(_) | Part::Fault(_) => false,
         }
     }
@@ -59,7 +60,7 @@ impl Setting<'_> {
     fn is_free(&self, nuisance: &Effect) -> bool {
         let Part::Nuisance(free) = nuisance.part else { return false };
         match free {
-            Free::NoGimbals => !self.provided.gimbals,
+            Free::ReadApart => self.provided.lags,
             Free::NoGimbalsTriadGiven => !self.provided.gimbals && self.gives(nuisance),
             // Without the vertical, the levelling tilts stand for the dip.
             Free::FieldUnknown => !self.field_known && self.kinds.contains(&SensorKind::Acc),
@@ -74,6 +75,9 @@ impl Setting<'_> {
         match effect.act {
             Act::Rig(_) if !provided.table => {
                 return Some("there is no rig: gravity itself gives the attitude of each rest");
+            }
+            Act::Rig(_) if !provided.base => {
+                return Some("there is no rig: the simulator gives what is sensed in the sensor's own axes");
             }
             Act::Clock(_) if !provided.table => return Some("there is no clock but the sensors' own"),
             _ => {}

@@ -43,7 +43,6 @@ const UNITS: [(f64, &str); 6] = [
 /// A size at even times from a first one.
 struct Even {
     from: f64,
-    step: f64,
     values: Vec<f64>,
 }
 
@@ -258,7 +257,7 @@ impl Even {
             }
             last
         });
-        Some(Self { from: from + 0.5 * step, step, values: values.collect() })
+        Some(Self { from: from + 0.5 * step, values: values.collect() })
     }
 }
 

@@ -42,6 +42,8 @@ pub struct Provided {
     pub clock: bool,
     /// That clock may also run at another rate, which is fitted too.
     pub clock_rate: bool,
+    /// That the sensors follow it was seen when its clock was found.
+    pub followed: bool,
     /// Nothing says that all sensors were read at the same time: each may lag.
     pub lags: bool,
     /// A place: the sensor is not moved to and fro, or its acceleration would be known.
