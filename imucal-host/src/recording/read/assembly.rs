@@ -191,10 +191,12 @@ fn note_columns(recording: &mut Recording) {
     if recording.position.is_some() && recording.reference.is_none() && recording.gimbal.is_none() {
         recording.warnings.push(Warning::PositionAlone { path: recording.path.clone() });
     }
-    // A simulator's file is one of its own.
-    let sensors = SensorKind::ALL.iter().any(|kind| recording.sensor(*kind).is_some());
-    if !sensors && recording.simulated.is_none() {
-        recording.warnings.push(Warning::NoSensor { path: recording.path.clone() });
+    if SensorKind::ALL.iter().all(|kind| recording.sensor(*kind).is_none()) {
+        let path = recording.path.clone();
+        recording.warnings.push(match recording.simulated {
+            Some(_) => Warning::SimulatorAlone { path },
+            None => Warning::NoSensor { path },
+        });
     }
 }
 
@@ -253,6 +255,37 @@ mod tests {
     #[test]
     fn a_file_without_sensors_is_warned_about() {
         assert_says(&csv("t,temp\n0,20\n1,20\n").warnings()[0], &["no sensor columns", "acc_x"]);
+    }
+
+    #[test]
+    fn a_simulator_s_file_is_read_without_a_sensor_and_a_position_alone_is_warned_about() {
+        let samples = "t,sim_gyr_x,sim_gyr_y,sim_gyr_z,sim_temp\n0,0,0,90,20\n0.01,,,,\n";
+        let fixture = Fixture::new("run.csv", "[units]\ngyr = \"deg/s\"\n", samples);
+        let simulated = fixture.read().simulated.unwrap();
+        assert_eq!((simulated.gyr.unwrap()[0].z, simulated.temperature.unwrap()[0]), (90.0, 20.0));
+        assert!(simulated.acc.is_none());
+        assert_says(&fixture.warnings()[0], &["a simulator's columns", "no sensor's", "--sim"]);
+
+        let with = |columns: &str, row: &str| {
+            csv(format!("t,sim_temp,ref_px,ref_py,ref_pz{columns}\n0,20,1,,inf{row}\n"))
+        };
+        let alone = with("", "");
+        assert_says(
+            &alone.warnings()[0],
+            &["run.csv, column `ref_px`", "without an attitude", "not used", "ref_qw"],
+        );
+        let position = alone.read().position.unwrap()[0];
+        assert!(position[0] == 1.0 && position[1].is_nan() && position[2].is_nan());
+        assert_eq!(with(",ref_qw,ref_qx,ref_qy,ref_qz", ",1,0,0,0").warnings().len(), 1);
+    }
+
+    #[test]
+    fn absolute_times_that_run_back_are_told_as_the_file_has_them() {
+        let message = with_times(&["1700000000.000001", "1700000000.01", "1700000000.000002"]).error();
+        assert_says(&message, &["line 4", "found 1700000000.000002 after 1700000000.01", "sort"]);
+        let recording = with_times(&["1700000000.000001", "1700000000.010002"]).read();
+        assert_eq!(recording.time, [0.0, 0.010_001]);
+        assert_eq!(recording.epoch.unwrap().picoseconds(), 1_700_000_000_000_001_000_000);
     }
 
     #[test]
