@@ -77,6 +77,9 @@ pub struct NoiseSettings {
     pub sway: &'static [usize],
     /// Groups are compared only where all their blocks hold as many rows: on a rig, one with fewer has just left a rest.
     pub whole_blocks: bool,
+    /// Distance of the instants between which drift goes on a straight line, s. Larger: faster; what changes within it is
+    /// white noise or an effect.
+    pub knots: f64,
     /// The table does not stand exactly as the source says: rests and movements have pointing errors.
     pub scatters: bool,
 }
@@ -201,7 +204,14 @@ impl Default for ResidualSettings {
 impl Default for NoiseSettings {
     /// That of a rig.
     fn default() -> Self {
-        Self { least_scatter: 1e-7, longest_stretch: 20.0, sway: &[], whole_blocks: true, scatters: true }
+        Self {
+            least_scatter: 1e-7,
+            longest_stretch: 20.0,
+            sway: &[],
+            whole_blocks: true,
+            knots: 2.5,
+            scatters: true,
+        }
     }
 }
 

@@ -244,7 +244,8 @@ impl Effect {
 
     /// Parameters that say how or when, at these values; an instant that never comes is none.
     pub fn shapes_at<'e>(&'e self, values: &'e [f64]) -> impl Iterator<Item = usize> + 'e {
-        let is_shape = |role: &Role| matches!(role, Role::Shape { .. } | Role::Instant { .. });
+        let is_shape =
+            |role: &Role| matches!(role, Role::Shape { .. } | Role::Detail { .. } | Role::Instant { .. });
         let known = self.parameters.iter().zip(values).enumerate();
         known.filter(move |(_, (p, value))| is_shape(&p.role) && value.is_finite()).map(|(index, _)| index)
     }

@@ -60,6 +60,11 @@ fn sizes(parameter: &Parameter) -> String {
             plain(parameter.range.0),
             plain(parameter.range.1)
         ),
+        Role::Detail { usual } => format!(
+            "0 until a strong effect shows it, then about {}{unit}, plausible to {}{unit}",
+            plain(usual),
+            plain(parameter.range.1)
+        ),
         Role::Instant { share } => {
             format!("a time, in simulations at about {:.0} % of the run", 100.0 * share)
         }

@@ -75,6 +75,7 @@ pub struct Streamed {
     temperature: Vec<f64>,
     moving: Vec<bool>,
     known: Vec<bool>,
+    speeds: Option<Vec<f64>>,
     place: Place,
 }
 
@@ -104,12 +105,14 @@ impl Streamed {
             temperature,
             moving: Vec::new(),
             known: Vec::new(),
+            speeds: None,
             place,
             time,
         };
         let measured = measured(stream);
         streamed.known = rows.iter().map(|row| streamed.is_covered(*row, &measured)).collect();
         streamed.moving = streamed.movement();
+        streamed.speeds = streamed.travelled();
         Some(streamed)
     }
 
@@ -124,6 +127,28 @@ impl Streamed {
         let after = self.time.partition_point(|t| *t < s);
         let (Some(before), true) = (after.checked_sub(2), after + 1 < self.time.len()) else { return false };
         measured[before..=after + 1].iter().all(|measured| *measured)
+    }
+
+    /// Speed at each row, by the specific force less its mean: what a machine gains on the whole it loses until it comes to
+    /// rest again. `None` without an accelerometer.
+    fn travelled(&self) -> Option<Vec<f64>> {
+        let acc = self.channels[SensorKind::Acc as usize].as_ref()?;
+        let forces: Vec<Vector3<f64>> = self.attitudes.iter().zip(&acc.values).map(|(c, f)| c * f).collect();
+        let steps = || self.time.windows(2).zip(forces.windows(2));
+        let gained = |(time, force): (&[f64], &[Vector3<f64>])| (force[0] + force[1]) * (0.5 * (time[1] - time[0]));
+        let length = self.time.last()? - self.time.first()?;
+        let gravity = steps().map(gained).sum::<Vector3<f64>>() / length;
+        let mut speed = Vector3::zeros();
+        let mut speeds = vec![0.0];
+        for step in steps() {
+            speed += gained(step) - gravity * (step.0[1] - step.0[0]);
+            speeds.push(speed.norm());
+        }
+        let at = |row: &f64| {
+            let sample = super::replay::nearest(&self.time, self.clock.stream_time(*row));
+            speeds.get(sample).copied().unwrap_or(0.0)
+        };
+        Some(self.rows.iter().map(at).collect())
     }
 
     /// Whether it turns or sways at each row.
@@ -195,6 +220,10 @@ impl Recorded for Streamed {
 
     fn known(&self) -> &[bool] {
         &self.known
+    }
+
+    fn speeds(&self) -> Option<&[f64]> {
+        self.speeds.as_deref()
     }
 
     fn steady(&self) -> &dyn Motion {
@@ -355,6 +384,18 @@ mod tests {
         let stream = stream(&Tumble::new(5, 3), StreamClock::default());
         let cut = Streamed::new(&stream, late, &rows, vec![25.0; 2900], Place::ankara()).unwrap();
         assert!(cut.known()[2400] && !cut.known()[2600]);
+    }
+
+    #[test]
+    fn the_speed_is_the_integral_of_what_is_not_gravity() {
+        let (_, streamed) = streamed(StreamClock::default(), |stream| {
+            // To and fro along the first axis in a first rest, 0.5 m/s² for a second each way.
+            for (time, force) in stream.time.iter().zip(stream.values.acc.as_mut().unwrap()) {
+                force.x += if (4.0..5.0).contains(time) { 0.5 } else if (6.0..7.0).contains(time) { -0.5 } else { 0.0 };
+            }
+        });
+        let at = |t: f64| streamed.speeds().unwrap()[((t - 0.3) / 0.01).round() as usize];
+        assert!((at(5.5) - 0.5).abs() < 0.03 && at(2.0) < 0.03 && at(8.0) < 0.03, "{} {} {}", at(5.5), at(2.0), at(8.0));
     }
 
     #[test]

@@ -56,6 +56,11 @@ pub trait Recorded: Motion {
         None
     }
 
+    /// Speed at each row, m/s; `None` where it is not known.
+    fn speeds(&self) -> Option<&[f64]> {
+        None
+    }
+
     /// The same movement estimated from more readings at a time, where they are noisy: less noise row by row, and bends cut.
     fn steady(&self) -> &dyn Motion;
 }

@@ -115,6 +115,7 @@ fn step(parameter: &Parameter) -> f64 {
     match parameter.role {
         Role::Amplitude | Role::Choice => STEP.0 * parameter.prior_scale,
         Role::Shape { usual } => STEP.1 * usual.abs(),
+        Role::Detail { usual } => STEP.0 * usual,
         Role::Instant { .. } => STEP.2,
     }
 }

@@ -191,6 +191,16 @@ impl<'a> ForwardModel<'a> {
         }
     }
 
+    /// Mean speed of each block, m/s; `None` where it is not known.
+    pub fn speeds(&self) -> Option<Vec<f64>> {
+        let speeds = self.motion.speeds().filter(|_| self.view.is_none())?;
+        let mean = |block: &Block| {
+            let rows = speeds.get(block.rows.clone()).unwrap_or_default();
+            rows.iter().sum::<f64>() / rows.len().max(1) as f64
+        };
+        Some(self.cuts.iter().map(mean).collect())
+    }
+
     /// Length of the recording, s.
     pub fn duration(&self) -> f64 {
         self.motion.duration()

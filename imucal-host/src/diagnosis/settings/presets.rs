@@ -103,7 +103,7 @@ impl Settings {
                 leaves_out_mismatch: true,
                 ..rig.residual
             },
-            noise: NoiseSettings { scatters: false, whole_blocks: false, ..rig.noise },
+            noise: NoiseSettings { knots: 0.5, scatters: false, whole_blocks: false, ..rig.noise },
             library: rig.library,
             search: SearchSettings { settling: 1, removes_pairs: true, ..rig.search },
             verdict: VerdictSettings { confirms_held_out: true, ..rig.verdict },
