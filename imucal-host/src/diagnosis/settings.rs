@@ -125,6 +125,9 @@ pub struct SearchSettings {
     pub paired: usize,
     /// Two effects at once are tried to be taken out: each may stand for a part of the other.
     pub removes_pairs: bool,
+    /// Before another effect is added, those of a class are tried in each other's place: a clock that is fitted with the wrong
+    /// one calls for effects that undo it.
+    pub settles_classes: bool,
 }
 
 /// Score tests against covariates.
@@ -239,6 +242,7 @@ impl Default for SearchSettings {
             replaced: 5,
             paired: 8,
             removes_pairs: false,
+            settles_classes: false,
         }
     }
 }

@@ -242,6 +242,13 @@ impl Effect {
         known.filter(|(_, parameter)| parameter.role == Role::Amplitude).map(|(index, _)| index)
     }
 
+    /// Parameters that a fit which holds the effect is linear in: amplitudes and details.
+    pub fn linear(&self) -> impl Iterator<Item = usize> {
+        let known = self.parameters.iter().enumerate();
+        let is_linear = |role: &Role| matches!(role, Role::Amplitude | Role::Detail { .. });
+        known.filter(move |(_, parameter)| is_linear(&parameter.role)).map(|(index, _)| index)
+    }
+
     /// Parameters that say how or when, at these values; an instant that never comes is none.
     pub fn shapes_at<'e>(&'e self, values: &'e [f64]) -> impl Iterator<Item = usize> + 'e {
         let is_shape =
