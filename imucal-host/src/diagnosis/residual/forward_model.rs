@@ -245,7 +245,6 @@ impl<'a> ForwardModel<'a> {
         kind: SensorKind,
         input: &[Input],
     ) -> Result<Vec<Vector3<f64>>, DiagnosisError> {
-        let output = chain.output(kind, &self.triads[kind as usize], input);
-        output.ok_or(DiagnosisError::Simulation { sensor: kind })
+        Ok(chain.output(kind, &self.triads[kind as usize], input)?)
     }
 }
