@@ -17,14 +17,17 @@ pub use self::{
     finding::{Diagnosis, Verdict},
 };
 use self::{
-    library::candidates::{Candidates, Setting},
+    library::{
+        candidates::{Candidates, Setting},
+        formulas,
+    },
     residual::forward_model::ForwardModel,
     screening::preparation::Preparation,
     search::stepwise,
     settings::{Settings, Source},
     verdict::answer::{answer, untestable},
 };
-use crate::{recording::Recording, store::StoredCalibration};
+use crate::{effect::Effect, recording::Recording, store::StoredCalibration};
 
 /// What is known before a diagnosis.
 #[derive(Clone, Debug, Default)]
@@ -33,6 +36,8 @@ pub struct Options {
     pub without: Vec<String>,
     /// The simulator's present model of the unit; without it, the baseline is calibrated from the recording.
     pub model: Option<StoredCalibration>,
+    /// The user's own effects, candidates besides the catalogue's.
+    pub effects: Vec<&'static Effect>,
     /// Settings; without them, the preset of the source of the movement.
     pub settings: Option<Settings>,
 }
@@ -67,9 +72,20 @@ pub fn try_diagnose(
         provided: settings.source,
         field_known: recording.manifest.site.field_ned_ut.is_some(),
     };
-    let candidates = Candidates::new(&setting, &options.without);
-    let explained = stepwise::search(&scene, &candidates, progress)?;
-    answer(recording, &preparation, &explained, progress)
+    let mut candidates = Candidates::new(&setting, &options.without, &options.effects);
+    formulas::sift(&scene, &mut candidates)?;
+    let explain = |candidates: &Candidates| {
+        let explained = stepwise::search(&scene, candidates, progress)?;
+        answer(recording, &preparation, &explained, progress)
+    };
+    loop {
+        match explain(&candidates) {
+            // In a shape of the search a user's formula has no value; each such effect is withdrawn once.
+            Err(DiagnosisError::Formula(cause))
+                if candidates.withdraw(&cause.effect, cause.without_row()) => {}
+            diagnosis => return diagnosis.map(|diagnosis| diagnosis.with_words_of(&options.effects)),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -52,7 +52,7 @@ fn with_fit<T>(recording: &Recording, check: impl FnOnce(Linearisation<'_>, &Fit
         provided: settings.source,
         field_known: true,
     };
-    let candidates = Candidates::new(&setting, &[]);
+    let candidates = Candidates::new(&setting, &[], &[]);
     let doses = candidates
         .baseline
         .iter()

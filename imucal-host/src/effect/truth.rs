@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::machine::Swing;
+use crate::recording::SensorKind;
 
 /// The truth at one row, in the table's frame `t`. `C_a_b` takes components from `a` to `b`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,6 +93,15 @@ impl Input {
             b_q: truth.b_t,
             angles: truth.gimbals.map(|gimbal| gimbal.angle),
             angle_rates: truth.gimbals.map(|gimbal| gimbal.rate),
+        }
+    }
+
+    /// What a sensor is given, SI units.
+    pub fn given(&self, kind: SensorKind) -> Vector3<f64> {
+        match kind {
+            SensorKind::Acc => self.f_q,
+            SensorKind::Gyr => self.w_iq_q,
+            SensorKind::Mag => self.b_q,
         }
     }
 

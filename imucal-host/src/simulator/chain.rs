@@ -76,13 +76,8 @@ impl<'a> Chain<'a> {
                 alter(&dose.values, &mut triad);
             }
         }
-        let given = |row: &Input| match kind {
-            SensorKind::Acc => row.f_q,
-            SensorKind::Gyr => row.w_iq_q,
-            SensorKind::Mag => row.b_q,
-        };
         let k = triad.sensitivity().ok_or(OutputError::Singular { sensor: kind })?;
-        let sensed: Vec<_> = input.iter().map(|row| k * given(row)).collect();
+        let sensed: Vec<_> = input.iter().map(|row| k * row.given(kind)).collect();
         let mut output: Vec<_> = sensed.iter().map(|sensed| sensed + triad.bias).collect();
         let mut run = SensorRun { input, sensed: &sensed, output: &mut output };
         for dose in &self.doses {

@@ -177,6 +177,16 @@ impl<'a> ForwardModel<'a> {
         Chain::new(doses).inputs(self.motion.steady(), &nodes.times)
     }
 
+    /// What a unit is given at each row, without any effect.
+    pub fn given_rows(&self) -> Vec<Input> {
+        Chain::default().inputs(self.motion, &self.recording.time)
+    }
+
+    /// Likewise at the nodes for signatures.
+    pub fn given_nodes(&self) -> Vec<Input> {
+        self.inputs(&[], &self.fine)
+    }
+
     /// The truth in the middle of each block, without any effect.
     pub fn plain(&self) -> Vec<Truth> {
         match &self.view {

@@ -17,8 +17,10 @@ const SHORT: usize = 60;
 const LONG: usize = 400;
 /// Most ids in `like`.
 const MOST_LIKE: usize = 20;
-/// Amplitudes and shapes are of this size.
+/// Amplitudes are of this size.
 const SIZES: (f64, f64) = (1e-30, 1e30);
+/// Shapes are at most of this size.
+const LARGEST_SHAPE: f64 = 1e9;
 
 /// An entry as it is written.
 #[derive(Clone, Debug, Deserialize)]
@@ -219,12 +221,16 @@ impl Shape {
             return Err(wrong(&key(".unit"), &self.unit, "a unit such as m/s^2, or - for none"));
         }
         let Self { typical, low, high, .. } = *self;
-        let is_sound = [typical, low, high].iter().all(|value| value.abs() <= SIZES.1)
+        let is_sound = [typical, low, high].iter().all(|value| value.abs() <= LARGEST_SHAPE)
             && low < high
             && (low..=high).contains(&typical);
         if !is_sound {
             let found = format!("{low} <= {typical} <= {high}");
-            return Err(wrong(&key(""), found, "finite numbers with low <= typical <= high and low < high"));
+            return Err(wrong(
+                &key(""),
+                found,
+                "numbers up to 1e9 with low <= typical <= high and low < high",
+            ));
         }
         if low >= 0.0 && low < SIZES.0 {
             return Err(wrong(

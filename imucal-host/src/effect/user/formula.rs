@@ -1,5 +1,9 @@
 //! What a user's effect adds to a sensor's output: an amplitude an axis, times a formula.
 
+use std::fmt;
+
+use nalgebra::Vector3;
+
 use super::{
     expression::{Column, Expression},
     quantity::{Quantity, Rows},
@@ -40,6 +44,13 @@ pub struct NotFinite {
     pub time: f64,
 }
 
+impl fmt::Display for Formula {
+    /// As it was written, part by part.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.texts.join(", "))
+    }
+}
+
 impl NotFinite {
     /// The same, for a run at other points than the recording's rows.
     pub fn without_row(&self) -> String {
@@ -62,7 +73,7 @@ impl Formula {
             values.get(amplitude).copied().filter(|amplitude| *amplitude != 0.0)
         };
         let shapes = values.get(self.amplitudes..).unwrap_or_default();
-        let columns = self.columns(run, shapes, |axis| amplitude(axis).is_some())?;
+        let columns = self.columns(run.input, run.sensed, shapes, |axis| amplitude(axis).is_some())?;
         for (axis, column) in columns.into_iter().enumerate() {
             let (Some(column), Some(amplitude)) = (column, amplitude(axis)) else { continue };
             for (row, output) in run.output.iter_mut().enumerate() {
@@ -72,10 +83,33 @@ impl Formula {
         Ok(())
     }
 
+    /// What is multiplied on each axis that has an amplitude, point by point, with these shapes.
+    ///
+    /// # Errors
+    ///
+    /// [`NotFinite`].
+    pub fn factors(
+        &self,
+        input: &[Input],
+        sensed: &[Vector3<f64>],
+        shapes: &[f64],
+    ) -> Result<Vec<Vec<f64>>, NotFinite> {
+        let columns = self.columns(input, sensed, shapes, |_| true)?;
+        let whole = |column: Column| (0..input.len()).map(|row| column.at(row)).collect();
+        Ok(columns.into_iter().flatten().map(whole).collect())
+    }
+
+    /// The same axes have amplitudes, in common or each its own.
+    pub fn is_laid_out_like(&self, other: &Self) -> bool {
+        let amplitudes = |formula: &Self| formula.axes.map(|axis| axis.map(|(amplitude, _)| amplitude));
+        amplitudes(self) == amplitudes(other)
+    }
+
     /// What each axis' amplitude multiplies, row by row, with these shapes.
     fn columns(
         &self,
-        run: &SensorRun<'_>,
+        input: &[Input],
+        sensed: &[Vector3<f64>],
         shapes: &[f64],
         is_asked: impl Fn(usize) -> bool,
     ) -> Result<[Option<Column>; 3], NotFinite> {
@@ -88,7 +122,7 @@ impl Formula {
             let column = match known {
                 Some(column) => column,
                 None => {
-                    let rows = Rows { input: run.input, sensed: run.sensed, axis };
+                    let rows = Rows { input, sensed, axis };
                     let column = self.parts[part].column(&rows, shapes);
                     self.check(&column, part, &rows)?;
                     column

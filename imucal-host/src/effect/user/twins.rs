@@ -93,8 +93,7 @@ impl Run {
         let table: Vec<Input> = self.truth.iter().map(Input::of).collect();
         let (input, triad) = if is_field { (&table, Triad::identity()) } else { (&self.input, self.triad) };
         let k = triad.sensitivity().unwrap();
-        let given = |row: &Input| [row.f_q, row.w_iq_q, row.b_q][kind as usize];
-        let sensed: Vec<_> = input.iter().map(|row| k * given(row)).collect();
+        let sensed: Vec<_> = input.iter().map(|row| k * row.given(kind)).collect();
         let mut output = vec![Vector3::zeros(); input.len()];
         let mut run = SensorRun { input, sensed: &sensed, output: &mut output };
         for dose in doses {
