@@ -103,8 +103,12 @@ impl OwnEffects {
     }
 
     fn digest(&self) -> Option<String> {
+        let formula = |effect: &Effect| match effect.act {
+            Act::Formula(_, formula) => formula.to_string(),
+            _ => String::new(),
+        };
         let text =
-            |effect: &&'static Effect| format!("{:?}\n", (&effect.id, &effect.act, &effect.parameters));
+            |effect: &&'static Effect| format!("{} {} {:?}\n", effect.id, formula(effect), effect.parameters);
         self.are_drawn.then(|| digest(&self.effects.iter().map(text).collect::<String>()))
     }
 }

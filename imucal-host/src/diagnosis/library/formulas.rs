@@ -142,6 +142,10 @@ fn normalised(sums: Vec<f64>) -> Vec<f64> {
     if most == 0.0 { Vec::new() } else { sums.into_iter().map(|sum| sum / most).collect() }
 }
 
+/// Their sums differ by a factor alone.
 fn are_same(one: &[f64], other: &[f64]) -> bool {
     !one.is_empty() && one.len() == other.len() && one.iter().zip(other).all(|(a, b)| (a - b).abs() < SAME)
 }
+
+#[cfg(test)]
+mod tests;

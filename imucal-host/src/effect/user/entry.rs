@@ -98,6 +98,7 @@ impl Entry {
             return Err(wrong("shape", format!("a table of {}", self.shape.len()), "at most two shapes"));
         }
         let shapes: Vec<String> = self.shape.keys().cloned().collect();
+        shapes.iter().try_for_each(|name| check_name(name))?;
         let texts = match &self.formula {
             Texts::One(text) => vec![text.clone()],
             Texts::Three(texts) => texts.to_vec(),
@@ -205,18 +206,6 @@ impl Entry {
 impl Shape {
     fn parameter(&self, name: &str, is_time: bool) -> Result<Parameter, EntryFault> {
         let key = |of: &str| format!("shape.{name}{of}");
-        let is_free = !XYZ.contains(&name)
-            && !["k", "pi"].contains(&name)
-            && quantity::find(name).is_none()
-            && !function::names().any(|own| own == name)
-            && History::find(name).is_none();
-        if !is_name(name) || !is_free {
-            return Err(wrong(
-                "shape",
-                name,
-                "a name of a-z, 0-9 and _ that begins with a letter and is no input, function, x, y, z, k or pi",
-            ));
-        }
         if !is_printed(&self.unit, SHORT) {
             return Err(wrong(&key(".unit"), &self.unit, "a unit such as m/s^2, or - for none"));
         }
@@ -252,6 +241,18 @@ impl Shape {
             material: 0.0,
         })
     }
+}
+
+/// A shape's name must mean nothing else.
+fn check_name(name: &str) -> Result<(), EntryFault> {
+    let is_free = !XYZ.contains(&name)
+        && !["k", "pi"].contains(&name)
+        && quantity::find(name).is_none()
+        && !function::names().any(|own| own == name)
+        && History::find(name).is_none();
+    let expected =
+        "a name of a-z, 0-9 and _ that begins with a letter and is no input, function, x, y, z, k or pi";
+    if is_name(name) && is_free { Ok(()) } else { Err(wrong("shape", name, expected)) }
 }
 
 /// A name of a-z, 0-9 and `_` that begins with a letter.

@@ -29,7 +29,7 @@ pub(super) const MOST: usize = 200;
 /// Deepest nesting of `lag` and `mean`.
 pub(super) const DEEPEST_HISTORY: usize = 3;
 /// Edits within which a misspelt name is taken for a known one.
-const NEAR: usize = 3;
+const NEAR: usize = 2;
 
 /// Understands a formula; `shapes` names the parameters it may have besides the inputs.
 pub(super) fn parse(text: &str, shapes: &[String]) -> Result<Expression, FormulaFault> {

@@ -133,7 +133,7 @@ fn what_is_no_formula_is_refused_with_its_column() {
             "found the name `a_xx` at column 1, expected an input, a shape of the entry or `pi`; did you mean `a_x`",
         ),
         ("velocity_of_the_robot", "use a_x, w_x"),
-        ("sinn(t)", "did you mean `sin`"),
+        ("sqr(t)", "did you mean `sqrt`"),
         ("system(t)", "the function `system`"),
         ("min(t)", "found 1 argument(s) of `min` at column 1, expected 2"),
         ("sin()", "found `)` at column 5"),
