@@ -67,7 +67,7 @@ fn effects_that_are_the_same_are_named_together_and_one_without_a_value_cannot_b
     text += &entry("mag.rooted", "sqrt(a_y)");
     text += &entry("mag.huge", "exp(100 * t)");
     let own = parse(&text, Path::new("own.toml")).unwrap();
-    let recording = simulated(&own, "mag.own_07", 0.5).unwrap();
+    let recording = simulated(&own, "mag.own_07", 0.05).unwrap();
     let diagnosis = diagnosed(&recording, &own);
     assert_eq!(ids(&diagnosis), ["mag.own_00"], "{diagnosis:#?}");
     let cause = &diagnosis.causes[0];
