@@ -19,11 +19,12 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     answer::{Answer, Finished, truly_closed},
-    case::{Case, draw},
+    case::{Case, draw_among},
     seal::{Nonce, digest},
 };
 use crate::{
     diagnosis::Diagnosis,
+    effect::{Act, Effect},
     file::{Limits, OutputError, OutputSet, ReadFault},
     recording::Recording,
     simulator::SimulationError,
@@ -39,6 +40,12 @@ pub enum TrialError {
     /// The file of the set cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// A set that is drawn otherwise.
+    #[error(
+        "{}: found a set drawn without these effects or with others, expected the same; choose another folder",
+        path.display()
+    )]
+    OtherEffects { path: PathBuf },
     /// Files of a set, but not which one.
     #[error(
         "{}: found the file of a set without its set.json, expected both or none; choose another folder; nothing was changed",
@@ -75,6 +82,35 @@ const ANSWERS: &str = "answers.jsonl";
 struct Set {
     format: String,
     nonce: String,
+    /// Hash of the user's own effects that are drawn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    drawn: Option<String>,
+}
+
+/// A user's own effects in a set of trials.
+#[derive(Clone, Debug, Default)]
+pub struct OwnEffects {
+    /// Candidates of the diagnosis.
+    pub effects: Vec<&'static Effect>,
+    /// They are drawn for recordings as well.
+    pub are_drawn: bool,
+}
+
+impl OwnEffects {
+    /// Those that are drawn.
+    pub fn drawn(&self) -> &[&'static Effect] {
+        if self.are_drawn { &self.effects } else { &[] }
+    }
+
+    fn digest(&self) -> Option<String> {
+        let formula = |effect: &Effect| match effect.act {
+            Act::Formula(_, formula) => formula.to_string(),
+            _ => String::new(),
+        };
+        let text =
+            |effect: &&'static Effect| format!("{} {} {:?}\n", effect.id, formula(effect), effect.parameters);
+        self.are_drawn.then(|| digest(&self.effects.iter().map(text).collect::<String>()))
+    }
 }
 
 /// The seal of one case.
@@ -89,6 +125,8 @@ struct Seal {
 pub struct Folder {
     path: PathBuf,
     nonce: Nonce,
+    drawn: Option<String>,
+    own: OwnEffects,
 }
 
 impl Folder {
@@ -98,11 +136,20 @@ impl Folder {
     ///
     /// [`TrialError::OtherSet`], [`TrialError::File`].
     pub fn open(path: &Path, nonce: Option<Nonce>) -> Result<Self, TrialError> {
+        Self::open_with(path, nonce, OwnEffects::default())
+    }
+
+    /// Likewise, to be run with a user's own effects.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`].
+    pub fn open_with(path: &Path, nonce: Option<Nonce>, own: OwnEffects) -> Result<Self, TrialError> {
         let set_path = path.join("set.json");
         let failed = |cause| TrialError::File { path: set_path.clone(), cause };
-        if let Some(found) = Self::nonce_of(path)? {
+        if let Some((found, drawn)) = Self::set_of(path)? {
             return match nonce.filter(|wanted| *wanted != found) {
-                None => Ok(Self { path: path.to_owned(), nonce: found }),
+                None => Ok(Self { path: path.to_owned(), nonce: found, drawn, own }),
                 Some(wanted) => {
                     Err(TrialError::OtherSet { path: set_path, found: found.hex(), expected: wanted.hex() })
                 }
@@ -118,20 +165,21 @@ impl Folder {
             Some(nonce) => nonce,
             None => Nonce::fresh().map_err(|cause| failed(io::Error::other(cause.to_string())))?,
         };
-        let set = Set { format: "imucal-blind/1".to_owned(), nonce: nonce.hex() };
+        let drawn = own.digest();
+        let set = Set { format: "imucal-blind/1".to_owned(), nonce: nonce.hex(), drawn: drawn.clone() };
         let text = serde_json::to_string_pretty(&set).unwrap_or_default() + "\n";
         let mut files = OutputSet::sparing_all_but(Vec::new());
         files.add(&set_path, text.as_bytes())?;
         files.commit()?;
-        Ok(Self { path: path.to_owned(), nonce })
+        Ok(Self { path: path.to_owned(), nonce, drawn, own })
     }
 
-    fn nonce_of(path: &Path) -> Result<Option<Nonce>, TrialError> {
+    fn set_of(path: &Path) -> Result<Option<(Nonce, Option<String>)>, TrialError> {
         let path = path.join("set.json");
         let Some(text) = text_of(&path, Limits::read_small)? else { return Ok(None) };
-        let nonce = serde_json::from_str::<Set>(&text).ok().and_then(|set| Nonce::parse(&set.nonce));
-        match nonce {
-            Some(nonce) => Ok(Some(nonce)),
+        let set = serde_json::from_str::<Set>(&text).ok();
+        match set.and_then(|set| Some((Nonce::parse(&set.nonce)?, set.drawn))) {
+            Some(set) => Ok(Some(set)),
             None => Err(TrialError::Damaged { path, line: 1, found: text.chars().take(80).collect() }),
         }
     }
@@ -175,6 +223,9 @@ impl Folder {
         diagnose: &(dyn Fn(&Recording) -> Diagnosis + Sync),
         heard: &(dyn Fn(usize) + Sync),
     ) -> Result<(), TrialError> {
+        if self.drawn != self.own.digest() {
+            return Err(TrialError::OtherEffects { path: self.path.join("set.json") });
+        }
         let over: Vec<String> = self.finished()?.into_iter().map(|trial| trial.case).collect();
         let left: Vec<Case> = cases.iter().copied().filter(|case| !over.contains(&case.name())).collect();
         let writer = Writer::open(&self.path)?;
@@ -182,7 +233,7 @@ impl Folder {
         let failure: Mutex<Option<TrialError>> = Mutex::new(None);
         let work = || {
             while let Some(case) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
-                if let Err(error) = trial(&self.nonce, *case, diagnose, &writer) {
+                if let Err(error) = trial(&self.nonce, *case, &self.own, diagnose, &writer) {
                     next.store(left.len(), Ordering::Relaxed);
                     failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_or_insert(error);
                 }
@@ -218,12 +269,13 @@ pub fn mingled(healthy: usize, afflicted: usize) -> Vec<Case> {
 fn trial(
     nonce: &Nonce,
     case: Case,
+    own: &OwnEffects,
     diagnose: &(dyn Fn(&Recording) -> Diagnosis + Sync),
     writer: &Writer,
 ) -> Result<(), TrialError> {
     let name = case.name();
     let failed = |cause| TrialError::Simulation { case: name.clone(), cause };
-    let drawn = draw(nonce, case).map_err(failed)?;
+    let drawn = draw_among(nonce, case, own.drawn()).map_err(failed)?;
     let label = serde_json::to_string(&drawn.label).unwrap_or_default();
     writer.seals.write(&Seal { case: name.clone(), sha256: digest(&label) })?;
     let recording = drawn.simulation.record(&format!("{name}.csv")).map_err(failed)?;
@@ -232,7 +284,7 @@ fn trial(
     let diagnosis = catch_unwind(AssertUnwindSafe(|| diagnose(&recording))).ok();
     let seconds = start.elapsed().as_secs_f64();
     let answer = Answer::of(diagnosis.as_ref());
-    let truly_closed = truly_closed(&drawn, &answer).unwrap_or(None);
+    let truly_closed = truly_closed(&drawn, &answer, &own.effects).unwrap_or(None);
     writer.answers.write(&Finished { case: name, label, answer, truly_closed, seconds })
 }
 

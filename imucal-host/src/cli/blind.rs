@@ -9,17 +9,19 @@ use super::{
     Ending,
     output::{self, say},
     overwrite::{Overwrite, Planned},
+    own_effects,
     progress::Progress,
 };
 use crate::{
     blind::{
-        case::{Case, draw},
+        case::{Case, draw_among},
         judgement::Judgement,
         score::score,
         seal::Nonce,
-        trial::{Folder, mingled},
+        trial::{Folder, OwnEffects, mingled},
     },
     diagnosis::{Options, diagnose},
+    file::Limits,
 };
 
 #[derive(Args, Debug)]
@@ -43,11 +45,17 @@ pub(super) struct Arguments {
     #[arg(long)]
     misses: bool,
     /// Only score what the folder DIR holds
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["cases", "healthy", "out", "nonce", "jobs", "open"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["cases", "healthy", "out", "nonce", "jobs", "open", "effects"])]
     score: Option<PathBuf>,
     /// Only write the recording of this case, such as afflicted-0003, and its label into --out
     #[arg(long, value_name = "CASE", value_parser = case, requires = "nonce")]
     open: Option<Case>,
+    /// Your own effects, in TOML: candidates like those of the catalogue (see docs/user_effects.md)
+    #[arg(long, value_name = "FILE")]
+    effects: Option<PathBuf>,
+    /// Draw your own effects for the recordings, too
+    #[arg(long, requires = "effects")]
+    draw_effects: bool,
     #[command(flatten)]
     overwrite: Overwrite,
 }
@@ -93,14 +101,21 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
 }
 
 fn trials(arguments: &Arguments) -> anyhow::Result<Folder> {
-    let folder = Folder::open(&arguments.out, arguments.nonce)?;
+    let own = own(arguments)?;
+    let options = Options { effects: own.effects.clone(), ..Options::default() };
+    let folder = Folder::open_with(&arguments.out, arguments.nonce, own)?;
     let cases = mingled(arguments.healthy, arguments.cases);
     let cores = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let jobs = arguments.jobs.unwrap_or(cores).get();
     let progress = Progress::start();
     let heard = |over: usize| progress.stage(&format!("{over} of {} cases", cases.len()));
-    folder.run(&cases, jobs, &|recording| diagnose(recording, &Options::default(), &|_| ()), &heard)?;
+    folder.run(&cases, jobs, &|recording| diagnose(recording, &options, &|_| ()), &heard)?;
     Ok(folder)
+}
+
+fn own(arguments: &Arguments) -> anyhow::Result<OwnEffects> {
+    let effects = own_effects(arguments.effects.as_deref(), &Limits::default())?;
+    Ok(OwnEffects { effects, are_drawn: arguments.draw_effects })
 }
 
 /// Writes one case for a closer look.
@@ -112,7 +127,7 @@ fn open(nonce: Nonce, case: Case, arguments: &Arguments) -> anyhow::Result<Endin
     let mut planned = Planned::recording(&path);
     planned.push(Planned::new(&label));
     let mut files = arguments.overwrite.plan(&[], &planned)?;
-    let drawn = draw(&nonce, case)?;
+    let drawn = draw_among(&nonce, case, own(arguments)?.drawn())?;
     drawn.simulation.record(&name)?.write_into(&path, &mut files)?;
     files.add(&label, (serde_json::to_string_pretty(&drawn.label)? + "\n").as_bytes())?;
     files.commit()?;

@@ -17,7 +17,10 @@ pub use self::{
     finding::{Diagnosis, Verdict},
 };
 use self::{
-    library::candidates::{Candidates, Setting},
+    library::{
+        candidates::{Candidates, Setting},
+        formulas,
+    },
     residual::forward_model::ForwardModel,
     screening::preparation::Preparation,
     search::{motion_mismatch, stepwise},
@@ -25,6 +28,7 @@ use self::{
     verdict::answer::{answer, untestable},
 };
 use crate::{
+    effect::Effect,
     recording::{Recording, Stream},
     store::StoredCalibration,
 };
@@ -38,6 +42,8 @@ pub struct Options {
     pub model: Option<StoredCalibration>,
     /// A simulator's stream for the recording, on a clock of its own; without it, the recording's own reference.
     pub stream: Option<Stream>,
+    /// The user's own effects, candidates besides the catalogue's.
+    pub effects: Vec<&'static Effect>,
     /// Settings; without them, the preset of the source of the movement.
     pub settings: Option<Settings>,
 }
@@ -58,7 +64,8 @@ pub fn try_diagnose(
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis, DiagnosisError> {
     let source = Source::of(recording, options.stream.as_ref());
-    let own = if source == Source::Simulator && options.stream.is_none() { Stream::of(recording) } else { None };
+    let own =
+        if source == Source::Simulator && options.stream.is_none() { Stream::of(recording) } else { None };
     let stream = options.stream.as_ref().or(own.as_ref());
     let settings = options.settings.clone().unwrap_or_else(|| Settings::preset(source));
     let mut preparation = Preparation::new(recording, stream, options.model.as_ref(), &settings)?;
@@ -76,11 +83,22 @@ pub fn try_diagnose(
         // A stream holds the field itself.
         field_known: recording.manifest.site.field_ned_ut.is_some() || stream.is_some(),
     };
-    let candidates = Candidates::new(&setting, &options.without);
+    let mut candidates = Candidates::new(&setting, &options.without, &options.effects);
     let (scene, stretches) = motion_mismatch::left_out(scene, &candidates)?;
     preparation.findings.extend(motion_mismatch::finding(&stretches));
-    let explained = stepwise::search(&scene, &candidates, progress)?;
-    answer(recording, &preparation, &explained, progress)
+    formulas::sift(&scene, &mut candidates)?;
+    let explain = |candidates: &Candidates| {
+        let explained = stepwise::search(&scene, candidates, progress)?;
+        answer(recording, &preparation, &explained, progress)
+    };
+    loop {
+        match explain(&candidates) {
+            // In a shape of the search a user's formula has no value; each such effect is withdrawn once.
+            Err(DiagnosisError::Formula(cause))
+                if candidates.withdraw(&cause.effect, cause.without_row()) => {}
+            diagnosis => return diagnosis.map(|diagnosis| diagnosis.with_words_of(&options.effects)),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -80,10 +80,16 @@ mod tests {
         let off = |values: &[f64]| {
             let mut output = given.clone();
             alter(values, &mut SensorRun { input: &input, sensed: &[], output: &mut output });
-            let differences = output.iter().zip(&computed).skip(1000).map(|(one, other)| (one - other).amax());
+            let differences =
+                output.iter().zip(&computed).skip(1000).map(|(one, other)| (one - other).amax());
             differences.fold(0.0, f64::max)
         };
-        assert!(off(&[0.03, 0.01]) < 4e-3 && off(&[0.03, 0.0]) > 2e-2, "{} {}", off(&[0.03, 0.01]), off(&[0.03, 0.0]));
+        assert!(
+            off(&[0.03, 0.01]) < 4e-3 && off(&[0.03, 0.0]) > 2e-2,
+            "{} {}",
+            off(&[0.03, 0.01]),
+            off(&[0.03, 0.0])
+        );
     }
 
     #[test]

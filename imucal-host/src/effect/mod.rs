@@ -67,6 +67,7 @@ mod transient;
 mod triad_entries;
 mod truth;
 mod unit_error;
+pub mod user;
 mod vibration_rectification;
 mod warmup;
 mod wobble;
@@ -114,6 +115,8 @@ pub enum Act {
     Triad(SensorKind, fn(&[f64], &mut Triad<f64>)),
     /// Alters a triad's output.
     Sensor(SensorKind, fn(&[f64], &mut SensorRun<'_>)),
+    /// Adds a user's formula to a triad's output.
+    Formula(SensorKind, &'static user::Formula),
     /// Alters a triad's noise or limit.
     Signal(SensorKind, fn(&[f64], &mut SignalRun<'_>)),
     /// Alters a triad's samples.
@@ -127,7 +130,7 @@ impl Act {
             Self::Rig(_) => Stage::Rig,
             Self::Clock(_) => Stage::Clock,
             Self::Field(_) => Stage::Field,
-            Self::Triad(..) | Self::Sensor(..) => Stage::Sensor,
+            Self::Triad(..) | Self::Sensor(..) | Self::Formula(..) => Stage::Sensor,
             Self::Signal(..) => Stage::Signal,
             Self::Data(..) => Stage::Data,
         }
@@ -170,9 +173,11 @@ impl Effect {
     fn new(id: &str, act: Act, parameters: Vec<Parameter>, words: Words) -> Self {
         let sensors: &'static [SensorKind] = match act {
             Act::Rig(_) | Act::Clock(_) | Act::Field(_) => &SensorKind::ALL,
-            Act::Triad(kind, _) | Act::Sensor(kind, _) | Act::Signal(kind, _) | Act::Data(kind, _) => {
-                only(kind)
-            }
+            Act::Triad(kind, _)
+            | Act::Sensor(kind, _)
+            | Act::Formula(kind, _)
+            | Act::Signal(kind, _)
+            | Act::Data(kind, _) => only(kind),
         };
         Self {
             id: id.to_owned(),

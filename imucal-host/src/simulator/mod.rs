@@ -25,7 +25,7 @@ pub mod unit;
 
 pub use conditions::{Conditions, NoiseLevel};
 pub use dose::Dose;
-pub use error::SimulationError;
+pub use error::{OutputError, SimulationError};
 pub use place::Place;
 pub use programme::Programme;
 pub use recorder::{SimulatedSensor, SimulatedUnit, record};

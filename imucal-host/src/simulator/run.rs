@@ -121,7 +121,7 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// As [`Self::schedule`], and [`SimulationError::Singular`] for an effect beyond reason.
+    /// As [`Self::schedule`], and [`SimulationError::Output`] for an effect beyond reason.
     pub fn record(&self, name: &str) -> Result<Recording, SimulationError> {
         let schedule = self.schedule()?;
         let unit = self.unit_under_test();
@@ -135,8 +135,7 @@ impl Simulation {
         let mut recording = Recording::new(name, manifest.clone(), time);
         for kind in SensorKind::ALL {
             let triad = unit.triad(kind);
-            let clean =
-                chain.output(kind, &triad.triad, &input).ok_or(SimulationError::Singular { sensor: kind })?;
+            let clean = chain.output(kind, &triad.triad, &input)?;
             let samples = self.convert(kind, triad, &chain, clean, &recording.time, &mut random);
             // Its own manifest has every conversion it needs.
             let triple = manifest.triple(kind, samples).ok();

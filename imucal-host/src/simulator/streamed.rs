@@ -135,7 +135,8 @@ impl Streamed {
         let acc = self.channels[SensorKind::Acc as usize].as_ref()?;
         let forces: Vec<Vector3<f64>> = self.attitudes.iter().zip(&acc.values).map(|(c, f)| c * f).collect();
         let steps = || self.time.windows(2).zip(forces.windows(2));
-        let gained = |(time, force): (&[f64], &[Vector3<f64>])| (force[0] + force[1]) * (0.5 * (time[1] - time[0]));
+        let gained =
+            |(time, force): (&[f64], &[Vector3<f64>])| (force[0] + force[1]) * (0.5 * (time[1] - time[0]));
         let length = self.time.last()? - self.time.first()?;
         let gravity = steps().map(gained).sum::<Vector3<f64>>() / length;
         let mut speed = Vector3::zeros();
@@ -317,10 +318,7 @@ fn attitudes(time: &[f64], [acc, gyr, _]: &[Option<Channel>; 3]) -> Vec<Matrix3<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        recording::Simulated,
-        simulator::{Tumble, truth::Motion as _},
-    };
+    use crate::{recording::Simulated, simulator::Tumble};
 
     /// The stream of a tumbling hand at 250 Hz, its own clock by `clock`.
     fn stream(tumble: &Tumble, clock: StreamClock) -> Stream {
@@ -391,11 +389,23 @@ mod tests {
         let (_, streamed) = streamed(StreamClock::default(), |stream| {
             // To and fro along the first axis in a first rest, 0.5 m/s² for a second each way.
             for (time, force) in stream.time.iter().zip(stream.values.acc.as_mut().unwrap()) {
-                force.x += if (4.0..5.0).contains(time) { 0.5 } else if (6.0..7.0).contains(time) { -0.5 } else { 0.0 };
+                force.x += if (4.0..5.0).contains(time) {
+                    0.5
+                } else if (6.0..7.0).contains(time) {
+                    -0.5
+                } else {
+                    0.0
+                };
             }
         });
         let at = |t: f64| streamed.speeds().unwrap()[((t - 0.3) / 0.01).round() as usize];
-        assert!((at(5.5) - 0.5).abs() < 0.03 && at(2.0) < 0.03 && at(8.0) < 0.03, "{} {} {}", at(5.5), at(2.0), at(8.0));
+        assert!(
+            (at(5.5) - 0.5).abs() < 0.03 && at(2.0) < 0.03 && at(8.0) < 0.03,
+            "{} {} {}",
+            at(5.5),
+            at(2.0),
+            at(8.0)
+        );
     }
 
     #[test]

@@ -188,7 +188,12 @@ impl<'s> Weighing<'s> {
             ChannelBlocks { weights: self.weights(channel, noise, &|_| true), offsets: offsets(channel) }
         };
         let rows = channels.iter().map(rows).collect();
-        let effects = Arc::new(RandomEffects::new(Knots::at(&self.times, self.scene.settings.noise.knots), rows, count, DRIFTS));
+        let effects = Arc::new(RandomEffects::new(
+            Knots::at(&self.times, self.scene.settings.noise.knots),
+            rows,
+            count,
+            DRIFTS,
+        ));
         ChannelGroup { channels, effects }
     }
 
@@ -227,7 +232,12 @@ impl<'s> Weighing<'s> {
     ) -> RandomEffects {
         let weights = self.weights(channel, noise, inside);
         let (count, offsets) = self.scattered(channel).offsets();
-        RandomEffects::new(Knots::at(&self.times, self.scene.settings.noise.knots), vec![ChannelBlocks { weights, offsets }], count, DRIFTS)
+        RandomEffects::new(
+            Knots::at(&self.times, self.scene.settings.noise.knots),
+            vec![ChannelBlocks { weights, offsets }],
+            count,
+            DRIFTS,
+        )
     }
 
     fn weights(&self, channel: &Channel, noise: &Noise, inside: &(dyn Fn(usize) -> bool + Sync)) -> Vec<f64> {

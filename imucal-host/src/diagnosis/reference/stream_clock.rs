@@ -295,7 +295,8 @@ mod tests {
 
     #[test]
     fn a_line_is_that_of_most_points() {
-        let mut points: Vec<(f64, f64)> = (0..20).map(|k| f64::from(k) * 12.0).map(|t| (t, 0.3 + 2e-4 * t)).collect();
+        let mut points: Vec<(f64, f64)> =
+            (0..20).map(|k| f64::from(k) * 12.0).map(|t| (t, 0.3 + 2e-4 * t)).collect();
         points[3].1 = 1.9;
         points[11].1 = -0.8;
         let (level, slope) = line(&points).unwrap();

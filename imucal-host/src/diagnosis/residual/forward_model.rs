@@ -214,6 +214,16 @@ impl<'a> ForwardModel<'a> {
         Chain::new(doses).inputs(self.motion.steady(), &nodes.times)
     }
 
+    /// What a unit is given at each row, without any effect.
+    pub fn given_rows(&self) -> Vec<Input> {
+        Chain::default().inputs(self.motion, &self.recording.time)
+    }
+
+    /// Likewise at the nodes for signatures.
+    pub fn given_nodes(&self) -> Vec<Input> {
+        self.inputs(&[], &self.fine)
+    }
+
     /// The truth in the middle of each block, without any effect.
     pub fn plain(&self) -> Vec<Truth> {
         match &self.view {
@@ -282,7 +292,6 @@ impl<'a> ForwardModel<'a> {
         kind: SensorKind,
         input: &[Input],
     ) -> Result<Vec<Vector3<f64>>, DiagnosisError> {
-        let output = chain.output(kind, &self.triads[kind as usize], input);
-        output.ok_or(DiagnosisError::Simulation { sensor: kind })
+        Ok(chain.output(kind, &self.triads[kind as usize], input)?)
     }
 }

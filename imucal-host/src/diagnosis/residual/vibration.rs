@@ -28,14 +28,12 @@ const BOUNDS: (f64, f64) = (0.25, 1e4);
 
 /// Variance of a sample in each block against the usual one, by sensor; `None` where all are alike. The simulator is given
 /// these effects.
-pub fn ratios(
-    scene: &ForwardModel<'_>,
-    doses: &[Dose],
-) -> Result<[Option<Vec<f64>>; 3], DiagnosisError> {
+pub fn ratios(scene: &ForwardModel<'_>, doses: &[Dose]) -> Result<[Option<Vec<f64>>; 3], DiagnosisError> {
     let mut ratios: [Option<Vec<f64>>; 3] = Default::default();
     for (kind, output) in scene.simulated(doses)? {
         let Some(triple) = scene.recording.sensor(kind) else { continue };
-        let left: Vec<Vector3<f64>> = triple.values.iter().zip(&output).map(|(real, ideal)| real - ideal).collect();
+        let left: Vec<Vector3<f64>> =
+            triple.values.iter().zip(&output).map(|(real, ideal)| real - ideal).collect();
         ratios[kind as usize] = of_sensor(scene, kind, &left);
     }
     Ok(ratios)
@@ -63,13 +61,15 @@ fn of_sensor(scene: &ForwardModel<'_>, kind: SensorKind, left: &[Vector3<f64>]) 
     for resting in [false, true] {
         let of_state = |at: &usize| scene.blocks[*at].rest.is_some() == resting;
         let own: Vec<usize> = (0..levels.len()).filter(of_state).collect();
-        let Some(usual) = median(own.iter().filter_map(|at| levels[*at]).collect()).filter(|usual| *usual > 0.0)
+        let Some(usual) =
+            median(own.iter().filter_map(|at| levels[*at]).collect()).filter(|usual| *usual > 0.0)
         else {
             continue;
         };
         own.iter().for_each(|at| levels[*at] = levels[*at].map(|level| level / usual));
     }
-    let ratios: Vec<f64> = levels.into_iter().map(|level| level.unwrap_or(1.0).clamp(BOUNDS.0, BOUNDS.1)).collect();
+    let ratios: Vec<f64> =
+        levels.into_iter().map(|level| level.unwrap_or(1.0).clamp(BOUNDS.0, BOUNDS.1)).collect();
     let mut ranked = ratios.clone();
     ranked.sort_by(f64::total_cmp);
     let at = |share: f64| ranked.get((share * ranked.len() as f64) as usize).copied().unwrap_or(1.0);

@@ -13,7 +13,9 @@ use super::{
 use crate::{
     diagnosis::{
         error::DiagnosisError,
-        reference::{model::Model, movement, movement::Reference, rest_to_rest::RestToRest, revisits, stream},
+        reference::{
+            model::Model, movement, movement::Reference, rest_to_rest::RestToRest, revisits, stream,
+        },
         settings::Settings,
     },
     effect::{Act, DataRun, Effect, Spoils, axis_swap},

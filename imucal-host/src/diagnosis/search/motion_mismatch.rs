@@ -27,9 +27,9 @@ use super::refit::{Fit, refit};
 use crate::{
     diagnosis::{
         error::DiagnosisError,
+        finding::Amount,
         library::candidates::Candidates,
         mixed_model::noise::{Noise, Weighing},
-        finding::Amount,
         residual::{base_run::Reference, forward_model::ForwardModel, vibration},
         screening::conventions::Finding,
     },
@@ -163,7 +163,11 @@ fn briskness(truth: &Truth, gravity: f64) -> Vector3<f64> {
 }
 
 /// What the blocks leave, by sensor, that move most like each.
-fn usual_of(scene: &ForwardModel<'_>, truth: &[Truth], energies: &[Vec<Option<f64>>; 3]) -> Vec<[Option<f64>; 3]> {
+fn usual_of(
+    scene: &ForwardModel<'_>,
+    truth: &[Truth],
+    energies: &[Vec<Option<f64>>; 3],
+) -> Vec<[Option<f64>; 3]> {
     let gravity = truth.iter().map(|row| row.f_t.norm()).sum::<f64>() / truth.len().max(1) as f64;
     let brisk: Vec<Vector3<f64>> = truth.iter().map(|row| briskness(row, gravity)).collect();
     let stride = brisk.len().div_ceil(COMPARED).max(1);
@@ -180,7 +184,8 @@ fn usual_of(scene: &ForwardModel<'_>, truth: &[Truth], energies: &[Vec<Option<f6
         near.select_nth_unstable_by(count - 1, |a, b| a.0.total_cmp(&b.0));
         SensorKind::ALL.map(|kind| {
             let alike = near[..count].iter();
-            let mut known: Vec<f64> = alike.filter_map(|(_, at)| smoothed(&energies[kind as usize], *at)).collect();
+            let mut known: Vec<f64> =
+                alike.filter_map(|(_, at)| smoothed(&energies[kind as usize], *at)).collect();
             known.sort_by(f64::total_cmp);
             known.get(3 * known.len() / 4).copied()
         })
@@ -214,7 +219,8 @@ fn stretch(
         let values = fit.residual[kind as usize].as_ref()?.get(blocks.clone())?;
         Some((values.iter().map(Vector3::norm_squared).sum::<f64>() / values.len() as f64).sqrt())
     };
-    let energy = |kind: SensorKind| energies[kind as usize][blocks.clone()].iter().flatten().sum::<f64>() * 3.0;
+    let energy =
+        |kind: SensorKind| energies[kind as usize][blocks.clone()].iter().flatten().sum::<f64>() * 3.0;
     Stretch {
         time: scene.blocks[blocks.start].time - MARGIN..scene.blocks[blocks.end - 1].time + MARGIN,
         force: rms(SensorKind::Acc),

@@ -41,6 +41,7 @@ pub fn untestable(recording: &Recording, why: String) -> Diagnosis {
         absent: Vec::new(),
         not_testable: Vec::new(),
         next_experiment: Vec::new(),
+        user_effects: Vec::new(),
     }
 }
 
@@ -292,7 +293,9 @@ fn next_experiment(
     let axes = movement::axes(recording).ok()?;
     let mut pairs: Vec<(&'static Effect, &'static Effect)> = Vec::new();
     for (cause, standing) in explained.best.set.iter().zip(&tested.standings) {
-        pairs.extend(standing.equivalents.iter().map(|other| (*cause, *other)));
+        // What is the same here has no columns of its own.
+        let is_fitted = |other: &&&'static Effect| explained.linear.candidates.effects.contains(*other);
+        pairs.extend(standing.equivalents.iter().filter(is_fitted).map(|other| (*cause, *other)));
     }
     experiment::next(explained, axes, &pairs)
 }

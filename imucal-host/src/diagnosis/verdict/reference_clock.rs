@@ -55,7 +55,8 @@ pub fn terms(explained: &Solution<'_>, clock: StreamClock) -> Result<Vec<Term>, 
         };
         let amount = |amount: &Amount| Amount { value: amount.value.map(whole), ..amount.clone() };
         let parameters: Vec<Amount> = amounts.iter().map(amount).collect();
-        let matters = estimates::is_material(term, &parameters) && estimates::is_sized(term, &parameters, errors);
+        let matters =
+            estimates::is_material(term, &parameters) && estimates::is_sized(term, &parameters, errors);
         matters.then_some(Term { effect: term, parameters })
     });
     Ok(named.collect())
@@ -80,7 +81,8 @@ pub fn clock<'s>(
     remainder: f64,
 ) -> Result<Option<Clock<'s>>, DiagnosisError> {
     let Solution { linear, best, fit, .. } = explained;
-    let set: Vec<&'static Effect> = best.set.iter().copied().chain(terms.iter().map(|term| term.effect)).collect();
+    let set: Vec<&'static Effect> =
+        best.set.iter().copied().chain(terms.iter().map(|term| term.effect)).collect();
     let shown = |term: &Term| {
         let value = |amount: &Amount| amount.value.unwrap_or_default().clamp(-LINEAR, LINEAR);
         (term.effect, term.parameters.iter().map(value).collect())
