@@ -14,12 +14,13 @@ use super::{
     reading::Reading,
     refuse,
     simulate::unknown,
+    warn,
 };
 use crate::{
     diagnosis::{Diagnosis, Options, Verdict, diagnose},
     effect::{CATALOGUE, Effect, user},
     file::OutputSet,
-    recording::Stream,
+    recording::{Recording, Stream, Warning},
     report,
 };
 
@@ -81,7 +82,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Some(Err(damaged)) => return Ok(refuse(&damaged)),
         model => model.and_then(Result::ok),
     };
-    let stream = arguments.sim.as_deref().map(|path| stream(path, arguments.reading)).transpose()?;
+    let stream =
+        arguments.sim.as_deref().map(|path| stream(path, &recording, arguments.reading)).transpose()?;
     let options = Options { without, model, stream, effects: own, settings: None };
     let progress = Progress::start();
     let diagnosis = diagnose(&recording, &options, &|stage| progress.stage(stage));
@@ -90,10 +92,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     Ok(if diagnosis.verdict == Verdict::NotTestable { Ending::Refused } else { Ending::Done })
 }
 
-/// A simulator's stream.
-fn stream(path: &Path, reading: Reading) -> anyhow::Result<Stream> {
-    let simulated = read(path, reading)?;
-    Stream::of(&simulated).with_context(|| {
+/// A simulator's stream for a recording.
+fn stream(path: &Path, recording: &Recording, reading: Reading) -> anyhow::Result<Stream> {
+    let simulated = Recording::read_within(path, &reading.limits())?;
+    // That no sensor is there is what is asked for.
+    let odd = simulated.warnings.iter().filter(|warning| !matches!(warning, Warning::SimulatorAlone { .. }));
+    odd.for_each(|warning| warn(warning));
+    Stream::beside(&simulated, recording).with_context(|| {
         format!(
             "{}: found no stream of a simulator, expected columns sim_acc_*, sim_gyr_* or sim_mag_*; export what an ideal \
              sensor would read",

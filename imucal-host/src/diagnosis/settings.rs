@@ -128,6 +128,8 @@ pub struct SearchSettings {
     /// Before another effect is added, those of a class are tried in each other's place: a clock that is fitted with the wrong
     /// one calls for effects that undo it.
     pub settles_classes: bool,
+    /// Details of strong effects are fitted with their amplitudes: where a clock is fitted too, it would take them up.
+    pub fits_details: bool,
 }
 
 /// Score tests against covariates.
@@ -243,6 +245,7 @@ impl Default for SearchSettings {
             paired: 8,
             removes_pairs: false,
             settles_classes: false,
+            fits_details: false,
         }
     }
 }

@@ -247,17 +247,15 @@ impl Effect {
         known.filter(|(_, parameter)| parameter.role == Role::Amplitude).map(|(index, _)| index)
     }
 
-    /// Parameters that a fit which holds the effect is linear in: amplitudes and details.
-    pub fn linear(&self) -> impl Iterator<Item = usize> {
+    /// Details, which a fit that holds the effect is linear in as well.
+    pub fn details(&self) -> impl Iterator<Item = usize> {
         let known = self.parameters.iter().enumerate();
-        let is_linear = |role: &Role| matches!(role, Role::Amplitude | Role::Detail { .. });
-        known.filter(move |(_, parameter)| is_linear(&parameter.role)).map(|(index, _)| index)
+        known.filter(|(_, parameter)| matches!(parameter.role, Role::Detail { .. })).map(|(index, _)| index)
     }
 
     /// Parameters that say how or when, at these values; an instant that never comes is none.
     pub fn shapes_at<'e>(&'e self, values: &'e [f64]) -> impl Iterator<Item = usize> + 'e {
-        let is_shape =
-            |role: &Role| matches!(role, Role::Shape { .. } | Role::Detail { .. } | Role::Instant { .. });
+        let is_shape = |role: &Role| matches!(role, Role::Shape { .. } | Role::Instant { .. });
         let known = self.parameters.iter().zip(values).enumerate();
         known.filter(move |(_, (p, value))| is_shape(&p.role) && value.is_finite()).map(|(index, _)| index)
     }

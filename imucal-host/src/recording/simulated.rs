@@ -95,6 +95,20 @@ impl Stream {
     }
 }
 
+impl Stream {
+    /// The simulator's stream of a file of its own for a recording: as [`Stream::of`]; where both files have absolute times,
+    /// on those of the recording.
+    #[must_use]
+    pub fn beside(simulated: &Recording, recording: &Recording) -> Option<Self> {
+        let mut stream = Self::of(simulated)?;
+        if let (Some(own), Some(others)) = (simulated.epoch, recording.epoch) {
+            let later = own.since(others);
+            stream.time.iter_mut().for_each(|time| *time += later);
+        }
+        Some(stream)
+    }
+}
+
 /// The sensors of a recording for ideal ones; `None` if there is none.
 fn of_sensors(recording: &Recording) -> Option<Simulated> {
     let values = |kind| recording.sensor(kind).map(|triple| triple.values.clone());

@@ -79,7 +79,7 @@ impl<'s> Linearisation<'s> {
     ) -> Result<Self, DiagnosisError> {
         let neutral = |effect: &&'static Effect| GridPosterior::alone(effect.neutral(scene.duration()));
         let shapes = candidates.effects.iter().map(neutral).collect();
-        let columns = columns(&fit.doses.iter().map(|dose| dose.effect).collect::<Vec<_>>());
+        let columns = columns(scene, &fit.doses.iter().map(|dose| dose.effect).collect::<Vec<_>>());
         let signatures = signatures(reference, &columns, &|_| Vec::new())?;
         let design = Design::new(scene, columns, &signatures, &fit.residual);
         let weighing = Weighing::new(scene, SensorKind::ALL.map(|kind| reference.output(kind)));
@@ -118,7 +118,7 @@ impl<'s> Linearisation<'s> {
             .iter()
             .copied()
             .partition(|effect| lasts(effect) && fit.doses.iter().all(|dose| dose.effect != *effect));
-        let fresh = columns(&candidates.baseline.iter().copied().chain(new).collect::<Vec<_>>());
+        let fresh = columns(scene, &candidates.baseline.iter().copied().chain(new).collect::<Vec<_>>());
         let signatures = signatures(&reference, &fresh, &|effect| candidates.shape(&shapes, effect))?;
         let mut design = match before {
             Some(before) => {
@@ -202,7 +202,7 @@ impl<'s> Linearisation<'s> {
             return None;
         }
         let reference = Reference::new(self.scene, doses.clone(), &self.scene.fine).ok()?;
-        let changed = columns(&others);
+        let changed = columns(self.scene, &others);
         let signatures =
             signatures(&reference, &changed, &|effect| self.candidates.shape(&shapes, effect)).ok()?;
         let is_kept = |id: &usize| !others.iter().any(|effect| self.design.columns[*id].is_of(effect));

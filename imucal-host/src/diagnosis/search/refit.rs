@@ -43,18 +43,21 @@ pub struct Fit {
     pub residual: Means,
 }
 
-/// All amplitudes and details of some effects.
-pub fn columns(effects: &[&'static Effect]) -> Vec<Column> {
-    let of = |effect: &'static Effect| effect.linear().map(move |parameter| Column { effect, parameter });
+/// All amplitudes of some effects, and their details where these are fitted.
+pub fn columns(scene: &ForwardModel<'_>, effects: &[&'static Effect]) -> Vec<Column> {
+    let of = |effect: &'static Effect| {
+        let details = effect.details().filter(|_| scene.settings.search.fits_details);
+        effect.amplitudes().chain(details).map(move |parameter| Column { effect, parameter })
+    };
     effects.iter().flat_map(|effect| of(effect)).collect()
 }
 
 /// All amplitudes of some doses, and the shapes of those.
-fn free(doses: &[Dose]) -> Vec<Column> {
+fn free(scene: &ForwardModel<'_>, doses: &[Dose]) -> Vec<Column> {
     let of = |dose: &Dose| -> Vec<Column> {
         let effect = dose.effect;
-        let parameters = effect.amplitudes().chain(effect.shapes_at(&dose.values));
-        parameters.map(|parameter| Column { effect, parameter }).collect()
+        let shapes = effect.shapes_at(&dose.values).map(|parameter| Column { effect, parameter });
+        columns(scene, &[effect]).into_iter().chain(shapes).collect()
     };
     doses.iter().flat_map(of).collect()
 }
@@ -79,7 +82,7 @@ pub fn refit(
     doses: Vec<Dose>,
     noise: Option<&Noise>,
 ) -> Result<Fit, DiagnosisError> {
-    let columns = free(&doses);
+    let columns = free(scene, &doses);
     let residual = scene.residual(&doses)?;
     let mut fit = Fit { doses, residual };
     let mut least: Option<Noise> = None;

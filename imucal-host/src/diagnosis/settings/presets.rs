@@ -105,7 +105,13 @@ impl Settings {
             },
             noise: NoiseSettings { knots: 0.5, scatters: false, whole_blocks: false, ..rig.noise },
             library: rig.library,
-            search: SearchSettings { settling: 1, removes_pairs: true, settles_classes: true, ..rig.search },
+            search: SearchSettings {
+                settling: 1,
+                removes_pairs: true,
+                settles_classes: true,
+                fits_details: true,
+                ..rig.search
+            },
             verdict: VerdictSettings { confirms_held_out: true, ..rig.verdict },
             location: rig.location,
         }

@@ -34,8 +34,7 @@ pub fn amounts_of(
     let dose = |effect: &Effect| explained.fit.doses.iter().find(|dose| dose.effect == effect);
     let shaped = |dose: &Dose| -> Vec<Column> {
         let effect = dose.effect;
-        let others = effect.shapes_at(&dose.values).filter(|at| effect.linear().all(|linear| linear != *at));
-        others.map(|parameter| Column { effect, parameter }).collect()
+        effect.shapes_at(&dose.values).map(|parameter| Column { effect, parameter }).collect()
     };
     let shape_columns: Vec<Column> = set.iter().filter_map(|effect| dose(effect)).flat_map(shaped).collect();
     let signatures: Vec<Signature> = shape_columns
@@ -73,7 +72,11 @@ pub fn amounts_of(
                 std_error: error(effect, at),
                 unit: effect.parameters[at].unit.clone(),
             };
-            values.iter().enumerate().map(amount).collect()
+            // A detail that is not fitted is not estimated; details stand last.
+            let is_known = |at: &usize| {
+                linear.scene.settings.search.fits_details || effect.details().all(|detail| detail != *at)
+            };
+            values.iter().enumerate().filter(|(at, _)| is_known(at)).map(amount).collect()
         })
         .collect())
 }
