@@ -16,6 +16,7 @@ pub mod random;
 pub mod recent;
 pub mod recorder;
 pub mod replay;
+pub mod robot;
 pub mod run;
 pub mod tracked;
 pub mod truth;
