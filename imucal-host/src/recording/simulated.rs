@@ -102,3 +102,44 @@ fn of_sensors(recording: &Recording) -> Option<Simulated> {
     let any = acc.is_some() || gyr.is_some() || mag.is_some();
     any.then(|| Simulated { acc, gyr, mag, temperature: recording.temperature.clone() })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::fixture::Fixture;
+
+    fn read(sections: &str, samples: &str) -> Recording {
+        Fixture::new("run.csv", sections, samples).read()
+    }
+
+    #[test]
+    fn a_stream_is_of_the_simulator_s_columns_without_the_rows_that_know_nothing() {
+        let samples = "t,acc_x,acc_y,acc_z,sim_acc_x,sim_acc_y,sim_acc_z,sim_temp\n\
+            0,0,0,9.8,,,,\n0.01,0,0,9.8,1,,,\n0.02,0,0,9.8,,,,20\n0.03,0,0,9.8,,,,\n";
+        let stream = Stream::of(&read("", samples)).unwrap();
+        assert_eq!((stream.name.as_str(), stream.time), ("run.csv", vec![0.01, 0.02]));
+        let acc = stream.values.sensor(SensorKind::Acc).unwrap();
+        assert!(acc.len() == 2 && acc[0].x == 1.0 && acc[1].x.is_nan());
+        assert_eq!(stream.values.temperature.unwrap()[1], 20.0);
+        assert_eq!(stream.values.gyr, None);
+    }
+
+    #[test]
+    fn a_simulator_s_file_may_call_its_columns_as_a_sensor_s() {
+        let sections = "[units]\nacc = \"g\"\n[reference]\nkind = \"simulator\"\nname = \"gazebo\"\n";
+        let recording = read(sections, "t,acc_x,acc_y,acc_z,temp\n0,0,0,1,20\n0.01,0,0,1,\n");
+        let stream = Stream::of(&recording).unwrap();
+        assert_eq!((stream.name.as_str(), &stream.time), ("gazebo", &recording.time));
+        assert_eq!(stream.values.acc.unwrap()[0].z, 9.80665);
+        assert_eq!(stream.values.temperature.unwrap()[0], 20.0);
+    }
+
+    #[test]
+    fn there_is_no_stream_where_nothing_is_known() {
+        // Real samples are no stand-in for a simulator that says nothing.
+        let silent = "t,acc_x,acc_y,acc_z,sim_acc_x,sim_acc_y,sim_acc_z\n0,0,0,9.8,,,\n";
+        assert_eq!(Stream::of(&read("", silent)), None);
+        assert_eq!(Stream::of(&read("", "t,temp\n0,20\n")), None);
+        assert!(Simulated::default().is_empty());
+    }
+}

@@ -37,6 +37,11 @@ pub enum WriteError {
         "{path}, row {row}, column `t`: found {found} s after {before} s, expected strictly increasing finite times; sort the rows or remove duplicates before writing"
     )]
     TimeOrder { path: PathBuf, row: usize, found: f64, before: f64 },
+    /// Times of an absolute clock that a Parquet file's doubles cannot tell apart.
+    #[error(
+        "{path}, row {row}, column `t`: found a time that is one with that of the row before as a double, expected times whole in their unit; write t = \"ns\" below [units] and whole nanoseconds, or write CSV"
+    )]
+    TimeTooFine { path: PathBuf, row: usize },
     /// An infinite value, which no reader takes.
     #[error(
         "{path}, row {row}, column `{column}`: found an infinite value, expected a finite one or NaN for not measured; correct the recording before writing it"

@@ -174,6 +174,8 @@ mod tests {
         assert_says(&wrong_type, &["a.toml, line 3", "integer", "string"]);
         let kind = parse("format = \"imucal-recording/1\"\n[rig]\nkind = \"table\"\n");
         assert_says(&kind, &["line 3", "table", "rate-table"]);
+        let kind = parse("format = \"imucal-recording/1\"\n[reference]\nkind = \"optical\"\n");
+        assert_says(&kind, &["line 3", "optical", "attitude", "pose", "simulator"]);
     }
 
     #[test]
@@ -190,6 +192,14 @@ mod tests {
                 "[units]",
             ],
         );
+    }
+
+    #[test]
+    fn a_misspelt_key_of_the_reference_is_told_with_the_one_meant() {
+        let sections = "[reference]\nkind = \"pose\"\nnoize = 1\n[refrence]\n";
+        let warnings = Fixture::new("run.csv", sections, SAMPLES).warnings();
+        assert_says(&warnings[0], &["line 4: unknown key `reference.noize`", "write `noise`"]);
+        assert_says(&warnings[1], &["line 5: unknown key `refrence`", "write `reference`"]);
     }
 
     #[test]

@@ -256,6 +256,36 @@ mod tests {
     }
 
     #[test]
+    fn a_simulator_s_file_is_read_without_a_sensor_and_a_position_alone_is_warned_about() {
+        let samples = "t,sim_gyr_x,sim_gyr_y,sim_gyr_z,sim_temp\n0,0,0,90,20\n0.01,,,,\n";
+        let fixture = Fixture::new("run.csv", "[units]\ngyr = \"deg/s\"\n", samples);
+        let simulated = fixture.read().simulated.unwrap();
+        assert_eq!((simulated.gyr.unwrap()[0].z, simulated.temperature.unwrap()[0]), (90.0, 20.0));
+        assert!(simulated.acc.is_none() && fixture.warnings().is_empty());
+
+        let with = |columns: &str, row: &str| {
+            csv(format!("t,sim_temp,ref_px,ref_py,ref_pz{columns}\n0,20,1,,inf{row}\n"))
+        };
+        let alone = with("", "");
+        assert_says(
+            &alone.warnings()[0],
+            &["run.csv, column `ref_px`", "without an attitude", "not used", "ref_qw"],
+        );
+        let position = alone.read().position.unwrap()[0];
+        assert!(position[0] == 1.0 && position[1].is_nan() && position[2].is_nan());
+        assert!(with(",ref_qw,ref_qx,ref_qy,ref_qz", ",1,0,0,0").warnings().is_empty());
+    }
+
+    #[test]
+    fn absolute_times_that_run_back_are_told_as_the_file_has_them() {
+        let message = with_times(&["1700000000.000001", "1700000000.01", "1700000000.000002"]).error();
+        assert_says(&message, &["line 4", "found 1700000000.000002 after 1700000000.01", "sort"]);
+        let recording = with_times(&["1700000000.000001", "1700000000.010002"]).read();
+        assert_eq!(recording.time, [0.0, 0.010_001]);
+        assert_eq!(recording.epoch.unwrap().picoseconds(), 1_700_000_000_000_001_000_000);
+    }
+
+    #[test]
     fn units_that_are_left_out_are_said_to_be_assumed_where_they_matter() {
         let samples = "t,acc_x,acc_y,acc_z,mag_x,mag_y,mag_z\n0,0,0,9.8,40,0,0\n0.01,0,0,9.8,40,0,0\n";
         let assumed = |sections: &str| -> Vec<String> {

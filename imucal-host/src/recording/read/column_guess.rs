@@ -6,7 +6,7 @@ use crate::recording::manifest::spelling;
 const LONGEST: usize = 60;
 
 /// Other words for the first part of a name.
-const PARTS: [(&str, &str); 13] = [
+const PARTS: [(&str, &str); 15] = [
     ("linearacceleration", "acc"),
     ("accelerometer", "acc"),
     ("acceleration", "acc"),
@@ -20,6 +20,8 @@ const PARTS: [(&str, &str); 13] = [
     ("magn", "mag"),
     ("temperature", "temp"),
     ("quat", "refq"),
+    ("refposition", "refp"),
+    ("refpos", "refp"),
 ];
 
 /// Whole names.
@@ -56,13 +58,11 @@ const UNITS: [(&str, &[&str]); 6] = [
 
 /// The absent column that an unknown name probably means, and whether a unit stands behind the name.
 pub(crate) fn meant(name: &str, absent: &[&'static str]) -> Option<(&'static str, bool)> {
-    // Columns of a reference of another kind, which have nothing to do with those of one letter more or less.
-    let other = name.starts_with("sim_") || ["ref_px", "ref_py", "ref_pz"].contains(&name);
-    if other || name.len() > LONGEST {
+    if name.len() > LONGEST {
         return None;
     }
     let bare = bare(name);
-    let same = |known: &&&'static str| plain(&super::column_guess::bare(known)) == plain(&bare);
+    let same = |known: &&&'static str| of_simulator(&super::column_guess::bare(known)) == of_simulator(&bare);
     if let Some(known) = absent.iter().find(same) {
         return Some((known, false));
     }
@@ -72,9 +72,25 @@ pub(crate) fn meant(name: &str, absent: &[&'static str]) -> Option<(&'static str
     // In a short name two edits make anything of anything.
     let near = |shortest: usize, edits| {
         let long = absent.iter().copied().filter(move |known| known.len() >= shortest);
-        spelling::nearest(name, long, edits)
+        spelling::nearest(name, long.filter(|known| may_be_near(&bare, known, edits)), edits)
     };
     near(4, 1).or_else(|| near(5, 2)).map(|known| (known, false))
+}
+
+/// Whether so many edits may make a known column of a bare name. A simulator and a reference have other quantities too,
+/// of names as like (`sim_time`, `ref_vx`).
+fn may_be_near(bare: &str, known: &str, edits: usize) -> bool {
+    match known {
+        "ref_px" | "ref_py" | "ref_pz" => edits < 2 && bare.contains('p'),
+        "ref_qw" | "ref_qx" | "ref_qy" | "ref_qz" => !bare.starts_with("refp"),
+        known => edits < 2 || !known.starts_with("sim_"),
+    }
+}
+
+/// Whether a bare name is one of a simulator's columns, and the rest of it in this program's words.
+fn of_simulator(bare: &str) -> (bool, String) {
+    let rest = bare.strip_prefix("simulated").or_else(|| bare.strip_prefix("sim"));
+    (rest.is_some(), plain(rest.unwrap_or(bare)))
 }
 
 /// Letters and digits in lower case.
@@ -131,6 +147,14 @@ mod tests {
             ("temperature", "temp"),
             ("time", "t"),
             ("qw", "ref_qw"),
+            ("ref_p_x", "ref_px"),
+            ("RefPosition.y", "ref_py"),
+            ("reff_pz", "ref_pz"),
+            ("sim_accx", "sim_acc_x"),
+            ("simAccelY", "sim_acc_y"),
+            ("simulated_gyro_z", "sim_gyr_z"),
+            ("smi_mag_x", "sim_mag_x"),
+            ("sim_temperature", "sim_temp"),
             ("gimbal_outter", "gimbal_outer"),
             ("Segment", "segment"),
         ] {
@@ -157,11 +181,18 @@ mod tests {
 
     #[test]
     fn other_quantities_are_left_alone() {
-        for name in
-            ["volts", "note", "tc", "pressure", "ref_px", "sim_acc_x", "sim_temp", "x", "", "row", "gps_lat"]
-        {
+        for name in ["volts", "note", "tc", "pressure", "x", "", "row", "gps_lat"] {
             assert_eq!(meant(name, &NAMES), None, "{name}");
         }
+        for name in ["ref_vx", "sim_time", "sim_t", "sim_pos_x", "sim_qw", "similar", "px"] {
+            let others: Vec<&'static str> =
+                NAMES.into_iter().filter(|name| !name.starts_with("ref_q")).collect();
+            assert_eq!(meant(name, &others), None, "{name}");
+        }
+        // A position whose attitude is not there.
+        let attitude = ["ref_qw", "ref_qx", "ref_qy", "ref_qz"];
+        assert_eq!(meant("ref_px", &attitude), None);
+        assert_eq!(meant("sim_acc_x", &["acc_x", "acc_y"]), None);
         let others: Vec<&'static str> = NAMES.into_iter().filter(|name| !name.starts_with("acc")).collect();
         assert_eq!(meant("acc2_x", &others), None);
     }

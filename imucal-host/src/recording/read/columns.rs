@@ -332,6 +332,8 @@ mod tests {
         assert!(text.contains("found `acc_x`, `acc_z`, expected all of `acc_x`, `acc_y`, `acc_z`"), "{text}");
         assert!(text.contains("add the column"), "{text}");
         assert!(message("t,ref_qw,ref_qx,ref_qy").contains("`ref_qz` is missing"));
+        assert!(message("t,ref_px,ref_pz").contains("`ref_py` is missing"));
+        assert!(message("t,sim_mag_x,sim_mag_y").contains("`sim_mag_z` is missing"));
     }
 
     #[test]

@@ -1,19 +1,17 @@
 //! Samples as Parquet: the columns of the CSV, numbers as doubles, unknown columns as text.
 
-use std::{cell::Cell, fs::File, io, path::Path, sync::Arc};
+use std::{cell::Cell, fs::File, path::Path};
 
 use ::parquet::{
-    basic::{Compression, ConvertedType, Repetition, Type as Physical},
+    basic::ConvertedType,
     column::reader::{ColumnReader, ColumnReaderImpl},
-    data_type::{ByteArray, ByteArrayType, DataType, DoubleType},
+    data_type::{ByteArray, DataType},
     errors::ParquetError,
     file::{
         metadata::ParquetMetaData,
-        properties::WriterProperties,
         reader::{FileReader, RowGroupReader, SerializedFileReader},
-        writer::SerializedFileWriter,
     },
-    schema::types::{ColumnDescriptor, Type},
+    schema::types::ColumnDescriptor,
 };
 
 use super::{
@@ -242,59 +240,22 @@ impl ColumnOfGroup<'_> {
     }
 }
 
-/// The columns of a table as Parquet; what was not measured is NaN.
-pub(crate) fn write(table: &Table, rows: usize, out: &mut (impl io::Write + Send)) -> io::Result<()> {
-    write_group(table, rows, out).map_err(io::Error::other)
-}
-
-fn write_group(table: &Table, rows: usize, out: &mut (impl io::Write + Send)) -> Result<(), ParquetError> {
-    let present: Vec<usize> = (0..KNOWN).filter(|slot| !table.columns[*slot].is_empty()).collect();
-    let mut fields = Vec::new();
-    for slot in &present {
-        fields.push(field(NAMES[*slot], Physical::DOUBLE, ConvertedType::NONE)?);
-    }
-    for column in &table.extra {
-        fields.push(field(&column.name, Physical::BYTE_ARRAY, ConvertedType::UTF8)?);
-    }
-    let schema = Arc::new(Type::group_type_builder("recording").with_fields(fields).build()?);
-    let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
-    let mut writer = SerializedFileWriter::new(out, schema, Arc::new(properties))?;
-    let mut group = writer.next_row_group()?;
-    for slot in &present {
-        let Some(mut column) = group.next_column()? else {
-            break;
-        };
-        column.typed::<DoubleType>().write_batch(&table.columns[*slot][..rows], None, None)?;
-        column.close()?;
-    }
-    for extra in &table.extra {
-        let Some(mut column) = group.next_column()? else {
-            break;
-        };
-        let texts: Vec<ByteArray> = extra.values.iter().map(|text| text.as_str().into()).collect();
-        column.typed::<ByteArrayType>().write_batch(&texts, None, None)?;
-        column.close()?;
-    }
-    group.close()?;
-    writer.close().map(|_| ())
-}
-
-fn field(name: &str, physical: Physical, converted: ConvertedType) -> Result<Arc<Type>, ParquetError> {
-    Type::primitive_type_builder(name, physical)
-        .with_repetition(Repetition::REQUIRED)
-        .with_converted_type(converted)
-        .build()
-        .map(Arc::new)
-}
-
 #[cfg(test)]
 mod tests {
-    use ::parquet::data_type::{FloatType, Int64Type};
+    use std::sync::Arc;
+
+    use ::parquet::{
+        basic::{Repetition, Type as Physical},
+        data_type::{DoubleType, FloatType, Int64Type},
+        file::writer::SerializedFileWriter,
+        schema::types::Type,
+    };
 
     use super::*;
     use crate::recording::{
         Recording,
         fixture::{Fixture, assert_says},
+        write::parquet_writer::{Times, write},
     };
 
     /// Nullable floats, integers and a text, as other programs write them.
@@ -343,6 +304,53 @@ mod tests {
         assert_eq!((acc[1].x, acc[3].y, acc[2].z), (0.5, 0.5, 10.0));
     }
 
+    /// Required columns of doubles, but for `t` if it is to be of integers.
+    fn of_numbers(columns: &[(&str, &[f64])], whole: &[i64]) -> Vec<u8> {
+        let physical = |name: &str| match name {
+            "t" if !whole.is_empty() => Physical::INT64,
+            _ => Physical::DOUBLE,
+        };
+        let field =
+            |name: &str| Arc::new(Type::primitive_type_builder(name, physical(name)).build().unwrap());
+        let fields = columns.iter().map(|(name, _)| field(name)).collect();
+        let schema = Arc::new(Type::group_type_builder("schema").with_fields(fields).build().unwrap());
+        let mut bytes = Vec::new();
+        let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::default()).unwrap();
+        let mut group = writer.next_row_group().unwrap();
+        for (name, values) in columns {
+            let levels = vec![1; values.len()];
+            let mut column = group.next_column().unwrap().unwrap();
+            match physical(name) {
+                Physical::INT64 => column.typed::<Int64Type>().write_batch(whole, Some(&levels), None),
+                _ => column.typed::<DoubleType>().write_batch(values, Some(&levels), None),
+            }
+            .unwrap();
+            column.close().unwrap();
+        }
+        group.close().unwrap();
+        writer.close().unwrap();
+        bytes
+    }
+
+    #[test]
+    fn integers_since_1970_are_exact_and_a_lost_position_is_not_measured() {
+        let columns: [(&str, &[f64]); 4] = [
+            ("t", &[0.0; 2]),
+            ("ref_px", &[1.0, f64::INFINITY]),
+            ("ref_py", &[0.0; 2]),
+            ("ref_pz", &[0.0; 2]),
+        ];
+        let whole = [1_700_000_000_123_456_789, 1_700_000_000_133_456_790];
+        let recording =
+            Fixture::new("run.parquet", "[units]\nt = \"ns\"\n", of_numbers(&columns, &whole)).read();
+        assert_eq!(recording.time, [0.0, 0.010_000_001]);
+        assert_eq!(recording.epoch.unwrap().picoseconds(), 1_700_000_000_123_456_789_000);
+        assert!(recording.position.unwrap()[1][0].is_nan());
+        let message =
+            Fixture::new("run.parquet", "", of_numbers(&[("t", &[0.0]), ("temp", &[f64::INFINITY])], &[]));
+        assert_says(&message.error(), &["column `temp`", "infinite"]);
+    }
+
     #[test]
     fn a_damaged_file_and_text_for_numbers_are_refused() {
         let mut bytes = foreign();
@@ -356,7 +364,7 @@ mod tests {
         table.extra[0].name = "temp".to_owned();
         table.extra[0].values.push("warm".to_owned());
         let mut bytes = Vec::new();
-        write(&table, 1, &mut bytes).unwrap();
+        write(&table, &Times::of(&table), 1, &mut bytes).unwrap();
         let message = Fixture::new("run.parquet", "", bytes).error();
         assert_says(
             &message,
@@ -377,7 +385,7 @@ mod tests {
         table.columns[0] = (0..300).map(f64::from).collect();
         table.extra[0].values = vec!["long ".repeat(300); 300];
         let mut bytes = Vec::new();
-        write(&table, 300, &mut bytes).unwrap();
+        write(&table, &Times::of(&table), 300, &mut bytes).unwrap();
         assert!(bytes.len() < 1 << 16, "the dictionary keeps one text: {}", bytes.len());
         let fixture = Fixture::new("run.parquet", "", bytes);
         let limits = Limits { size: 1 << 16, ..Limits::default() };

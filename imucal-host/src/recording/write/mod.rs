@@ -2,4 +2,6 @@
 
 mod csv_writer;
 mod file_units;
+#[cfg(feature = "parquet")]
+pub(crate) mod parquet_writer;
 pub(crate) mod writer;

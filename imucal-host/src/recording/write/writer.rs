@@ -54,7 +54,13 @@ fn write_samples(
             encoder.finish().map(|_| ()).map_err(unwritable)
         }
         #[cfg(feature = "parquet")]
-        Format::Parquet => crate::recording::read::parquet::write(table, rows, file).map_err(unwritable),
+        Format::Parquet => {
+            let times = super::parquet_writer::Times::of(table);
+            if let Some(row) = times.repeated() {
+                return Err(WriteError::TimeTooFine { path: path.to_path_buf(), row: row + 1 });
+            }
+            super::parquet_writer::write(table, &times, rows, file).map_err(unwritable)
+        }
         #[cfg(not(feature = "parquet"))]
         Format::Parquet => Err(WriteError::ParquetNotBuilt { path: path.to_path_buf() }),
     }
@@ -120,7 +126,7 @@ mod tests {
 
     use super::*;
     use crate::recording::{
-        ExtraColumn,
+        Epoch, ExtraColumn, Simulated,
         fixture::{Fixture, assert_says},
         unit::{AngleUnit, TimeUnit, Unit},
     };
@@ -136,6 +142,15 @@ mod tests {
         recording.temperature = Some(vec![20.0, f64::NAN, 21.5]);
         recording.gimbal = Some(vec![[0.1, -0.2, 3.0]; 3]);
         recording.reference = Some(vec![[1.0, 0.0, 0.0, 0.0]; 3]);
+        recording.position = Some(vec![[1.0, -2.5, 0.1], [f64::NAN; 3], [1.1, -2.5, 0.125]]);
+        let values =
+            |value| Some(vec![Vector3::new(value, 0.0, -9.81), Vector3::repeat(f64::NAN), Vector3::x()]);
+        recording.simulated = Some(Simulated {
+            acc: values(0.1),
+            gyr: values(1.0 / 3.0),
+            mag: values(40.0),
+            temperature: Some(vec![25.0, f64::NAN, 25.5]),
+        });
         recording.segment = Some(vec![Some(1), None, Some(-2)]);
         let values = ["a", "b, \"c\"", ""].map(str::to_owned).to_vec();
         recording.extra = vec![ExtraColumn { name: "note".to_owned(), values }];
@@ -146,9 +161,14 @@ mod tests {
         (a.is_nan() && b.is_nan()) || (a - b).abs() <= 1e-12 * b.abs()
     }
 
+    fn absolute(recording: &Recording) -> Vec<f64> {
+        let start = recording.epoch.map_or(0.0, |epoch| epoch.since(Epoch::of_picoseconds(0)));
+        recording.time.iter().map(|time| start + time).collect()
+    }
+
     fn assert_same(back: &Recording, recording: &Recording) {
         assert_eq!(back.manifest, recording.manifest);
-        assert!(back.time.iter().zip(&recording.time).all(|(a, b)| near(*a, *b)));
+        assert!(absolute(back).iter().zip(absolute(recording)).all(|(a, b)| near(*a, b)));
         for kind in SensorKind::ALL {
             let components = |recording: &Recording| -> Option<Vec<f64>> {
                 Some(
@@ -168,6 +188,9 @@ mod tests {
         assert!(angles(back).iter().zip(angles(recording)).all(|(a, b)| near(*a, b)));
         assert_eq!((&back.segment, &back.extra), (&recording.segment, &recording.extra));
         assert_eq!(back.reference, recording.reference);
+        // NaN is not itself, but its text is.
+        let text = |recording: &Recording| format!("{:?} {:?}", recording.position, recording.simulated);
+        assert_eq!(text(back), text(recording));
     }
 
     fn round_trip(name: &str) {
@@ -209,6 +232,46 @@ mod tests {
         assert_eq!(fs::read_to_string(copy).unwrap(), samples);
     }
 
+    /// What is written, read, written and read again.
+    fn twice(recording: &Recording, name: &str) -> [Recording; 2] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        recording.write(&path).unwrap();
+        let once = Recording::read(&path).unwrap();
+        once.write(&path).unwrap();
+        [once, Recording::read(&path).unwrap()]
+    }
+
+    #[test]
+    fn absolute_times_are_written_as_they_were() {
+        for (unit, samples) in [
+            ("s", "t,temp\n1700000000.123456,20\n1700000000.133457,20\n"),
+            ("ms", "t,temp\n1700000000123.456,20\n1700000000133.457,20\n"),
+            ("us", "t,temp\n1700000000123456,20\n1700000000133457,20\n"),
+            ("ns", "t,temp\n1700000000123456789,20\n1700000000123556790,20\n"),
+        ] {
+            let fixture = Fixture::new("run.csv", &format!("[units]\nt = \"{unit}\"\n"), samples);
+            let copy = fixture.folder.path().join("copy.csv");
+            fixture.read().write(&copy).unwrap();
+            assert_eq!(fs::read_to_string(copy).unwrap(), samples);
+        }
+    }
+
+    #[cfg(feature = "parquet")]
+    #[test]
+    fn absolute_times_too_fine_for_a_double_are_not_written_as_one() {
+        let mut recording = Recording::new("run.parquet", Manifest::default(), vec![0.0, 1e-7]);
+        recording.epoch = Some(Epoch::of_picoseconds(1_700_000_000 * 10i128.pow(12)));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.parquet");
+        let message = recording.write(&path).unwrap_err().to_string();
+        assert_says(&message, &["run.parquet, row 2, column `t`", "t = \"ns\"", "write CSV"]);
+        recording.manifest.units.t = TimeUnit::Nanosecond;
+        recording.write(&path).unwrap();
+        let back = Recording::read(&path).unwrap();
+        assert_eq!((back.time, back.epoch), (recording.time, recording.epoch));
+    }
+
     #[test]
     fn a_place_that_cannot_be_written_is_named_and_nothing_is_left() {
         let folder = tempfile::tempdir().unwrap();
@@ -235,6 +298,12 @@ mod tests {
         assert_says(&short, &["run.csv, column `segment`", "found 1 rows, expected 3", "correct"]);
         let order = refused(|recording| recording.time[2] = 0.01);
         assert_says(&order, &["run.csv, row 3, column `t`", "strictly increasing", "sort"]);
+        let position = refused(|recording| recording.position = Some(vec![[0.0; 3]]));
+        assert_says(&position, &["column `ref_px`", "found 1 rows, expected 3"]);
+        let simulated = refused(|recording| {
+            recording.simulated = Some(Simulated { mag: Some(Vec::new()), ..Simulated::default() });
+        });
+        assert_says(&simulated, &["column `sim_mag_x`", "found 0 rows, expected 3"]);
         let infinite = refused(|recording| recording.temperature = Some(vec![0.0, f64::INFINITY, 0.0]));
         assert_says(&infinite, &["row 2, column `temp`", "infinite", "NaN for not measured"]);
         let unit = refused(|recording| recording.manifest.units.gyr = Unit::Gauss);
@@ -260,6 +329,28 @@ mod tests {
             let path = folder.path().join("run.csv");
             recording.write(&path).unwrap();
             assert_same(&Recording::read(&path).unwrap(), &recording);
+        }
+
+        #[test]
+        fn exact_times_survive_every_round_trip(
+            start in 1_000_000_000_000_001i64..1_900_000_000_000_000_000,
+            steps in proptest::collection::vec(50_000i64..20_000_000, 1..30),
+            unit in prop::sample::select(TimeUnit::ALL.to_vec()),
+        ) {
+            let elapsed = steps.iter().scan(0, |sum, step| { *sum += step; Some(*sum) });
+            let time: Vec<f64> = std::iter::once(0).chain(elapsed).map(|ns| ns as f64 / 1e9).collect();
+            let mut recording = Recording::new("run.csv", Manifest::default(), time);
+            recording.manifest.units.t = unit;
+            recording.epoch = Some(Epoch::of_picoseconds(i128::from(start) * 1000));
+            for back in twice(&recording, "run.csv") {
+                prop_assert_eq!((&back.time, back.epoch), (&recording.time, recording.epoch));
+            }
+            #[cfg(feature = "parquet")]
+            if unit == TimeUnit::Nanosecond {
+                for back in twice(&recording, "run.parquet") {
+                    prop_assert_eq!((&back.time, back.epoch), (&recording.time, recording.epoch));
+                }
+            }
         }
     }
 }
