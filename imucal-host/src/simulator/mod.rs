@@ -6,6 +6,7 @@
 pub mod chain;
 pub mod climate;
 pub mod conditions;
+mod converter;
 pub mod course;
 pub mod dose;
 mod error;

@@ -1,6 +1,6 @@
 //! A robot's trajectory as a source of truth.
 
-use super::{deviation::Deviation, trajectory::Trajectory};
+use super::{mismatch::Mismatch, trajectory::Trajectory};
 use crate::{
     effect::{Machine, Swing, Truth},
     recording::manifest::{Axis, Rig, RigKind},
@@ -22,12 +22,8 @@ pub struct RobotMotion {
     pub climate: Climate,
     /// Where.
     pub place: Place,
-}
-
-impl RobotMotion {
-    fn deviation(&self, _time: f64) -> Deviation {
-        Deviation::NONE
-    }
+    /// Where it departs from the plan.
+    pub mismatch: Mismatch,
 }
 
 impl Motion for RobotMotion {
@@ -39,7 +35,7 @@ impl Motion for RobotMotion {
     fn truth_among(&self, time: f64, rig: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
         let mut ground = Machine::exact([Axis::Z, Axis::Y, Axis::X].map(direction));
         rig(&mut ground);
-        let body = self.trajectory.body(time, &self.deviation(time));
+        let body = self.trajectory.body(time, &self.mismatch.at(time));
         let pose = body.pose(recent.base(&ground));
         let temperature = self.climate.temperature(time);
         let truth = at_pose(time, &pose, [Swing::default(); 3], &self.place, temperature, recent);

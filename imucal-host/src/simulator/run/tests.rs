@@ -2,6 +2,8 @@ use std::sync::LazyLock;
 
 use sha2::{Digest, Sha256};
 
+use nalgebra::Vector3;
+
 use super::*;
 use crate::{
     effect::{Act, CATALOGUE, Role, Stage, find},
