@@ -63,12 +63,16 @@ fn fitting(simulation: Simulation) -> Simulation {
     }
 }
 
-fn conditions(random: &mut Random) -> Conditions {
-    let level = |random: &mut Random| NoiseLevel {
+/// Noise of a sensor.
+pub(super) fn level(random: &mut Random) -> NoiseLevel {
+    NoiseLevel {
         white: logarithmic(WHITE, random),
         drift: logarithmic(DRIFT, random),
         kind: DriftKind::ALL[random.below(DriftKind::ALL.len())],
-    };
+    }
+}
+
+fn conditions(random: &mut Random) -> Conditions {
     let noise = [level(random), level(random), level(random)];
     Conditions { place: Place::draw(random), noise, scatter: logarithmic(SCATTER, random).to_radians() }
 }

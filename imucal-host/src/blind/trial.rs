@@ -6,21 +6,20 @@
 use std::{
     fs::{self, File, OpenOptions},
     io::{self, Write},
-    panic::{AssertUnwindSafe, catch_unwind},
     path::{Path, PathBuf},
     sync::{
         Mutex,
         atomic::{AtomicUsize, Ordering},
     },
-    time::Instant,
 };
 
 use serde::{Deserialize, Serialize};
 
 use super::{
-    answer::{Answer, Finished, truly_closed},
-    case::{Case, draw},
+    answer::Finished,
+    case::Case,
     seal::{Nonce, digest},
+    world::{Outcome, RigWorld, World, WorldKind},
 };
 use crate::{
     diagnosis::Diagnosis,
@@ -51,6 +50,12 @@ pub enum TrialError {
         path.display()
     )]
     OtherSet { path: PathBuf, found: String, expected: String },
+    /// The folder holds trials of another world.
+    #[error(
+        "{}: found trials of the world `{found}`, expected `{expected}`; choose another folder, or --world {found} to go on with it",
+        path.display()
+    )]
+    OtherWorld { path: PathBuf, found: &'static str, expected: &'static str },
     /// A line that cannot be read, and is not the last.
     #[error("{}, line {line}: found {found}, expected a finished trial; remove the line and run again", path.display())]
     Damaged { path: PathBuf, line: usize, found: String },
@@ -75,6 +80,8 @@ const ANSWERS: &str = "answers.jsonl";
 struct Set {
     format: String,
     nonce: String,
+    #[serde(default, skip_serializing_if = "WorldKind::is_rig")]
+    world: WorldKind,
 }
 
 /// The seal of one case.
@@ -89,20 +96,44 @@ struct Seal {
 pub struct Folder {
     path: PathBuf,
     nonce: Nonce,
+    world: WorldKind,
 }
 
 impl Folder {
-    /// Opens a folder or makes it, with this nonce, or its own, or a fresh one.
+    /// Opens a folder of trials with the rig or makes it, with this nonce, or its own, or a fresh one.
     ///
     /// # Errors
     ///
-    /// [`TrialError::OtherSet`], [`TrialError::File`].
+    /// As [`Self::open_of`].
     pub fn open(path: &Path, nonce: Option<Nonce>) -> Result<Self, TrialError> {
+        Self::open_of(WorldKind::Rig, path, nonce)
+    }
+
+    /// The folder of a set that is there, of whichever world.
+    ///
+    /// # Errors
+    ///
+    /// [`TrialError::Damaged`], [`TrialError::File`].
+    pub fn existing(path: &Path) -> Result<Option<Self>, TrialError> {
+        Ok(Self::set_of(path)?.map(|(nonce, world)| Self { path: path.to_owned(), nonce, world }))
+    }
+
+    /// Opens a folder of trials of a world or makes it, with this nonce, or its own, or a fresh one.
+    ///
+    /// # Errors
+    ///
+    /// [`TrialError::OtherSet`], [`TrialError::OtherWorld`], [`TrialError::File`].
+    pub fn open_of(world: WorldKind, path: &Path, nonce: Option<Nonce>) -> Result<Self, TrialError> {
         let set_path = path.join("set.json");
         let failed = |cause| TrialError::File { path: set_path.clone(), cause };
-        if let Some(found) = Self::nonce_of(path)? {
+        if let Some(folder) = Self::existing(path)? {
+            if folder.world != world {
+                let (found, expected) = (folder.world.name(), world.name());
+                return Err(TrialError::OtherWorld { path: set_path, found, expected });
+            }
+            let found = folder.nonce;
             return match nonce.filter(|wanted| *wanted != found) {
-                None => Ok(Self { path: path.to_owned(), nonce: found }),
+                None => Ok(folder),
                 Some(wanted) => {
                     Err(TrialError::OtherSet { path: set_path, found: found.hex(), expected: wanted.hex() })
                 }
@@ -118,20 +149,20 @@ impl Folder {
             Some(nonce) => nonce,
             None => Nonce::fresh().map_err(|cause| failed(io::Error::other(cause.to_string())))?,
         };
-        let set = Set { format: "imucal-blind/1".to_owned(), nonce: nonce.hex() };
+        let set = Set { format: "imucal-blind/1".to_owned(), nonce: nonce.hex(), world };
         let text = serde_json::to_string_pretty(&set).unwrap_or_default() + "\n";
         let mut files = OutputSet::sparing_all_but(Vec::new());
         files.add(&set_path, text.as_bytes())?;
         files.commit()?;
-        Ok(Self { path: path.to_owned(), nonce })
+        Ok(Self { path: path.to_owned(), nonce, world })
     }
 
-    fn nonce_of(path: &Path) -> Result<Option<Nonce>, TrialError> {
+    fn set_of(path: &Path) -> Result<Option<(Nonce, WorldKind)>, TrialError> {
         let path = path.join("set.json");
         let Some(text) = text_of(&path, Limits::read_small)? else { return Ok(None) };
-        let nonce = serde_json::from_str::<Set>(&text).ok().and_then(|set| Nonce::parse(&set.nonce));
-        match nonce {
-            Some(nonce) => Ok(Some(nonce)),
+        let set = serde_json::from_str::<Set>(&text).ok();
+        match set.and_then(|set| Some((Nonce::parse(&set.nonce)?, set.world))) {
+            Some(set) => Ok(Some(set)),
             None => Err(TrialError::Damaged { path, line: 1, found: text.chars().take(80).collect() }),
         }
     }
@@ -139,6 +170,11 @@ impl Folder {
     /// Its nonce.
     pub fn nonce(&self) -> Nonce {
         self.nonce
+    }
+
+    /// Its world.
+    pub fn world(&self) -> WorldKind {
+        self.world
     }
 
     /// Trials that are over, in the order of their names, each against its seal.
@@ -163,7 +199,7 @@ impl Folder {
         Ok(finished)
     }
 
-    /// Runs those of the cases that are not over yet, so many at a time; `heard` is given how many of all are over.
+    /// Runs trials with the rig, see [`Self::run_in`].
     ///
     /// # Errors
     ///
@@ -175,6 +211,21 @@ impl Folder {
         diagnose: &(dyn Fn(&Recording) -> Diagnosis + Sync),
         heard: &(dyn Fn(usize) + Sync),
     ) -> Result<(), TrialError> {
+        self.run_in(&RigWorld(diagnose), cases, jobs, heard)
+    }
+
+    /// Runs those of the cases that are not over yet, so many at a time; `heard` is given how many of all are over.
+    ///
+    /// # Errors
+    ///
+    /// [`TrialError`].
+    pub fn run_in(
+        &self,
+        world: &dyn World,
+        cases: &[Case],
+        jobs: usize,
+        heard: &(dyn Fn(usize) + Sync),
+    ) -> Result<(), TrialError> {
         let over: Vec<String> = self.finished()?.into_iter().map(|trial| trial.case).collect();
         let left: Vec<Case> = cases.iter().copied().filter(|case| !over.contains(&case.name())).collect();
         let writer = Writer::open(&self.path)?;
@@ -182,7 +233,7 @@ impl Folder {
         let failure: Mutex<Option<TrialError>> = Mutex::new(None);
         let work = || {
             while let Some(case) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
-                if let Err(error) = trial(&self.nonce, *case, diagnose, &writer) {
+                if let Err(error) = trial(&self.nonce, *case, world, &writer) {
                     next.store(left.len(), Ordering::Relaxed);
                     failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_or_insert(error);
                 }
@@ -215,24 +266,14 @@ pub fn mingled(healthy: usize, afflicted: usize) -> Vec<Case> {
 }
 
 /// One trial: drawn, sealed, recorded, diagnosed, opened.
-fn trial(
-    nonce: &Nonce,
-    case: Case,
-    diagnose: &(dyn Fn(&Recording) -> Diagnosis + Sync),
-    writer: &Writer,
-) -> Result<(), TrialError> {
+fn trial(nonce: &Nonce, case: Case, world: &dyn World, writer: &Writer) -> Result<(), TrialError> {
     let name = case.name();
     let failed = |cause| TrialError::Simulation { case: name.clone(), cause };
-    let drawn = draw(nonce, case).map_err(failed)?;
-    let label = serde_json::to_string(&drawn.label).unwrap_or_default();
+    let pending = world.draw(nonce, case).map_err(failed)?;
+    let label = pending.label;
     writer.seals.write(&Seal { case: name.clone(), sha256: digest(&label) })?;
-    let recording = drawn.simulation.record(&format!("{name}.csv")).map_err(failed)?;
-    let start = Instant::now();
-    // A diagnosis that panics has failed this trial, and not the set.
-    let diagnosis = catch_unwind(AssertUnwindSafe(|| diagnose(&recording))).ok();
-    let seconds = start.elapsed().as_secs_f64();
-    let answer = Answer::of(diagnosis.as_ref());
-    let truly_closed = truly_closed(&drawn, &answer).unwrap_or(None);
+    let outcome = (pending.finish)().map_err(failed)?;
+    let Outcome { answer, truly_closed, seconds } = outcome;
     writer.answers.write(&Finished { case: name, label, answer, truly_closed, seconds })
 }
 

@@ -87,7 +87,7 @@ mod tests {
                 let squares: Vec<f64> = of.map(|(row, _)| row.norm_squared() / 3.0).collect();
                 (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
             };
-            assert_eq!(rms(0.0, 1e-12), 0.0);
+            assert!(rms(0.0, 1e-12) < 1e-9);
             let most = efforts.iter().copied().fold(0.0, f64::max);
             let (slow, fast) = (rms(1e-3, 0.4 * most), rms(0.8 * most, 2.0));
             assert!(fast > 1.5 * slow && slow > 0.0, "{kind:?} {slow} {fast}");

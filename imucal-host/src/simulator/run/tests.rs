@@ -1,8 +1,7 @@
 use std::sync::LazyLock;
 
-use sha2::{Digest, Sha256};
-
 use nalgebra::Vector3;
+use sha2::{Digest, Sha256};
 
 use super::*;
 use crate::{
