@@ -40,6 +40,11 @@ impl MismatchKind {
             Self::Contact => "contact",
         }
     }
+
+    /// The kind of a name.
+    pub fn find(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
 }
 
 /// One stretch, and the whole departure in its middle.

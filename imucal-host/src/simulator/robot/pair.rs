@@ -119,7 +119,7 @@ impl RobotScene {
         if self.duration > longest {
             return Err(SimulationError::TooLong { found: self.duration, longest });
         }
-        if !(self.duration >= shortest) {
+        if self.duration.is_nan() || self.duration < shortest {
             let programme = self.kind.name();
             return Err(SimulationError::TooShort { programme, duration: self.duration, shortest });
         }
