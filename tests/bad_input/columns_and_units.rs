@@ -233,3 +233,68 @@ fn a_gain_that_a_wrong_range_explains_is_remarked() {
         "[counts]",
     ]);
 }
+
+/// Gives every row further fields, the header's first.
+fn with(bad: &mut Bad, names: &[&str], field: impl Fn(usize) -> String) {
+    for (index, row) in bad.rows.iter_mut().enumerate() {
+        for (column, name) in names.iter().enumerate() {
+            row.push(if index == 0 { (*name).into() } else { field(column) });
+        }
+    }
+}
+
+#[test]
+fn a_part_of_a_reference_or_of_a_simulator_s_sensor_is_named_with_the_rest() {
+    for (names, missing) in [
+        (["ref_px", "ref_pz"], "`ref_py`"),
+        (["sim_acc_x", "sim_acc_y"], "`sim_acc_z`"),
+        (["sim_gyr_z", "sim_gyr_y"], "`sim_gyr_x`"),
+    ] {
+        let mut bad = Bad::new();
+        with(&mut bad, &names, |_| "0".into());
+        bad.calibrate().with(2).telling(&["small.csv, line 1", missing, "is missing", "add the column"]);
+    }
+}
+
+#[test]
+fn misspelt_columns_of_a_reference_and_of_a_simulator_are_told() {
+    let mut bad = Bad::new();
+    with(&mut bad, &["ref_p_x", "ref_py", "ref_pz", "sim_accx", "sim_acc_y", "sim_acc_z"], |_| "0".into());
+    bad.calibrate().with(2).telling(&[
+        "small.csv, line 1",
+        "`ref_p_x` for `ref_px`, `sim_accx` for `sim_acc_x`",
+        "rename them",
+    ]);
+}
+
+#[test]
+fn text_in_a_simulator_s_column_names_line_and_column() {
+    let names = ["sim_mag_x", "sim_mag_y", "sim_mag_z", "sim_temp"];
+    let mut bad = Bad::new();
+    with(&mut bad, &names, |_| String::new());
+    bad.line(7)[11] = "north".into();
+    bad.calibrate().with(2).telling(&["small.csv, line 7, column `sim_mag_y`", "`north`", "a number"]);
+}
+
+#[test]
+fn what_a_simulator_says_and_a_position_alone_change_no_calibration() {
+    let mut bad = Bad::new();
+    with(&mut bad, &["sim_acc_x", "sim_acc_y", "sim_acc_z"], |axis| ["", "0", "-9.8"][axis].into());
+    with(&mut bad, &["ref_px", "ref_py", "ref_pz"], |axis| ["1", "inf", ""][axis].into());
+    bad.calibrate().with(0).telling(&["column `ref_px`", "without an attitude", "not used"]);
+    assert_as_clean(&bad, &ALL);
+}
+
+#[test]
+fn a_simulator_s_file_has_nothing_to_calibrate() {
+    let mut bad = Bad::new();
+    for (column, name) in bad.line(1).iter_mut().enumerate().skip(ACC) {
+        *name = format!("sim_{}", ["acc", "gyr", "mag"][(column - 1) / 3]) + &name[3..];
+    }
+    bad.calibrate().with(1).telling(&[
+        "small.csv",
+        "a simulator's columns",
+        "nothing can be calibrated",
+        "--sim",
+    ]);
+}

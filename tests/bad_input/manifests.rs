@@ -78,3 +78,29 @@ fn gravity_of_no_place_on_earth_is_warned_about() {
     bad.manifest("gravity = 9.7997", "gravity = 9.6");
     bad.calibrate().telling(&["warning", "small.toml, line", "gravity 9.6", "expected 9.76 to 9.84"]);
 }
+
+#[test]
+fn a_reference_that_cannot_be_is_refused() {
+    let with = |section: &str| {
+        let mut bad = Bad::new();
+        bad.toml += section;
+        bad.calibrate()
+    };
+    with("\n[reference]\nkind = \"optical\"\n").with(2).telling(&[
+        "small.toml, line",
+        "optical",
+        "attitude",
+        "pose",
+    ]);
+    with("\n[reference]\nkind = \"pose\"\nnoise = -1.0\n")
+        .with(2)
+        .telling(&["reference.noise = -1", "above zero"]);
+    with("\n[reference]\nkind = \"pose\"\nname = 7\n").with(2).telling(&[
+        "small.toml, line",
+        "integer",
+        "string",
+    ]);
+    with("\n[reference]\nkind = \"pose\"\nnois = 1.0\n")
+        .with(0)
+        .telling(&["`reference.nois`", "write `noise`"]);
+}

@@ -76,3 +76,27 @@ fn a_jump_of_the_clock_is_a_gap() {
     bad.calibrate().with(0).printing(&["gap of", "row 2000"]);
     assert_as_clean(&bad, &ALL);
 }
+
+#[test]
+fn seconds_since_1970_with_microseconds_calibrate_as_those_since_the_start() {
+    let mut bad = Bad::new();
+    let times: Vec<f64> = bad.rows[1..].iter().map(|row| row[TIME].parse().expect("a number")).collect();
+    for (row, time) in bad.rows[1..].iter_mut().zip(times) {
+        // Of whole microseconds, which a double since 1970 is a quarter of.
+        row[TIME] = format!("{:.6}", 1.7e9 + 0.123456 + time);
+    }
+    bad.calibrate().with(0);
+    assert_as_clean(&bad, &ALL);
+}
+
+#[test]
+fn absolute_times_that_run_back_are_told_as_the_file_has_them() {
+    let mut bad = Bad::new();
+    for (index, row) in bad.rows.iter_mut().enumerate().skip(1) {
+        row[TIME] = format!("17000000{:02}.{:06}", index / 50, index % 50 * 20_000);
+    }
+    bad.line(1000)[TIME] = "1700000001.500001".into();
+    bad.calibrate()
+        .with(2)
+        .telling(&["small.csv, line 1000, column `t`", "found 1700000001.500001 after 17000000"]);
+}

@@ -164,6 +164,14 @@ pub enum Warning {
         /// Samples file.
         path: PathBuf,
     },
+    /// The file holds a simulator's columns and no sensor; which is as it should be where a simulator's file is asked for.
+    #[error(
+        "{path}: a simulator's columns found and no sensor's; nothing can be calibrated from it, but a recording of the sensor can be compared with it: imucal diagnose RECORDING --sim {path}"
+    )]
+    SimulatorAlone {
+        /// Samples file.
+        path: PathBuf,
+    },
     /// Gravity of the site that no place on Earth has.
     #[error(
         "{path}, line {line}: gravity {found} m/s² found, expected 9.76 to 9.84 on Earth; correct it or leave it out and give latitude_deg and height_m"

@@ -191,10 +191,12 @@ fn note_columns(recording: &mut Recording) {
     if recording.position.is_some() && recording.reference.is_none() && recording.gimbal.is_none() {
         recording.warnings.push(Warning::PositionAlone { path: recording.path.clone() });
     }
-    // A simulator's file is one of its own.
-    let sensors = SensorKind::ALL.iter().any(|kind| recording.sensor(*kind).is_some());
-    if !sensors && recording.simulated.is_none() {
-        recording.warnings.push(Warning::NoSensor { path: recording.path.clone() });
+    if SensorKind::ALL.iter().all(|kind| recording.sensor(*kind).is_none()) {
+        let path = recording.path.clone();
+        recording.warnings.push(match recording.simulated {
+            Some(_) => Warning::SimulatorAlone { path },
+            None => Warning::NoSensor { path },
+        });
     }
 }
 
@@ -261,7 +263,8 @@ mod tests {
         let fixture = Fixture::new("run.csv", "[units]\ngyr = \"deg/s\"\n", samples);
         let simulated = fixture.read().simulated.unwrap();
         assert_eq!((simulated.gyr.unwrap()[0].z, simulated.temperature.unwrap()[0]), (90.0, 20.0));
-        assert!(simulated.acc.is_none() && fixture.warnings().is_empty());
+        assert!(simulated.acc.is_none());
+        assert_says(&fixture.warnings()[0], &["a simulator's columns", "no sensor's", "--sim"]);
 
         let with = |columns: &str, row: &str| {
             csv(format!("t,sim_temp,ref_px,ref_py,ref_pz{columns}\n0,20,1,,inf{row}\n"))
@@ -273,7 +276,7 @@ mod tests {
         );
         let position = alone.read().position.unwrap()[0];
         assert!(position[0] == 1.0 && position[1].is_nan() && position[2].is_nan());
-        assert!(with(",ref_qw,ref_qx,ref_qy,ref_qz", ",1,0,0,0").warnings().is_empty());
+        assert_eq!(with(",ref_qw,ref_qx,ref_qy,ref_qz", ",1,0,0,0").warnings().len(), 1);
     }
 
     #[test]
