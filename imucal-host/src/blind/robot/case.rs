@@ -37,7 +37,9 @@ const ROUND: [Content; 12] = [
     Content::Motion,
     Content::Effect,
 ];
-/// Smallest departure of a robot from its simulator that is to be seen, λ, and the largest it is drawn with.
+/// How far a robot departs from its simulator, in multiples of the usual.
+const DEPARTURE: (f64, f64) = (0.05, 2.0);
+/// Smallest departure that is to be seen, λ, and the largest multiple it is drawn with.
 const SEEN: f64 = 200.0;
 const LARGEST: f64 = 8.0;
 
@@ -244,7 +246,7 @@ fn depart(
     if (scene.kind, kind) == (RobotKind::Flying, MismatchKind::Contact) {
         kind = MismatchKind::Gait;
     }
-    let mut size = logarithmic((0.3, 2.0), random);
+    let mut size = logarithmic(DEPARTURE, random);
     loop {
         let run = lambda.run_otherwise((kind, size))?;
         let found = lambda.of(&difference(&run, &lambda.healthy), &[]);

@@ -20,6 +20,10 @@ use crate::simulator::random::Random;
 const PACE: (f64, f64) = (0.15, 0.3);
 /// Feet strike if the gait is more vigorous than this.
 const STRIKING: f64 = 0.1;
+/// Half the length of a strike, s: from 5 to 20 ms, which a stream at some hundred Hz does not resolve.
+const HALF: (f64, f64) = (2.5e-3, 10e-3);
+/// Largest acceleration of a usual strike at full vigour, m/s².
+const HARD: (f64, f64) = (4.0, 15.0);
 /// Steps are looked for at this distance, s.
 const LOOK: f64 = 0.01;
 
@@ -66,7 +70,7 @@ impl Walk {
 
     /// Draws the strikes: one a step.
     fn strike(&mut self, random: &mut Random) {
-        let hard = random.between(4.0, 15.0);
+        let hard = random.between(HARD.0, HARD.1);
         let phase = |time: f64| self.gait.phase(time, &self.route.at(time)).value / TAU;
         let rows = (self.route.duration() / LOOK) as usize;
         let (mut strikes, mut before) = (Vec::new(), phase(0.0));
@@ -77,8 +81,7 @@ impl Walk {
                 let time = from + LOOK * (here.floor() - before) / (here - before);
                 let going = self.route.at(time);
                 let vigour = vigour(&going).value;
-                // From 5 to 20 ms, and of any hardness about the usual.
-                let half = random.between(2.5e-3, 10e-3);
+                let half = random.between(HALF.0, HALF.1);
                 let peak = hard * vigour * random.between(0.5, 1.5);
                 let (forward, right) = (random.between(-0.5, 0.1), random.between(-0.3, 0.3));
                 if vigour > STRIKING {
