@@ -15,6 +15,7 @@ use tempfile::TempDir;
 mod bad_recordings;
 mod contract;
 mod printing;
+mod user_effects;
 
 /// A short run of rates at 50 Hz: 150 s.
 fn rates(seed: u64) -> Simulation {

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     diagnosis::{Diagnosis, Verdict, finding},
-    effect,
+    effect::{self, Effect},
     simulator::{Dose, SimulationError},
 };
 
@@ -92,9 +92,9 @@ impl Answer {
     }
 
     /// The effects as they were fitted, ready for the simulator; those it does not know are left out.
-    fn doses(&self) -> Vec<Dose> {
+    fn doses(&self, own: &[&'static Effect]) -> Vec<Dose> {
         let dose = |cause: &Asserted| {
-            let effect = effect::find(&cause.effect)?;
+            let effect = effect::user::find_among(&cause.effect, own)?;
             let asserted =
                 |name: &str| cause.parameters.iter().find(|(own, _)| own == name).map(|(_, value)| *value);
             let value = |parameter: &effect::Parameter| match asserted(&parameter.name) {
@@ -151,8 +151,12 @@ impl Finished {
 /// # Errors
 ///
 /// [`SimulationError`], when an effect as fitted is beyond reason.
-pub fn truly_closed(drawn: &Drawn, answer: &Answer) -> Result<Option<f64>, SimulationError> {
-    let doses = answer.doses();
+pub fn truly_closed(
+    drawn: &Drawn,
+    answer: &Answer,
+    own: &[&'static Effect],
+) -> Result<Option<f64>, SimulationError> {
+    let doses = answer.doses(own);
     if doses.is_empty() || drawn.simulation.doses.is_empty() {
         return Ok(None);
     }
@@ -202,11 +206,11 @@ pub(super) mod tests {
                     (name.clone(), Some(if parameter.switches() { value * share } else { *value }))
                 });
             let answer = asserting(Verdict::Explained, &[(&present.effect, parameters.collect())]);
-            truly_closed(&drawn, &answer).unwrap().unwrap()
+            truly_closed(&drawn, &answer, &[]).unwrap().unwrap()
         };
         assert!((closed(1.0) - 1.0).abs() < 1e-9, "{present:?}");
         assert!((closed(0.5) - 0.75).abs() < 0.05, "{present:?}: {}", closed(0.5));
         assert!(closed(-1.0) < -2.5, "{present:?}");
-        assert_eq!(truly_closed(&drawn, &Answer::of(None)).unwrap(), None);
+        assert_eq!(truly_closed(&drawn, &Answer::of(None), &[]).unwrap(), None);
     }
 }

@@ -9,7 +9,7 @@ use super::{
     setting::{self, logarithmic},
 };
 use crate::{
-    effect::{CATALOGUE, Effect, Part, Role, Spoils, class::class},
+    effect::{Act, CATALOGUE, Effect, Part, Role, Spoils, class::class},
     simulator::{
         Dose, Simulation, SimulationError,
         random::{Purpose, Random},
@@ -75,7 +75,7 @@ pub fn omission(effect: &Effect) -> Option<Omission> {
         Part::TriadTerm | Part::RigTerm(_) | Part::Nuisance(_) => Some(Omission::Baseline),
         Part::Fault(Spoils::Nothing | Spoils::Scale) => Some(Omission::Convention),
         Part::Fault(Spoils::Passage | Spoils::Repeats) => Some(Omission::NoMean),
-        Part::Fault(Spoils::BeyondLimit) | Part::Candidate | Part::ClockTerm => None,
+        Part::Fault(Spoils::BeyondLimit) | Part::Candidate | Part::ClockTerm | Part::ClockRateTerm => None,
     }
 }
 
@@ -151,6 +151,15 @@ pub struct Drawn {
 ///
 /// [`SimulationError`]; none is known.
 pub fn draw(nonce: &Nonce, case: Case) -> Result<Drawn, SimulationError> {
+    draw_among(nonce, case, &[])
+}
+
+/// Likewise, with a user's own effects drawn as those of the catalogue are.
+///
+/// # Errors
+///
+/// [`SimulationError`], as where a formula has no value.
+pub fn draw_among(nonce: &Nonce, case: Case, own: &[&'static Effect]) -> Result<Drawn, SimulationError> {
     let name = case.name();
     let seed = nonce.seed(&format!("imucal blind seed {name}"));
     let mut random = Random::new(seed, Purpose::Case);
@@ -163,7 +172,10 @@ pub fn draw(nonce: &Nonce, case: Case) -> Result<Drawn, SimulationError> {
     let (pool, count): (Vec<&'static Effect>, usize) = match wanted {
         None => (Vec::new(), 0),
         Some(0) => (OUTSIDE.iter().collect(), 1),
-        Some(count) => (CATALOGUE.iter().filter(|effect| omission(effect).is_none()).collect(), count),
+        Some(count) => {
+            let all = CATALOGUE.iter().chain(own.iter().copied());
+            (all.filter(|effect| omission(effect).is_none()).collect(), count)
+        }
     };
     let mut passed_over = Vec::new();
     simulation.doses = doses(&lambda, pool, count, seed, &mut passed_over, &mut random)?;
@@ -247,6 +259,10 @@ pub(super) fn shaped(effect: &'static Effect, seed: u64, duration: f64, random: 
             *value = usual * logarithmic((0.4, 2.5), random);
         }
     }
+    if matches!(effect.act, Act::Formula(..)) {
+        let ranges = effect.parameters.iter().map(|parameter| parameter.range);
+        dose.values.iter_mut().zip(ranges).for_each(|(value, (low, high))| *value = value.clamp(low, high));
+    }
     dose
 }
 
@@ -307,7 +323,7 @@ fn present(lambda: &Lambda, doses: &[Dose]) -> Result<Vec<Present>, SimulationEr
         let names = dose.effect.parameters.iter().map(|parameter| parameter.name.clone());
         Present {
             effect: dose.effect.id.clone(),
-            outside: CATALOGUE.iter().all(|effect| effect.id != dose.effect.id),
+            outside: OUTSIDE.iter().any(|effect| effect.id == dose.effect.id),
             parameters: names.zip(dose.values.iter().copied()).collect(),
             lambda: lambda.of(&signals[at], &[]),
             lambda_beside: largest(&lambda.of(&signals[at], &others)),

@@ -19,7 +19,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use crate::{
     effect,
     recording::SensorKind,
-    simulator::{Dose, Simulation, SimulationError},
+    simulator::{Dose, OutputError, Simulation, SimulationError},
 };
 
 /// Length of a block, s.
@@ -103,7 +103,7 @@ impl Lambda {
             let white = triad.noise * triad.noise / samples;
             let covariance = |one: f64, other: f64| triad.drift.covariance(one, other);
             let measure = Measure::new(lambda.healthy[kind as usize].len(), white, covariance);
-            lambda.sensors.push(measure.ok_or(SimulationError::Singular { sensor: kind })?);
+            lambda.sensors.push(measure.ok_or(OutputError::Singular { sensor: kind })?);
         }
         Ok(lambda)
     }

@@ -23,6 +23,7 @@ use super::{
 };
 use crate::{
     diagnosis::Diagnosis,
+    effect::{Act, Effect},
     file::{Limits, OutputError, OutputSet, ReadFault},
     recording::Recording,
     simulator::SimulationError,
@@ -38,6 +39,12 @@ pub enum TrialError {
     /// The file of the set cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// A set that is drawn otherwise.
+    #[error(
+        "{}: found a set drawn without these effects or with others, expected the same; choose another folder",
+        path.display()
+    )]
+    OtherEffects { path: PathBuf },
     /// Files of a set, but not which one.
     #[error(
         "{}: found the file of a set without its set.json, expected both or none; choose another folder; nothing was changed",
@@ -82,6 +89,42 @@ struct Set {
     nonce: String,
     #[serde(default, skip_serializing_if = "WorldKind::is_rig")]
     world: WorldKind,
+    /// Hash of the user's own effects that are drawn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    drawn: Option<String>,
+}
+
+/// A user's own effects in a set of trials.
+#[derive(Clone, Debug, Default)]
+pub struct OwnEffects {
+    /// Candidates of the diagnosis.
+    pub effects: Vec<&'static Effect>,
+    /// They are drawn for recordings as well.
+    pub are_drawn: bool,
+}
+
+impl OwnEffects {
+    /// Those that are drawn.
+    pub fn drawn(&self) -> &[&'static Effect] {
+        if self.are_drawn { &self.effects } else { &[] }
+    }
+
+    fn digest(&self) -> Option<String> {
+        let formula = |effect: &Effect| match effect.act {
+            Act::Formula(_, formula) => formula.to_string(),
+            _ => String::new(),
+        };
+        let text =
+            |effect: &&'static Effect| format!("{} {} {:?}\n", effect.id, formula(effect), effect.parameters);
+        self.are_drawn.then(|| digest(&self.effects.iter().map(text).collect::<String>()))
+    }
+}
+
+/// What a folder's set is.
+struct FolderSet {
+    nonce: Nonce,
+    world: WorldKind,
+    drawn: Option<String>,
 }
 
 /// The seal of one case.
@@ -97,6 +140,8 @@ pub struct Folder {
     path: PathBuf,
     nonce: Nonce,
     world: WorldKind,
+    drawn: Option<String>,
+    own: OwnEffects,
 }
 
 impl Folder {
@@ -106,7 +151,7 @@ impl Folder {
     ///
     /// As [`Self::open_of`].
     pub fn open(path: &Path, nonce: Option<Nonce>) -> Result<Self, TrialError> {
-        Self::open_of(WorldKind::Rig, path, nonce)
+        Self::open_of(WorldKind::Rig, path, nonce, OwnEffects::default())
     }
 
     /// The folder of a set that is there, of whichever world.
@@ -115,15 +160,29 @@ impl Folder {
     ///
     /// [`TrialError::Damaged`], [`TrialError::File`].
     pub fn existing(path: &Path) -> Result<Option<Self>, TrialError> {
-        Ok(Self::set_of(path)?.map(|(nonce, world)| Self { path: path.to_owned(), nonce, world }))
+        let own = OwnEffects::default();
+        let of = |set: FolderSet| Self {
+            path: path.to_owned(),
+            nonce: set.nonce,
+            world: set.world,
+            drawn: set.drawn,
+            own,
+        };
+        Ok(Self::set_of(path)?.map(of))
     }
 
-    /// Opens a folder of trials of a world or makes it, with this nonce, or its own, or a fresh one.
+    /// Opens a folder of trials of a world or makes it, with this nonce, or its own, or a fresh one, to be
+    /// run with a user's own effects.
     ///
     /// # Errors
     ///
     /// [`TrialError::OtherSet`], [`TrialError::OtherWorld`], [`TrialError::File`].
-    pub fn open_of(world: WorldKind, path: &Path, nonce: Option<Nonce>) -> Result<Self, TrialError> {
+    pub fn open_of(
+        world: WorldKind,
+        path: &Path,
+        nonce: Option<Nonce>,
+        own: OwnEffects,
+    ) -> Result<Self, TrialError> {
         let set_path = path.join("set.json");
         let failed = |cause| TrialError::File { path: set_path.clone(), cause };
         if let Some(folder) = Self::existing(path)? {
@@ -133,7 +192,7 @@ impl Folder {
             }
             let found = folder.nonce;
             return match nonce.filter(|wanted| *wanted != found) {
-                None => Ok(folder),
+                None => Ok(Self { own, ..folder }),
                 Some(wanted) => {
                     Err(TrialError::OtherSet { path: set_path, found: found.hex(), expected: wanted.hex() })
                 }
@@ -149,19 +208,24 @@ impl Folder {
             Some(nonce) => nonce,
             None => Nonce::fresh().map_err(|cause| failed(io::Error::other(cause.to_string())))?,
         };
-        let set = Set { format: "imucal-blind/1".to_owned(), nonce: nonce.hex(), world };
+        let drawn = own.digest();
+        let set =
+            Set { format: "imucal-blind/1".to_owned(), nonce: nonce.hex(), world, drawn: drawn.clone() };
         let text = serde_json::to_string_pretty(&set).unwrap_or_default() + "\n";
         let mut files = OutputSet::sparing_all_but(Vec::new());
         files.add(&set_path, text.as_bytes())?;
         files.commit()?;
-        Ok(Self { path: path.to_owned(), nonce, world })
+        Ok(Self { path: path.to_owned(), nonce, world, drawn, own })
     }
 
-    fn set_of(path: &Path) -> Result<Option<(Nonce, WorldKind)>, TrialError> {
+    fn set_of(path: &Path) -> Result<Option<FolderSet>, TrialError> {
         let path = path.join("set.json");
         let Some(text) = text_of(&path, Limits::read_small)? else { return Ok(None) };
         let set = serde_json::from_str::<Set>(&text).ok();
-        match set.and_then(|set| Some((Nonce::parse(&set.nonce)?, set.world))) {
+        let known = |set: Set| {
+            Some(FolderSet { nonce: Nonce::parse(&set.nonce)?, world: set.world, drawn: set.drawn })
+        };
+        match set.and_then(known) {
             Some(set) => Ok(Some(set)),
             None => Err(TrialError::Damaged { path, line: 1, found: text.chars().take(80).collect() }),
         }
@@ -170,6 +234,11 @@ impl Folder {
     /// Its nonce.
     pub fn nonce(&self) -> Nonce {
         self.nonce
+    }
+
+    /// A user's own effects that it is run with.
+    pub fn own(&self) -> &OwnEffects {
+        &self.own
     }
 
     /// Its world.
@@ -211,7 +280,7 @@ impl Folder {
         diagnose: &(dyn Fn(&Recording) -> Diagnosis + Sync),
         heard: &(dyn Fn(usize) + Sync),
     ) -> Result<(), TrialError> {
-        self.run_in(&RigWorld(diagnose), cases, jobs, heard)
+        self.run_in(&RigWorld { diagnose, own: &self.own }, cases, jobs, heard)
     }
 
     /// Runs those of the cases that are not over yet, so many at a time; `heard` is given how many of all are over.
@@ -226,6 +295,9 @@ impl Folder {
         jobs: usize,
         heard: &(dyn Fn(usize) + Sync),
     ) -> Result<(), TrialError> {
+        if self.drawn != self.own.digest() {
+            return Err(TrialError::OtherEffects { path: self.path.join("set.json") });
+        }
         let over: Vec<String> = self.finished()?.into_iter().map(|trial| trial.case).collect();
         let left: Vec<Case> = cases.iter().copied().filter(|case| !over.contains(&case.name())).collect();
         let writer = Writer::open(&self.path)?;

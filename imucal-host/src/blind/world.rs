@@ -9,8 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     answer::{Answer, truly_closed},
-    case::{Case, draw},
+    case::{Case, draw_among},
     seal::Nonce,
+    trial::OwnEffects,
 };
 use crate::{diagnosis::Diagnosis, recording::Recording, simulator::SimulationError};
 
@@ -85,7 +86,12 @@ pub struct Outcome {
 
 /// Recordings of the rig, and what diagnoses them.
 #[allow(missing_debug_implementations)] // A function has no text.
-pub struct RigWorld<'d>(pub &'d (dyn Fn(&Recording) -> Diagnosis + Sync));
+pub struct RigWorld<'d> {
+    /// The diagnosis.
+    pub diagnose: &'d (dyn Fn(&Recording) -> Diagnosis + Sync),
+    /// A user's own effects.
+    pub own: &'d OwnEffects,
+}
 
 impl World for RigWorld<'_> {
     fn kind(&self) -> WorldKind {
@@ -93,13 +99,13 @@ impl World for RigWorld<'_> {
     }
 
     fn draw(&self, nonce: &Nonce, case: Case) -> Result<Pending<'_>, SimulationError> {
-        let drawn = draw(nonce, case)?;
+        let drawn = draw_among(nonce, case, self.own.drawn())?;
         let label = serde_json::to_string(&drawn.label).unwrap_or_default();
         let finish = move || {
             let recording = drawn.simulation.record(&format!("{}.csv", case.name()))?;
-            let (diagnosis, seconds) = timed(|| (self.0)(&recording));
+            let (diagnosis, seconds) = timed(|| (self.diagnose)(&recording));
             let answer = Answer::of(diagnosis.as_ref());
-            let truly_closed = truly_closed(&drawn, &answer).unwrap_or(None);
+            let truly_closed = truly_closed(&drawn, &answer, &self.own.effects).unwrap_or(None);
             Ok(Outcome { answer, truly_closed, seconds })
         };
         Ok(Pending { label, finish: Box::new(finish) })

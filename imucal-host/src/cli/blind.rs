@@ -13,20 +13,22 @@ use super::{
     Ending,
     output::{self, say},
     overwrite::{Overwrite, Planned},
+    own_effects,
     progress::Progress,
 };
 use crate::{
     blind::{
-        case::{Case, draw},
+        case::{Case, draw_among},
         judgement::Judgement,
         robot,
         score::score,
         seal::Nonce,
-        trial::{Folder, mingled},
+        trial::{Folder, OwnEffects, mingled},
         world::{RigWorld, World, WorldKind},
     },
     diagnosis::{Diagnosis, Options, diagnose},
-    recording::Recording,
+    file::Limits,
+    recording::{Recording, Stream},
     simulator::robot::RobotPair,
 };
 
@@ -54,11 +56,17 @@ pub(super) struct Arguments {
     #[arg(long)]
     misses: bool,
     /// Only score what the folder DIR holds
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["world", "cases", "healthy", "out", "nonce", "jobs", "open"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["world", "cases", "healthy", "out", "nonce", "jobs", "open", "effects"])]
     score: Option<PathBuf>,
     /// Only write the recording of this case, such as afflicted-0003, and its label into --out
     #[arg(long, value_name = "CASE", value_parser = case, requires = "nonce")]
     open: Option<Case>,
+    /// Your own effects, in TOML: candidates like those of the catalogue (see docs/user_effects.md)
+    #[arg(long, value_name = "FILE")]
+    effects: Option<PathBuf>,
+    /// Draw your own effects for the recordings, too
+    #[arg(long, requires = "effects")]
+    draw_effects: bool,
     #[command(flatten)]
     overwrite: Overwrite,
 }
@@ -126,26 +134,36 @@ fn scored(folder: &Folder) -> anyhow::Result<(String, Vec<String>)> {
     })
 }
 
-/// Diagnoses a robot's recording. The simulator's stream is not taken yet: the recording stands alone.
-fn diagnose_pair(pair: &RobotPair) -> Diagnosis {
-    diagnose(&pair.real, &Options::default(), &|_| ())
+/// Diagnoses a robot's recording against its simulator's stream.
+fn diagnose_pair(pair: &RobotPair, options: &Options) -> Diagnosis {
+    let options = Options { stream: Stream::of(&pair.simulated), ..options.clone() };
+    diagnose(&pair.real, &options, &|_| ())
 }
 
 fn trials(arguments: &Arguments) -> anyhow::Result<Folder> {
-    let folder = Folder::open_of(arguments.world, &arguments.out, arguments.nonce)?;
+    let own = own(arguments)?;
+    let options = Options { effects: own.effects.clone(), ..Options::default() };
+    let folder = Folder::open_of(arguments.world, &arguments.out, arguments.nonce, own)?;
     let cases = mingled(arguments.healthy, arguments.cases);
     let cores = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let jobs = arguments.jobs.unwrap_or(cores).get();
     let progress = Progress::start();
     let heard = |over: usize| progress.stage(&format!("{over} of {} cases", cases.len()));
-    let diagnose_recording = |recording: &Recording| diagnose(recording, &Options::default(), &|_| ());
-    let (rig, robots) = (RigWorld(&diagnose_recording), robot::trial::RobotWorld(&diagnose_pair));
+    let diagnose_recording = |recording: &Recording| diagnose(recording, &options, &|_| ());
+    let diagnose_pair = |pair: &RobotPair| diagnose_pair(pair, &options);
+    let rig = RigWorld { diagnose: &diagnose_recording, own: folder.own() };
+    let robots = robot::trial::RobotWorld(&diagnose_pair);
     let world: &dyn World = match arguments.world {
         WorldKind::Rig => &rig,
         WorldKind::Robot => &robots,
     };
     folder.run_in(world, &cases, jobs, &heard)?;
     Ok(folder)
+}
+
+fn own(arguments: &Arguments) -> anyhow::Result<OwnEffects> {
+    let effects = own_effects(arguments.effects.as_deref(), &Limits::default())?;
+    Ok(OwnEffects { effects, are_drawn: arguments.draw_effects })
 }
 
 /// Writes one case for a closer look.
@@ -161,7 +179,7 @@ fn open(nonce: Nonce, case: Case, arguments: &Arguments) -> anyhow::Result<Endin
     let mut planned = Planned::recording(&path);
     planned.push(Planned::new(&label));
     let mut files = arguments.overwrite.plan(&[], &planned)?;
-    let drawn = draw(&nonce, case)?;
+    let drawn = draw_among(&nonce, case, own(arguments)?.drawn())?;
     drawn.simulation.record(&name)?.write_into(&path, &mut files)?;
     files.add(&label, (serde_json::to_string_pretty(&drawn.label)? + "\n").as_bytes())?;
     files.commit()?;

@@ -1,6 +1,6 @@
 //! `imucal diagnose`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
@@ -8,6 +8,7 @@ use clap::Args;
 use super::{
     Ending, load, output,
     overwrite::{Overwrite, Planned, files_of},
+    own_effects,
     progress::Progress,
     read,
     reading::Reading,
@@ -16,8 +17,9 @@ use super::{
 };
 use crate::{
     diagnosis::{Diagnosis, Options, Verdict, diagnose},
-    effect::{self, CATALOGUE},
+    effect::{CATALOGUE, Effect, user},
     file::OutputSet,
+    recording::Stream,
     report,
 };
 
@@ -29,9 +31,16 @@ pub(super) struct Arguments {
     /// The unit's present model, as `imucal calibrate` wrote it (default: calibrated from the recording)
     #[arg(long, value_name = "CAL")]
     model: Option<PathBuf>,
+    /// A simulator's ideal stream of the same movement, on its own clock: columns sim_* (or acc_*, gyr_*, mag_*) of a
+    /// recording
+    #[arg(long, value_name = "SIM")]
+    sim: Option<PathBuf>,
     /// Exclude effects from the candidates, or terms (such as acc.misalignment) from the baseline
-    #[arg(long, value_name = "EFFECT_OR_TERM", num_args = 1.., value_parser = known)]
+    #[arg(long, value_name = "EFFECT_OR_TERM", num_args = 1..)]
     without: Vec<String>,
+    /// Your own effects, in TOML: candidates like those of the catalogue (see docs/user_effects.md)
+    #[arg(long, value_name = "FILE")]
+    effects: Option<PathBuf>,
     /// Write everything as JSON; `-` prints it instead of the report
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -44,20 +53,27 @@ pub(super) struct Arguments {
     reading: Reading,
 }
 
-/// An id of the catalogue.
-fn known(id: &str) -> Result<String, String> {
-    let ids = CATALOGUE.iter().map(|effect| effect.id.as_str());
-    effect::find(id).map(|effect| effect.id.clone()).ok_or_else(|| unknown("effect or term", id, ids))
+/// An id of the catalogue or of the user's own effects.
+fn known(id: &str, own: &[&'static Effect]) -> Result<String, String> {
+    let ids = CATALOGUE.iter().chain(own.iter().copied()).map(|effect| effect.id.as_str());
+    user::find_among(id, own)
+        .map(|effect| effect.id.clone())
+        .ok_or_else(|| unknown("effect or term", id, ids))
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let own = own_effects(arguments.effects.as_deref(), &arguments.reading.limits())?;
+    let without: Result<Vec<String>, String> = arguments.without.iter().map(|id| known(id, &own)).collect();
+    let without = without.map_err(|unknown| anyhow::anyhow!("--without: {unknown}"))?;
     let Some(path) = arguments.recording.as_deref().filter(|_| !arguments.list) else {
-        output::text(&report::catalogue::catalogue())?;
+        output::text(&report::catalogue::catalogue(&own))?;
         return Ok(Ending::Done);
     };
     let json = arguments.json.iter().filter(|path| path.as_os_str() != "-");
     let mut inputs = files_of(path);
     inputs.extend(arguments.model.clone());
+    inputs.extend(arguments.sim.iter().flat_map(|path| files_of(path)));
+    inputs.extend(arguments.effects.clone());
     let files = arguments.overwrite.plan(&inputs, &json.map(Planned::new).collect::<Vec<_>>())?;
     let recording = read(path, arguments.reading)?;
     let model = arguments.model.as_deref().map(|path| load(path, arguments.reading)).transpose()?;
@@ -65,12 +81,25 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Some(Err(damaged)) => return Ok(refuse(&damaged)),
         model => model.and_then(Result::ok),
     };
-    let options = Options { without: arguments.without.clone(), model, settings: None };
+    let stream = arguments.sim.as_deref().map(|path| stream(path, arguments.reading)).transpose()?;
+    let options = Options { without, model, stream, effects: own, settings: None };
     let progress = Progress::start();
     let diagnosis = diagnose(&recording, &options, &|stage| progress.stage(stage));
     drop(progress);
     print(arguments, &diagnosis, files)?;
     Ok(if diagnosis.verdict == Verdict::NotTestable { Ending::Refused } else { Ending::Done })
+}
+
+/// A simulator's stream.
+fn stream(path: &Path, reading: Reading) -> anyhow::Result<Stream> {
+    let simulated = read(path, reading)?;
+    Stream::of(&simulated).with_context(|| {
+        format!(
+            "{}: found no stream of a simulator, expected columns sim_acc_*, sim_gyr_* or sim_mag_*; export what an ideal \
+             sensor would read",
+            path.display()
+        )
+    })
 }
 
 fn print(arguments: &Arguments, diagnosis: &Diagnosis, mut files: OutputSet) -> anyhow::Result<()> {
@@ -92,7 +121,7 @@ mod tests {
 
     #[test]
     fn only_what_the_catalogue_holds_can_be_left_out() {
-        assert_eq!(known("acc.misalignment").unwrap(), "acc.misalignment");
-        assert!(known("acc.misalinment").unwrap_err().contains("did you mean `acc.misalignment`"));
+        assert_eq!(known("acc.misalignment", &[]).unwrap(), "acc.misalignment");
+        assert!(known("acc.misalinment", &[]).unwrap_err().contains("did you mean `acc.misalignment`"));
     }
 }

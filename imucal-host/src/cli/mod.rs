@@ -6,6 +6,8 @@ use clap::{Parser, Subcommand};
 
 use self::reading::Reading;
 use crate::{
+    effect::{self, Effect},
+    file::Limits,
     recording::Recording,
     store::{LoadError, StoredCalibration},
 };
@@ -114,6 +116,14 @@ fn load(path: &Path, reading: Reading) -> anyhow::Result<Result<StoredCalibratio
     match StoredCalibration::load_within(path, &reading.limits()) {
         Err(damaged @ (LoadError::Record { .. } | LoadError::Unusable { .. })) => Ok(Err(damaged)),
         read => Ok(Ok(read?)),
+    }
+}
+
+/// The user's own effects; none without a file.
+fn own_effects(path: Option<&Path>, limits: &Limits) -> anyhow::Result<Vec<&'static Effect>> {
+    match path {
+        Some(path) => Ok(effect::user::read(path, limits)?),
+        None => Ok(Vec::new()),
     }
 }
 

@@ -10,6 +10,7 @@ use super::{
     overwrite::{Overwrite, Planned},
 };
 use crate::{
+    effect::Effect,
     recording::Manifest,
     simulator::{
         Dose,
@@ -24,14 +25,15 @@ const MOUNT: f64 = 1.0;
 /// Simulates a robot's recording, NAME-real, and its simulator's stream, NAME-sim.
 pub(super) fn simulate(
     mut scene: RobotScene,
-    effects: &[(&'static crate::effect::Effect, f64)],
+    effects: &[(&'static Effect, f64)],
+    inputs: &[PathBuf],
     out: &Path,
     overwrite: Overwrite,
 ) -> anyhow::Result<Ending> {
     let [real, simulated] = [part(out, "real")?, part(out, "sim")?];
     let mut planned = Planned::recording(&real);
     planned.extend(Planned::recording(&simulated));
-    let mut files = overwrite.plan(&[], &planned)?;
+    let mut files = overwrite.plan(inputs, &planned)?;
     let mut random = Random::new(scene.seed, Purpose::Rig);
     scene.mounting = random.normals().normalize() * MOUNT.to_radians();
     let dose = |(effect, size): &(&'static _, f64)| Dose::sized(effect, *size, scene.seed, scene.duration);
@@ -83,7 +85,7 @@ mod tests {
             RobotScene { kind: RobotKind::Flying, duration: 40.0, counts: false, ..RobotScene::default() };
         let out = folder.path().join("flight.csv.gz");
         let effect = crate::effect::find("clk.time_offset").unwrap();
-        simulate(scene, &[(effect, 2.0)], &out, Overwrite::default()).unwrap();
+        simulate(scene, &[(effect, 2.0)], &[], &out, Overwrite::default()).unwrap();
         let read =
             |part: &str| Recording::read(&folder.path().join(format!("flight-{part}.csv.gz"))).unwrap();
         let (real, simulated) = (read("real"), read("sim"));

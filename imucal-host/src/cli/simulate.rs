@@ -10,16 +10,15 @@ use super::{
     Ending,
     output::{self, say},
     overwrite::{Overwrite, Planned},
-    robot,
+    own_effects, robot,
 };
 use crate::{
     blind::{
         case::{Omission, omission},
         seal::{Nonce, digest},
     },
-    effect,
-    effect::{CATALOGUE, Effect},
-    file::OutputSet,
+    effect::{CATALOGUE, Effect, user},
+    file::{Limits, OutputSet},
     recording::{
         Manifest,
         manifest::{Axis, spelling::nearest},
@@ -61,8 +60,11 @@ pub(super) struct Arguments {
     programme: Programme,
     /// An effect beyond the baseline, e.g. acc.lever_arm or mag.bias_step=3: its size in multiples of its usual one.
     /// Several parameters point in a direction drawn from the seed; for P.axis_swap the size is the code of the order
-    #[arg(long = "effect", value_name = "ID[=SIZE]", value_parser = dose)]
-    effects: Vec<(&'static Effect, f64)>,
+    #[arg(long = "effect", value_name = "ID[=SIZE]", value_parser = size)]
+    doses: Vec<(String, f64)>,
+    /// Your own effects, in TOML, for --effect and --list (see docs/user_effects.md)
+    #[arg(long, value_name = "FILE")]
+    effects: Option<PathBuf>,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -82,7 +84,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     no_noise: bool,
     /// Draw seed and effects from a fresh nonce, write them into NAME.label.json and print only its SHA-256
-    #[arg(long, conflicts_with_all = ["effects", "seed"])]
+    #[arg(long, conflicts_with_all = ["doses", "effects", "seed"])]
     sealed: bool,
     #[command(flatten)]
     overwrite: Overwrite,
@@ -105,15 +107,21 @@ fn programme(text: &str) -> Result<Programme, String> {
     Programme::find(text).ok_or_else(|| unknown("programme", text, Programme::ALL.map(Programme::name)))
 }
 
-fn dose(text: &str) -> Result<(&'static Effect, f64), String> {
+/// An id and a size.
+fn size(text: &str) -> Result<(String, f64), String> {
     let (id, size) = text.split_once('=').unwrap_or((text, "1"));
-    let effect = effect::find(id).ok_or_else(|| unknown("effect", id, CATALOGUE.iter().map(|e| &*e.id)))?;
     let size: f64 = size
         .parse()
         .ok()
         .filter(|size: &f64| size.is_finite())
         .ok_or_else(|| format!("the size `{size}` of {id} is no number; expected for instance {id}=2"))?;
-    Ok((effect, size))
+    Ok((id.to_owned(), size))
+}
+
+/// The effect of an id of the catalogue or of the user's own.
+fn known(id: &str, own: &[&'static Effect]) -> Result<&'static Effect, String> {
+    let ids = CATALOGUE.iter().chain(own.iter().copied()).map(|effect| &*effect.id);
+    user::find_among(id, own).ok_or_else(|| unknown("effect", id, ids))
 }
 
 /// What was found, and the nearest name or all there are.
@@ -146,12 +154,19 @@ fn axes(text: &str) -> Result<[Axis; 3], String> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let own = own_effects(arguments.effects.as_deref(), &Limits::default())?;
     let Some(out) = arguments.out.as_deref().filter(|_| !arguments.list) else {
-        output::text(&report::catalogue::catalogue())?;
+        output::text(&report::catalogue::catalogue(&own))?;
         return Ok(Ending::Done);
     };
+    let sized = |(id, size): &(String, f64)| -> anyhow::Result<(&'static Effect, f64)> {
+        let effect = known(id, &own).map_err(|unknown| anyhow::anyhow!("--effect: {unknown}"))?;
+        Ok((effect, *size))
+    };
+    let effects: Vec<_> = arguments.doses.iter().map(sized).collect::<Result<_, _>>()?;
+    let inputs: Vec<PathBuf> = arguments.effects.iter().cloned().collect();
     if let Some(kind) = arguments.robot {
-        return robot::simulate(scene(kind, arguments), &arguments.effects, out, arguments.overwrite);
+        return robot::simulate(scene(kind, arguments), &effects, &inputs, out, arguments.overwrite);
     }
     let mut simulation = Simulation {
         unit: arguments.unit,
@@ -169,9 +184,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if arguments.sealed {
         return sealed(simulation, out, arguments.overwrite);
     }
-    let mut files = arguments.overwrite.plan(&[], &Planned::recording(out))?;
-    for (effect, size) in &arguments.effects {
-        simulation.add(effect, *size)?;
+    let mut files = arguments.overwrite.plan(&inputs, &Planned::recording(out))?;
+    for (effect, size) in effects {
+        simulation.add(effect, size)?;
     }
     let done = write(&simulation, out, &mut files)?;
     files.commit()?;
@@ -290,18 +305,20 @@ mod tests {
 
     #[test]
     fn an_unknown_name_is_answered_with_the_nearest() {
-        assert!(dose("acc.leverarm=2").unwrap_err().contains("did you mean `acc.lever_arm`"));
+        assert!(known("acc.leverarm", &[]).unwrap_err().contains("did you mean `acc.lever_arm`"));
         assert!(programme("rate").unwrap_err().contains("`rates`"));
         assert!(unit("mti").unwrap_err().contains("`mtx`"));
-        assert!(dose("something else entirely").unwrap_err().contains("expected one of rig.level_tilt"));
+        assert!(
+            known("something else entirely", &[]).unwrap_err().contains("expected one of rig.level_tilt")
+        );
     }
 
     #[test]
     fn a_size_must_be_a_number() {
-        assert_eq!(dose("gyr.warmup=-2.5").unwrap().1, -2.5);
-        assert_eq!(dose("gyr.warmup").unwrap().1, 1.0);
+        assert_eq!(size("gyr.warmup=-2.5").unwrap().1, -2.5);
+        assert_eq!(size("gyr.warmup").unwrap().1, 1.0);
         for text in ["gyr.warmup=", "gyr.warmup=big", "gyr.warmup=inf"] {
-            assert!(dose(text).unwrap_err().contains("no number"), "{text}");
+            assert!(size(text).unwrap_err().contains("no number"), "{text}");
         }
     }
 

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::recording::SensorKind;
+use crate::{effect::user::NotFinite, recording::SensorKind, simulator::OutputError};
 
 /// Why a diagnosis cannot be made.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -16,6 +16,9 @@ pub enum DiagnosisError {
         /// The sensor.
         sensor: SensorKind,
     },
+    /// Simulation: a user's formula has no value in this recording.
+    #[error("{}: {}", .0.effect, .0.without_row())]
+    Formula(Box<NotFinite>),
     /// Fit of the baseline, or of it and a set of effects.
     #[error(
         "the baseline cannot be fitted to this recording: the normal equations of {columns} columns are singular"
@@ -72,4 +75,13 @@ pub enum DiagnosisError {
         /// Number of the columns.
         columns: usize,
     },
+}
+
+impl From<OutputError> for DiagnosisError {
+    fn from(error: OutputError) -> Self {
+        match error {
+            OutputError::Singular { sensor } => Self::Simulation { sensor },
+            OutputError::NotFinite(cause) => Self::Formula(Box::new(cause)),
+        }
+    }
 }

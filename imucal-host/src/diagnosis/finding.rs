@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::effect::Effect;
+
 /// The contract's name of what [`Diagnosis`] is serialised to.
 pub const FORMAT: &str = "imucal-diagnosis/1";
 
@@ -58,6 +60,38 @@ pub struct Diagnosis {
     pub not_testable: Vec<NotTestable>,
     /// What to record next to part causes from their equivalents.
     pub next_experiment: Vec<Experiment>,
+    /// The user's own effects among causes and equivalents, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub user_effects: Vec<UserEffect>,
+}
+
+impl Diagnosis {
+    /// With the words of those effects of a user that it names.
+    #[must_use]
+    pub fn with_words_of(mut self, own: &[&'static Effect]) -> Self {
+        let is_named = |effect: &&&'static Effect| {
+            let of = |cause: &Cause| cause.effect == effect.id || cause.equivalents.contains(&effect.id);
+            self.causes.iter().any(of) || self.credible_set.contains(&effect.id)
+        };
+        let words = |effect: &&'static Effect| UserEffect {
+            effect: effect.id.clone(),
+            cause: effect.words.cause.to_owned(),
+            remedy: effect.words.remedy.to_owned(),
+        };
+        self.user_effects = own.iter().filter(is_named).map(words).collect();
+        self
+    }
+}
+
+/// An effect of a user's file, in the file's words.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct UserEffect {
+    /// Its id.
+    pub effect: String,
+    /// What causes it.
+    pub cause: String,
+    /// What to do about it.
+    pub remedy: String,
 }
 
 /// The gap of one channel: root mean squares of block means.

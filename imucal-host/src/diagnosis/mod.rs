@@ -17,14 +17,21 @@ pub use self::{
     finding::{Diagnosis, Verdict},
 };
 use self::{
-    library::candidates::{Candidates, Setting},
+    library::{
+        candidates::{Candidates, Setting},
+        formulas,
+    },
     residual::forward_model::ForwardModel,
     screening::preparation::Preparation,
-    search::stepwise,
+    search::{motion_mismatch, stepwise},
     settings::{Settings, Source},
     verdict::answer::{answer, untestable},
 };
-use crate::{recording::Recording, store::StoredCalibration};
+use crate::{
+    effect::Effect,
+    recording::{Recording, Stream},
+    store::StoredCalibration,
+};
 
 /// What is known before a diagnosis.
 #[derive(Clone, Debug, Default)]
@@ -33,6 +40,10 @@ pub struct Options {
     pub without: Vec<String>,
     /// The simulator's present model of the unit; without it, the baseline is calibrated from the recording.
     pub model: Option<StoredCalibration>,
+    /// A simulator's stream for the recording, on a clock of its own; without it, the recording's own reference.
+    pub stream: Option<Stream>,
+    /// The user's own effects, candidates besides the catalogue's.
+    pub effects: Vec<&'static Effect>,
     /// Settings; without them, the preset of the source of the movement.
     pub settings: Option<Settings>,
 }
@@ -52,8 +63,12 @@ pub fn try_diagnose(
     options: &Options,
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis, DiagnosisError> {
-    let settings = options.settings.clone().unwrap_or_else(|| Settings::preset(Source::of(recording)));
-    let preparation = Preparation::new(recording, options.model.as_ref(), &settings)?;
+    let source = Source::of(recording, options.stream.as_ref());
+    let own =
+        if source == Source::Simulator && options.stream.is_none() { Stream::of(recording) } else { None };
+    let stream = options.stream.as_ref().or(own.as_ref());
+    let settings = options.settings.clone().unwrap_or_else(|| Settings::preset(source));
+    let mut preparation = Preparation::new(recording, stream, options.model.as_ref(), &settings)?;
     let (usable, movement) = (preparation.usable.clone(), &*preparation.movement);
     let mut scene = ForwardModel::new(recording, usable, movement, preparation.triads, &settings);
     if let Some(held) = &preparation.held {
@@ -65,11 +80,25 @@ pub fn try_diagnose(
         thermometer: recording.temperature.is_some(),
         calibrated: &preparation.model.calibrated,
         provided: settings.source,
-        field_known: recording.manifest.site.field_ned_ut.is_some(),
+        // A stream holds the field itself.
+        field_known: recording.manifest.site.field_ned_ut.is_some() || stream.is_some(),
     };
-    let candidates = Candidates::new(&setting, &options.without);
-    let explained = stepwise::search(&scene, &candidates, progress)?;
-    answer(recording, &preparation, &explained, progress)
+    let mut candidates = Candidates::new(&setting, &options.without, &options.effects);
+    let (scene, stretches) = motion_mismatch::left_out(scene, &candidates)?;
+    preparation.findings.extend(motion_mismatch::finding(&stretches));
+    formulas::sift(&scene, &mut candidates)?;
+    let explain = |candidates: &Candidates| {
+        let explained = stepwise::search(&scene, candidates, progress)?;
+        answer(recording, &preparation, &explained, progress)
+    };
+    loop {
+        match explain(&candidates) {
+            // In a shape of the search a user's formula has no value; each such effect is withdrawn once.
+            Err(DiagnosisError::Formula(cause))
+                if candidates.withdraw(&cause.effect, cause.without_row()) => {}
+            diagnosis => return diagnosis.map(|diagnosis| diagnosis.with_words_of(&options.effects)),
+        }
+    }
 }
 
 #[cfg(test)]

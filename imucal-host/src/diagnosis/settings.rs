@@ -6,29 +6,11 @@
 //!
 //! Not here: constants of an algorithm that change no answer, such as the steps of a solver, and shares of distributions.
 
-use crate::recording::{Recording, SensorKind};
+mod presets;
+mod source;
 
-/// Where the movement of a recording comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// Encoders of a rig's gimbals.
-    Rig,
-    /// A reference attitude, as of an optical tracker.
-    Reference,
-    /// The sensor's own rests: a hand, or a turntable without a readout.
-    Rests,
-}
-
-impl Source {
-    /// That of a recording.
-    pub fn of(recording: &Recording) -> Self {
-        match (&recording.gimbal, &recording.reference) {
-            (Some(_), _) => Self::Rig,
-            (None, Some(_)) => Self::Reference,
-            (None, None) => Self::Rests,
-        }
-    }
-}
+pub use self::source::{Provided, Source};
+use crate::recording::SensorKind;
 
 /// Settings of a diagnosis, stage by stage.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,23 +29,6 @@ pub struct Settings {
     pub location: LocationSettings,
     /// What is asserted.
     pub verdict: VerdictSettings,
-}
-
-/// What the source of a movement provides; an effect's needs are compared with it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Provided {
-    /// Angles of three gimbals.
-    pub gimbals: bool,
-    /// Something outside of the sensor turns with it, whose own errors can be distinguished from the sensor's.
-    pub table: bool,
-    /// A clock of its own, whose offset from the sensor's is always fitted.
-    pub clock: bool,
-    /// A place: the sensor is not moved to and fro, or its acceleration would be known.
-    pub position: bool,
-    /// The heading against north.
-    pub heading: bool,
-    /// An attitude without noise or a filter of its own.
-    pub exact_attitude: bool,
 }
 
 /// How residuals are averaged and simulated.
@@ -94,6 +59,10 @@ pub struct ResidualSettings {
     /// Sensors that one effect may alter by way of a movement that is reconstructed from them; those of the effect
     /// otherwise.
     pub coupled: Option<&'static [SensorKind]>,
+    /// Samples count the less the more the machine shakes the sensor, block by block.
+    pub weighs_vibration: bool,
+    /// Stretches in which all sensors agree on a movement that the source does not have are left out and named.
+    pub leaves_out_mismatch: bool,
 }
 
 /// How noise is estimated.
@@ -108,6 +77,11 @@ pub struct NoiseSettings {
     pub sway: &'static [usize],
     /// Groups are compared only where all their blocks hold as many rows: on a rig, one with fewer has just left a rest.
     pub whole_blocks: bool,
+    /// Distance of the instants between which drift goes on a straight line, s. Larger: faster; what changes within it is
+    /// white noise or an effect.
+    pub knots: f64,
+    /// The table does not stand exactly as the source says: rests and movements have pointing errors.
+    pub scatters: bool,
 }
 
 /// Where nonlinear parameters are looked for.
@@ -149,6 +123,11 @@ pub struct SearchSettings {
     pub replaced: usize,
     /// Effects of a sensor tried in pairs.
     pub paired: usize,
+    /// Two effects at once are tried to be taken out: each may stand for a part of the other.
+    pub removes_pairs: bool,
+    /// Before another effect is added, those of a class are tried in each other's place: a clock that is fitted with the wrong
+    /// one calls for effects that undo it.
+    pub settles_classes: bool,
 }
 
 /// Score tests against covariates.
@@ -219,6 +198,8 @@ impl Default for ResidualSettings {
             passage_change: 8.0,
             keeps_sensors_without_rows: true,
             coupled: None,
+            weighs_vibration: false,
+            leaves_out_mismatch: false,
         }
     }
 }
@@ -226,7 +207,14 @@ impl Default for ResidualSettings {
 impl Default for NoiseSettings {
     /// That of a rig.
     fn default() -> Self {
-        Self { least_scatter: 1e-7, longest_stretch: 20.0, sway: &[], whole_blocks: true }
+        Self {
+            least_scatter: 1e-7,
+            longest_stretch: 20.0,
+            sway: &[],
+            whole_blocks: true,
+            knots: 2.5,
+            scatters: true,
+        }
     }
 }
 
@@ -253,6 +241,8 @@ impl Default for SearchSettings {
             behind: 25.0,
             replaced: 5,
             paired: 8,
+            removes_pairs: false,
+            settles_classes: false,
         }
     }
 }
@@ -297,92 +287,6 @@ impl Default for VerdictSettings {
 impl Default for Settings {
     fn default() -> Self {
         Self::preset(Source::Rig)
-    }
-}
-
-impl Settings {
-    /// Those for a source of the movement.
-    pub fn preset(source: Source) -> Self {
-        match source {
-            Source::Rig => Self::rig(),
-            Source::Reference => Self::reference(),
-            Source::Rests => Self::rests(),
-        }
-    }
-
-    /// A rig: its encoders are exact but for errors that the catalogue holds and for pointing errors at each rest.
-    fn rig() -> Self {
-        Self {
-            source: Provided {
-                gimbals: true,
-                table: true,
-                clock: false,
-                position: true,
-                heading: true,
-                exact_attitude: true,
-            },
-            residual: ResidualSettings::default(),
-            noise: NoiseSettings::default(),
-            library: LibrarySettings::default(),
-            search: SearchSettings::default(),
-            location: LocationSettings::default(),
-            verdict: VerdictSettings::default(),
-        }
-    }
-
-    /// A reference attitude: a hand moves the sensor briskly, and the reference has noise, a filter and a clock of its own.
-    fn reference() -> Self {
-        let rig = Self::rig();
-        Self {
-            source: Provided {
-                gimbals: false,
-                table: true,
-                clock: true,
-                position: false,
-                heading: true,
-                exact_attitude: false,
-            },
-            residual: ResidualSettings {
-                moving_points: 0.0175,
-                resting_points: 0.0175,
-                points_in_gaps: false,
-                leaves_out_passages: true,
-                keeps_sensors_without_rows: false,
-                ..rig.residual
-            },
-            noise: NoiseSettings {
-                least_scatter: 1e-5,
-                sway: &[1, 2, 4, 8, 16, 32],
-                whole_blocks: false,
-                ..rig.noise
-            },
-            library: LibrarySettings { places_in_quiet_noise: true, ..rig.library },
-            search: SearchSettings { most: 5, staged_start: true, settling: 2, ..rig.search },
-            verdict: VerdictSettings { confirms_held_out: true, ..rig.verdict },
-            location: rig.location,
-        }
-    }
-
-    /// The sensor's own rests: gravity gives their attitude, and nothing the heading.
-    fn rests() -> Self {
-        let reference = Self::reference();
-        Self {
-            source: Provided {
-                gimbals: false,
-                table: false,
-                clock: false,
-                position: true,
-                heading: false,
-                exact_attitude: true,
-            },
-            residual: ResidualSettings {
-                leaves_out_passages: false,
-                coupled: Some(&SensorKind::ALL),
-                ..reference.residual
-            },
-            verdict: VerdictSettings { counts_faults: false, ..reference.verdict },
-            ..reference
-        }
     }
 }
 

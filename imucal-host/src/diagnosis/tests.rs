@@ -42,7 +42,7 @@ fn with_linear<T>(check: impl FnOnce(Linearisation<'_>) -> T) -> T {
 /// Likewise, and the fit.
 fn with_fit<T>(recording: &Recording, check: impl FnOnce(Linearisation<'_>, &Fit) -> T) -> T {
     let settings = Settings::default();
-    let preparation = Preparation::new(recording, None, &settings).unwrap();
+    let preparation = Preparation::new(recording, None, None, &settings).unwrap();
     let (usable, movement) = (preparation.usable.clone(), &*preparation.movement);
     let scene = ForwardModel::new(recording, usable, movement, preparation.triads, &settings);
     let setting = Setting {
@@ -52,7 +52,7 @@ fn with_fit<T>(recording: &Recording, check: impl FnOnce(Linearisation<'_>, &Fit
         provided: settings.source,
         field_known: true,
     };
-    let candidates = Candidates::new(&setting, &[]);
+    let candidates = Candidates::new(&setting, &[], &[]);
     let doses = candidates
         .baseline
         .iter()
@@ -141,7 +141,7 @@ fn samples_beside_clipped_ones_are_left_out_whatever_their_own_noise() {
     let effect = find("acc.saturation").unwrap();
     simulation.doses.push(Dose { effect, values: vec![full_scale / 9.5 - 1.0] });
     let recording = simulation.record("clipped").unwrap();
-    let preparation = Preparation::new(&recording, None, &Settings::default()).unwrap();
+    let preparation = Preparation::new(&recording, None, None, &Settings::default()).unwrap();
     let (values, usable) =
         (&recording.acc.as_ref().unwrap().values, &preparation.usable[SensorKind::Acc as usize]);
     let clipped: Vec<f64> =

@@ -1,8 +1,15 @@
 //! The sensor's low-pass: `P.bandwidth`.
 //!
 //! ```text
-//! τ ẏ = x − y      exact for an input that is straight between rows
+//! (τ + h) ẏ = x + h ẋ − y      exact for an input that is straight between rows
 //! ```
+//!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | τ | lag of a slow input, s |
+//! | h | half the interval at which the filter is computed, s: to second order of it, y_k = y_{k−1} + (x_k − y_{k−1}) · 2 h / (τ + 2 h) |
+//!
+//! Not modelled: filters of a higher order.
 
 use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, of};
 
@@ -13,7 +20,8 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         needs: "Sinusoids at three or more frequencies, or brisk slews.",
     };
     let tau = Parameter::magnitude("tau", "s", of(kind, 5e-3, 4e-3, 0.016), 0.2);
-    let effect = Effect::member(kind, "bandwidth", Act::Sensor(kind, alter), vec![tau], words)
+    let interval = Parameter::detail("interval", "s", 5e-3);
+    let effect = Effect::member(kind, "bandwidth", Act::Sensor(kind, alter), vec![tau, interval], words)
         .needing(Needs::EXACT_ATTITUDE)
         .like("clk.time_offset", "the other triads: one clock makes all of them late alike");
     match kind {
@@ -26,8 +34,10 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
 }
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {
-    let tau = values.first().copied().unwrap_or(0.0);
-    let (Some(first), true) = (run.output.first().copied(), tau > 0.0) else { return };
+    let value = |at: usize| values.get(at).copied().unwrap_or(0.0);
+    let (lag, half) = (value(0), 0.5 * value(1));
+    let (Some(first), true) = (run.output.first().copied(), lag > 0.0) else { return };
+    let tau = lag + half;
     let (mut state, mut before) = (first, first);
     for row in 1..run.output.len() {
         let ratio = run.since_before(row) / tau;
@@ -37,7 +47,7 @@ fn alter(values: &[f64], run: &mut SensorRun<'_>) {
             state = state * kept + before * (lag - kept) + run.output[row] * (1.0 - lag);
         }
         before = run.output[row];
-        run.output[row] = state;
+        run.output[row] = state + (before - state) * (half / tau);
     }
 }
 
@@ -54,6 +64,32 @@ mod tests {
         let mut output: Vec<Vector3<f64>> = input.iter().map(|row| Vector3::repeat(row.time)).collect();
         alter(&[0.037], &mut SensorRun { input: &input, sensed: &[], output: &mut output });
         assert!((output[399].x - (3.99 - 0.037)).abs() < 1e-9, "{}", output[399].x);
+    }
+
+    #[test]
+    fn a_filter_that_is_computed_row_by_row_is_one_of_that_interval() {
+        let input = Input::empty(4000);
+        let signal = |row: &Input| Vector3::repeat((4.0 * row.time).sin() + 0.5 * (9.0 * row.time).cos());
+        let given: Vec<Vector3<f64>> = input.iter().map(signal).collect();
+        let share = 0.25;
+        let mut computed = given.clone();
+        for row in 1..given.len() {
+            computed[row] = computed[row - 1] + (given[row] - computed[row - 1]) * share;
+        }
+        // share = 0.01 / (lag + 0.01)
+        let off = |values: &[f64]| {
+            let mut output = given.clone();
+            alter(values, &mut SensorRun { input: &input, sensed: &[], output: &mut output });
+            let differences =
+                output.iter().zip(&computed).skip(1000).map(|(one, other)| (one - other).amax());
+            differences.fold(0.0, f64::max)
+        };
+        assert!(
+            off(&[0.03, 0.01]) < 4e-3 && off(&[0.03, 0.0]) > 2e-2,
+            "{} {}",
+            off(&[0.03, 0.01]),
+            off(&[0.03, 0.0])
+        );
     }
 
     #[test]

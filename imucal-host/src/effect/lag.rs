@@ -14,7 +14,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     };
     let lag = Parameter::amplitude("lag", "s", 5e-3);
     Effect::new(&member_id(kind, "lag"), Act::Sensor(kind, alter), vec![lag], words)
-        .part(Part::Nuisance(Free::NoGimbals))
+        .part(Part::Nuisance(Free::ReadApart))
 }
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {

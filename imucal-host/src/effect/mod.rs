@@ -44,6 +44,7 @@ mod level_tilt;
 mod lever_arm;
 mod machine;
 mod misalignment;
+pub mod motion_mismatch;
 mod motor_current;
 mod mounting;
 mod noise_burst;
@@ -66,6 +67,7 @@ mod transient;
 mod triad_entries;
 mod truth;
 mod unit_error;
+pub mod user;
 mod vibration_rectification;
 mod warmup;
 mod wobble;
@@ -113,6 +115,8 @@ pub enum Act {
     Triad(SensorKind, fn(&[f64], &mut Triad<f64>)),
     /// Alters a triad's output.
     Sensor(SensorKind, fn(&[f64], &mut SensorRun<'_>)),
+    /// Adds a user's formula to a triad's output.
+    Formula(SensorKind, &'static user::Formula),
     /// Alters a triad's noise or limit.
     Signal(SensorKind, fn(&[f64], &mut SignalRun<'_>)),
     /// Alters a triad's samples.
@@ -126,7 +130,7 @@ impl Act {
             Self::Rig(_) => Stage::Rig,
             Self::Clock(_) => Stage::Clock,
             Self::Field(_) => Stage::Field,
-            Self::Triad(..) | Self::Sensor(..) => Stage::Sensor,
+            Self::Triad(..) | Self::Sensor(..) | Self::Formula(..) => Stage::Sensor,
             Self::Signal(..) => Stage::Signal,
             Self::Data(..) => Stage::Data,
         }
@@ -169,9 +173,11 @@ impl Effect {
     fn new(id: &str, act: Act, parameters: Vec<Parameter>, words: Words) -> Self {
         let sensors: &'static [SensorKind] = match act {
             Act::Rig(_) | Act::Clock(_) | Act::Field(_) => &SensorKind::ALL,
-            Act::Triad(kind, _) | Act::Sensor(kind, _) | Act::Signal(kind, _) | Act::Data(kind, _) => {
-                only(kind)
-            }
+            Act::Triad(kind, _)
+            | Act::Sensor(kind, _)
+            | Act::Formula(kind, _)
+            | Act::Signal(kind, _)
+            | Act::Data(kind, _) => only(kind),
         };
         Self {
             id: id.to_owned(),
@@ -241,9 +247,17 @@ impl Effect {
         known.filter(|(_, parameter)| parameter.role == Role::Amplitude).map(|(index, _)| index)
     }
 
+    /// Parameters that a fit which holds the effect is linear in: amplitudes and details.
+    pub fn linear(&self) -> impl Iterator<Item = usize> {
+        let known = self.parameters.iter().enumerate();
+        let is_linear = |role: &Role| matches!(role, Role::Amplitude | Role::Detail { .. });
+        known.filter(move |(_, parameter)| is_linear(&parameter.role)).map(|(index, _)| index)
+    }
+
     /// Parameters that say how or when, at these values; an instant that never comes is none.
     pub fn shapes_at<'e>(&'e self, values: &'e [f64]) -> impl Iterator<Item = usize> + 'e {
-        let is_shape = |role: &Role| matches!(role, Role::Shape { .. } | Role::Instant { .. });
+        let is_shape =
+            |role: &Role| matches!(role, Role::Shape { .. } | Role::Detail { .. } | Role::Instant { .. });
         let known = self.parameters.iter().zip(values).enumerate();
         known.filter(move |(_, (p, value))| is_shape(&p.role) && value.is_finite()).map(|(index, _)| index)
     }
@@ -322,6 +336,7 @@ pub static CATALOGUE: LazyLock<Vec<Effect>> = LazyLock::new(|| {
         wobble::effect(),
         time_offset::effect(),
         rate_error::effect(),
+        motion_mismatch::effect(),
         gravity_error::effect(),
         lever_arm::effect(),
         earth_rate::effect(),

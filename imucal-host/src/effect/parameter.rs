@@ -10,6 +10,11 @@ pub enum Role {
         /// Usual value.
         usual: f64,
     },
+    /// How, in a detail that a strong effect alone shows: zero until it is fitted with the amplitudes, and not looked for.
+    Detail {
+        /// Usual value.
+        usual: f64,
+    },
     /// When, as a time of the run.
     Instant {
         /// Usual share of the run, 0 to 1.
@@ -64,6 +69,16 @@ impl Parameter {
         }
     }
 
+    /// A detail from zero to ten times its usual value.
+    pub(super) fn detail(name: &str, unit: &str, usual: f64) -> Self {
+        Self {
+            role: Role::Detail { usual },
+            range: (0.0, 10.0 * usual),
+            material: 0.0,
+            ..Self::amplitude(name, unit, usual)
+        }
+    }
+
     /// A time of the run.
     pub(super) fn instant(name: &str, share: f64) -> Self {
         Self {
@@ -92,7 +107,7 @@ impl Parameter {
     /// Its value in a run of `duration` s where the effect is off.
     pub fn neutral(&self, duration: f64) -> f64 {
         match self.role {
-            Role::Amplitude | Role::Choice => 0.0,
+            Role::Amplitude | Role::Choice | Role::Detail { .. } => 0.0,
             Role::Shape { usual } => usual,
             Role::Instant { share } => share * duration,
         }

@@ -15,6 +15,8 @@ pub enum Part {
     /// The reference's clock: fitted always where no gimbals turn the sensor, since such a reference has a clock of its
     /// own; a candidate on a rig.
     ClockTerm,
+    /// The rate of that clock: fitted always where it is not that of the sensor; a candidate on a rig.
+    ClockRateTerm,
     /// Fitted where nothing else fixes it, and never named as a cause.
     Nuisance(Free),
     /// A fault of the recording itself, which the screening finds.
@@ -24,8 +26,8 @@ pub enum Part {
 /// Where a nuisance is free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Free {
-    /// No gimbals turn the sensor: a chip of its own has no clock in common with a reference.
-    NoGimbals,
+    /// Nothing says that the chip was read when the others were.
+    ReadApart,
     /// No gimbals turn the sensor, and its triad is given.
     NoGimbalsTriadGiven,
     /// The site's field is not given, and an accelerometer shows the vertical.

@@ -1,6 +1,6 @@
 //! The sensor's clock runs fast: `clk.rate_error`.
 
-use super::{Act, Effect, Parameter, Words};
+use super::{Act, Effect, Parameter, Part, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -9,6 +9,7 @@ pub(super) fn effect() -> Effect {
         needs: "Brisk motion at the beginning and again at the end of a long recording.",
     };
     Effect::new("clk.rate_error", Act::Clock(alter), vec![Parameter::amplitude("error", "-", 1e-4)], words)
+        .part(Part::ClockRateTerm)
         .like("clk.time_offset", "brisk motion at the beginning and again at the end")
         .like("gyr.scale", "the encoders at the end of a long motion at constant rate")
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::truth::Input;
+use super::{truth::Input, user::History};
 
 /// A triad's output before noise. Effects with a memory see the whole run.
 #[derive(Debug)]
@@ -33,13 +33,9 @@ impl SensorRun<'_> {
 
     /// Square of the rate of turn at each row, (rad/s)², as what it heats or shakes follows it within `tau`, s.
     pub fn squared_rate_within(&self, tau: f64) -> Vec<f64> {
-        let mut power = 0.0;
-        let follow = |(row, input): (usize, &Input)| {
-            let share = 1.0 - libm::exp(-self.since_before(row) / tau);
-            power += share * (input.w_iq_q.norm_squared() - power);
-            power
-        };
-        self.input.iter().enumerate().map(follow).collect()
+        let times: Vec<f64> = self.input.iter().map(|row| row.time).collect();
+        let squares: Vec<f64> = self.input.iter().map(|row| row.w_iq_q.norm_squared()).collect();
+        History::Lag.of(&times, &squares, tau)
     }
 }
 

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::machine::Swing;
+use crate::recording::SensorKind;
 
 /// The truth at one row, in the table's frame `t`. `C_a_b` takes components from `a` to `b`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +58,10 @@ pub struct Input {
     pub dw_iq_q: Vector3<f64>,
     /// Magnetic field, µT.
     pub b_q: Vector3<f64>,
+    /// True angles of the gimbals, outermost first, rad, not wrapped; zero without gimbals.
+    pub angles: [f64; 3],
+    /// Their rates, rad/s.
+    pub angle_rates: [f64; 3],
 }
 
 impl Input {
@@ -71,6 +76,8 @@ impl Input {
             w_iq_q: zero,
             dw_iq_q: zero,
             b_q: zero,
+            angles: [0.0; 3],
+            angle_rates: [0.0; 3],
         };
         (0..rows).map(row).collect()
     }
@@ -84,6 +91,17 @@ impl Input {
             w_iq_q: truth.w_it_t,
             dw_iq_q: truth.dw_it_t,
             b_q: truth.b_t,
+            angles: truth.gimbals.map(|gimbal| gimbal.angle),
+            angle_rates: truth.gimbals.map(|gimbal| gimbal.rate),
+        }
+    }
+
+    /// What a sensor is given, SI units.
+    pub fn given(&self, kind: SensorKind) -> Vector3<f64> {
+        match kind {
+            SensorKind::Acc => self.f_q,
+            SensorKind::Gyr => self.w_iq_q,
+            SensorKind::Mag => self.b_q,
         }
     }
 

@@ -7,9 +7,6 @@
 
 use super::{Span, process::Process};
 
-/// Distance between knots of observations at instants, s.
-pub const SPACING: f64 = 2.5;
-
 /// Knots in order of time, and rows that count them.
 #[derive(Clone, Debug)]
 pub struct Knots {
@@ -35,18 +32,18 @@ pub(super) struct Row {
 pub(super) type Transition = (f64, f64, usize);
 
 impl Knots {
-    /// Of observations at instants, s, increasing.
-    pub fn at(times: &[f64]) -> Self {
+    /// Of observations at instants, s, increasing, on knots that are `spacing` apart, s.
+    pub fn at(times: &[f64], spacing: f64) -> Self {
         let start = times.first().copied().unwrap_or(0.0);
         let length = times.last().copied().unwrap_or(0.0) - start;
-        let count = ((length / SPACING).ceil() as usize + 1).max(2);
+        let count = ((length / spacing).ceil() as usize + 1).max(2);
         let row = |time: &f64| {
-            let at = (time - start) / SPACING;
+            let at = (time - start) / spacing;
             let knot = (at.floor() as usize).min(count - 2);
             let share = at - knot as f64;
             Row { knot, weights: [1.0 - share, share], more: Vec::new() }
         };
-        Self { distances: vec![(SPACING, count - 1)], count, rows: times.iter().map(row).collect() }
+        Self { distances: vec![(spacing, count - 1)], count, rows: times.iter().map(row).collect() }
     }
 
     /// Of means over spans in time order that do not overlap, of some drifts; one that begins where another ends shares a
@@ -101,7 +98,7 @@ mod tests {
 
     #[test]
     fn an_instant_is_on_the_line_between_its_knots() {
-        let knots = Knots::at(&[1.0, 2.0, 5.0]);
+        let knots = Knots::at(&[1.0, 2.0, 5.0], 2.5);
         let found: Vec<(usize, [f64; 2])> = knots.rows.iter().map(|row| (row.knot, row.weights)).collect();
         assert_eq!((knots.count, found[0], found[1]), (3, (0, [1.0, 0.0]), (0, [0.6, 0.4])));
         assert!((found[2].1[1] - 0.6).abs() < 1e-12 && found[2].0 == 1);

@@ -168,12 +168,15 @@ pub(crate) mod tests {
     use super::{
         super::{
             Span, flicker,
-            knots::{Knots, SPACING},
+            knots::Knots,
             random_effects::{ChannelBlocks, Columns},
             sparse_rows::SparseRows,
         },
         *,
     };
+
+    /// Distance of the knots, s.
+    const SPACING: f64 = 2.5;
 
     /// Anything but one.
     pub const SIGMA: f64 = 0.8;
@@ -205,7 +208,7 @@ pub(crate) mod tests {
         }
 
         pub fn effects(&self, processes: usize) -> Arc<RandomEffects> {
-            Arc::new(RandomEffects::new(Knots::at(&self.times), self.channels.clone(), 2, processes))
+            Arc::new(RandomEffects::new(Knots::at(&self.times, SPACING), self.channels.clone(), 2, processes))
         }
 
         /// Σ by its definition, over the blocks that hold something, and these, channel below channel.

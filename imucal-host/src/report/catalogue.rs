@@ -6,9 +6,9 @@ use crate::{
     recording::SensorKind,
 };
 
-/// All effects, in the order of the chain.
-pub fn catalogue() -> String {
-    let entries: Vec<String> = CATALOGUE.iter().map(entry).collect();
+/// All effects, in the order of the chain, and a user's own.
+pub fn catalogue(own: &[&'static Effect]) -> String {
+    let entries: Vec<String> = CATALOGUE.iter().chain(own.iter().copied()).map(entry).collect();
     entries.join("\n")
 }
 
@@ -28,7 +28,12 @@ pub fn entry(effect: &Effect) -> String {
         text += &hanging("  size:     ", &format!("{}: {}", names.join(", "), sizes(&group[0])));
     }
     for other in &effect.confusables {
-        text += &hanging("  or else:  ", &format!("{}; distinguish by: {}", other.id, other.parted_by));
+        let parted = if other.parted_by.is_empty() {
+            String::new()
+        } else {
+            format!("; distinguish by: {}", other.parted_by)
+        };
+        text += &hanging("  or else:  ", &format!("{}{parted}", other.id));
     }
     text
 }
@@ -60,6 +65,11 @@ fn sizes(parameter: &Parameter) -> String {
             plain(parameter.range.0),
             plain(parameter.range.1)
         ),
+        Role::Detail { usual } => format!(
+            "0 until a strong effect shows it, then about {}{unit}, plausible to {}{unit}",
+            plain(usual),
+            plain(parameter.range.1)
+        ),
         Role::Instant { share } => {
             format!("a time, in simulations at about {:.0} % of the run", 100.0 * share)
         }
@@ -74,7 +84,7 @@ mod tests {
 
     #[test]
     fn every_effect_is_printed_with_its_parameters_and_all_that_is_said_of_it() {
-        let text = catalogue();
+        let text = catalogue(&[]);
         let ids: Vec<&str> = text.lines().filter(|line| !line.is_empty() && !line.starts_with(' ')).collect();
         let expected: Vec<&str> = CATALOGUE.iter().map(|effect| effect.id.as_str()).collect();
         assert_eq!(ids, expected);

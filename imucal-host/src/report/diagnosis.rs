@@ -155,11 +155,14 @@ fn write_causes(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
         text.push_str(&hanging("  ", &format!("probability {certain}; {share}{material}")));
         let amounts: Vec<String> = cause.parameters.iter().map(amount).collect();
         text.push_str(&hanging("  how much:  ", &amounts.join("; ")));
-        if let Some(effect) = effect::find(&cause.effect) {
-            text.push_str(&hanging("  what:      ", effect.words.cause));
-            text.push_str(&hanging("  to do:     ", effect.words.remedy));
-            write_equivalents(text, effect, cause);
+        let known = effect::find(&cause.effect);
+        let own = diagnosis.user_effects.iter().find(|own| own.effect == cause.effect);
+        let words = known.map(|effect| (effect.words.cause, effect.words.remedy));
+        if let Some((what, remedy)) = words.or_else(|| own.map(|own| (&*own.cause, &*own.remedy))) {
+            text.push_str(&hanging("  what:      ", what));
+            text.push_str(&hanging("  to do:     ", remedy));
         }
+        write_equivalents(text, known, cause);
     }
     let asserted = |id: &String| diagnosis.causes.iter().any(|cause| cause.effect == **id);
     let others: Vec<&str> =
@@ -170,9 +173,10 @@ fn write_causes(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
     Ok(())
 }
 
-fn write_equivalents(text: &mut String, effect: &Effect, cause: &Cause) {
+fn write_equivalents(text: &mut String, effect: Option<&Effect>, cause: &Cause) {
     for other in &cause.equivalents {
-        let parted = effect.confusables.iter().find(|confusable| confusable.id == *other);
+        let confusables = effect.map(|effect| &*effect.confusables).unwrap_or_default();
+        let parted = confusables.iter().find(|confusable| confusable.id == *other);
         let parted = parted.map_or(String::new(), |known| format!("; distinguish by: {}", known.parted_by));
         text.push_str(&hanging("  or else:   ", &format!("{other}{parted}")));
     }

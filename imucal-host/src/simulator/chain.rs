@@ -4,7 +4,7 @@ use imucal_core::triad::Triad;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::{dose::Dose, recent::Recent, truth::Motion};
+use super::{dose::Dose, error::OutputError, recent::Recent, truth::Motion};
 use crate::{
     effect::{Act, CATALOGUE, DataRun, Effect, Input, Machine, SensorRun, SignalRun, Truth},
     recording::SensorKind,
@@ -20,7 +20,6 @@ impl<'a> Chain<'a> {
     /// A chain with these effects, given in any order. Of two doses of one effect, both act.
     pub fn new(doses: &'a [Dose]) -> Self {
         let mut active: Vec<&Dose> = doses.iter().filter(|dose| !dose.effect.is_off(&dose.values)).collect();
-        let place = |effect: &Effect| CATALOGUE.iter().position(|entry| entry.id == effect.id);
         active.sort_by_key(|dose| place(dose.effect));
         Self { doses: active }
     }
@@ -58,8 +57,17 @@ impl<'a> Chain<'a> {
         row
     }
 
-    /// A triad's output without noise, SI units: K v + b, and what effects make of it. `None` where K is singular.
-    pub fn output(&self, kind: SensorKind, triad: &Triad<f64>, input: &[Input]) -> Option<Vec<Vector3<f64>>> {
+    /// A triad's output without noise, SI units: K v + b, and what effects make of it.
+    ///
+    /// # Errors
+    ///
+    /// [`OutputError`], where K is singular or a user's formula has no value.
+    pub fn output(
+        &self,
+        kind: SensorKind,
+        triad: &Triad<f64>,
+        input: &[Input],
+    ) -> Result<Vec<Vector3<f64>>, OutputError> {
         let mut triad = *triad;
         for dose in &self.doses {
             if let Act::Triad(of, alter) = dose.effect.act
@@ -68,23 +76,18 @@ impl<'a> Chain<'a> {
                 alter(&dose.values, &mut triad);
             }
         }
-        let given = |row: &Input| match kind {
-            SensorKind::Acc => row.f_q,
-            SensorKind::Gyr => row.w_iq_q,
-            SensorKind::Mag => row.b_q,
-        };
-        let k = triad.sensitivity()?;
-        let sensed: Vec<_> = input.iter().map(|row| k * given(row)).collect();
+        let k = triad.sensitivity().ok_or(OutputError::Singular { sensor: kind })?;
+        let sensed: Vec<_> = input.iter().map(|row| k * row.given(kind)).collect();
         let mut output: Vec<_> = sensed.iter().map(|sensed| sensed + triad.bias).collect();
         let mut run = SensorRun { input, sensed: &sensed, output: &mut output };
         for dose in &self.doses {
-            if let Act::Sensor(of, alter) = dose.effect.act
-                && of == kind
-            {
-                alter(&dose.values, &mut run);
+            match dose.effect.act {
+                Act::Sensor(of, alter) if of == kind => alter(&dose.values, &mut run),
+                Act::Formula(of, formula) if of == kind => formula.add(&dose.values, &mut run)?,
+                _ => {}
             }
         }
-        Some(output)
+        Ok(output)
     }
 
     /// Noise and limit of a triad on the way to its converter.
@@ -108,5 +111,14 @@ impl<'a> Chain<'a> {
                 alter(&dose.values, &mut run);
             }
         }
+    }
+}
+
+/// Where an effect stands in the chain: a user's formula comes before the sensor's low-pass, which filters it too.
+fn place(effect: &Effect) -> (Option<usize>, bool) {
+    let of = |id: &str| CATALOGUE.iter().position(|entry| entry.id == id);
+    match effect.act {
+        Act::Formula(..) => (of("acc.bandwidth"), false),
+        _ => (of(&effect.id), true),
     }
 }

@@ -17,7 +17,7 @@ impl Dose {
     ///
     /// - A single amplitude is size × prior scale; one that cannot be negative takes the size without its sign.
     /// - Several amplitudes point in a direction drawn from the seed, their root mean square size × prior scale.
-    /// - A shape is drawn from 0.7 to 1.4 of its usual value, an instant within 5 % of the run about its usual one.
+    /// - A shape is drawn from 0.7 to 1.4 of its usual value, a detail is zero, an instant within 5 % of the run about its usual one.
     /// - A choice is the size itself, rounded.
     ///
     /// All stay within their plausible range. The draw depends on seed and id alone, not on other effects.
@@ -34,6 +34,7 @@ impl Dose {
             let value = match parameter.role {
                 Role::Amplitude => amplitude(parameter, size, direction.next().unwrap_or(1.0)),
                 Role::Choice => size.round(),
+                Role::Detail { .. } => 0.0,
                 Role::Shape { usual } => usual * random.between(0.7, 1.4),
                 Role::Instant { share } => duration * (share + random.between(-0.05, 0.05)),
             };

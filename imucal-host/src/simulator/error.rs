@@ -1,6 +1,20 @@
 //! Why there is no simulation.
 
-use crate::recording::SensorKind;
+use crate::{effect::user::NotFinite, recording::SensorKind};
+
+/// A triad's output that cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)] // The fields are those of each message.
+pub enum OutputError {
+    /// An effect that leaves no sensor.
+    #[error(
+        "{sensor}: its axes do not span space any more, expected independent ones; reduce the size of the effect"
+    )]
+    Singular { sensor: SensorKind },
+    /// A user's formula without a value.
+    #[error(transparent)]
+    NotFinite(#[from] NotFinite),
+}
 
 /// A simulation that cannot be; its text says what was found, what was expected and what to do.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -18,9 +32,7 @@ pub enum SimulationError {
     /// No such sampling rate.
     #[error("the sampling rate is {found} Hz, expected 10 to 1000 Hz; choose another")]
     Rate { found: f64 },
-    /// An effect that leaves no sensor.
-    #[error(
-        "{sensor}: its axes do not span space any more, expected independent ones; reduce the size of the effect"
-    )]
-    Singular { sensor: SensorKind },
+    /// Of a sensor's output.
+    #[error(transparent)]
+    Output(#[from] OutputError),
 }

@@ -116,7 +116,7 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// As [`Self::schedule`], and [`SimulationError::Singular`] for an effect beyond reason.
+    /// As [`Self::schedule`], and [`SimulationError::Output`] for an effect beyond reason.
     pub fn record(&self, name: &str) -> Result<Recording, SimulationError> {
         let schedule = self.schedule()?;
         let unit = self.unit_under_test();
@@ -130,8 +130,7 @@ impl Simulation {
         let mut recording = Recording::new(name, manifest.clone(), time);
         for kind in SensorKind::ALL {
             let triad = unit.triad(kind);
-            let clean =
-                chain.output(kind, &triad.triad, &input).ok_or(SimulationError::Singular { sensor: kind })?;
+            let clean = chain.output(kind, &triad.triad, &input)?;
             let chance =
                 self.noise.then(|| Chance { random: &mut random, interval: 1.0 / self.rate, shaken: &[] });
             let samples = converter::samples(kind, triad, &chain, clean, &recording.time, chance);

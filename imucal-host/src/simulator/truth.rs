@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     effect::{Machine, Swing, Truth},
-    recording::manifest::Rig,
+    recording::{SensorKind, manifest::Rig},
 };
 
 /// A movement: a source of truth.
@@ -31,6 +31,11 @@ pub trait Motion: Sync {
         None
     }
 
+    /// Whether it says what a sensor of a kind is given.
+    fn gives(&self, _kind: SensorKind) -> bool {
+        true
+    }
+
     /// What turns the sensor.
     fn rig(&self) -> Rig;
 
@@ -48,6 +53,11 @@ pub trait Recorded: Motion {
 
     /// Swings of the gimbals at each row, outermost first, those of [`steady`](Self::steady); `None` without gimbals.
     fn swings(&self) -> Option<&[[Swing; 3]]> {
+        None
+    }
+
+    /// Speed at each row, m/s; `None` where it is not known.
+    fn speeds(&self) -> Option<&[f64]> {
         None
     }
 

@@ -21,7 +21,7 @@ use crate::{
     blind::lambda::{Signal, difference},
     recording::SensorKind,
     simulator::{
-        Dose, SimulationError,
+        Dose, OutputError, SimulationError,
         robot::{RobotScene, mismatch::MismatchKind},
         unit::Drift,
     },
@@ -279,7 +279,7 @@ fn metrics(scene: &RobotScene, blocks: usize) -> Result<[Metric; 3], SimulationE
         };
         let variances: Vec<f64> = efforts.iter().map(variance).collect();
         Metric::new(&variances, &triad.drift, blocks as f64 * length)
-            .ok_or(SimulationError::Singular { sensor: kind })
+            .ok_or(SimulationError::Output(OutputError::Singular { sensor: kind }))
     };
     Ok([of(SensorKind::Acc)?, of(SensorKind::Gyr)?, of(SensorKind::Mag)?])
 }

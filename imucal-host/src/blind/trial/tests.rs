@@ -19,6 +19,7 @@ fn nothing(recording: &Recording) -> Diagnosis {
         held_out: false,
         absent: Vec::new(),
         not_testable: Vec::new(),
+        user_effects: Vec::new(),
         next_experiment: Vec::new(),
     }
 }

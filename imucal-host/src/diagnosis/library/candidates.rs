@@ -17,7 +17,9 @@ pub struct Candidates {
     /// Those among them that were taken out of the baseline: every sensor has them, and they are no noise.
     pub taken_out: Vec<&'static Effect>,
     /// Effects that the recording cannot show, and why.
-    pub untestable: Vec<(&'static Effect, &'static str)>,
+    pub untestable: Vec<(&'static Effect, String)>,
+    /// Effects of a user that do here what one among `effects` does, which stands for them: that one first.
+    pub same: Vec<(&'static Effect, &'static Effect)>,
 }
 
 /// What a recording is diagnosed with.
@@ -41,8 +43,9 @@ impl Setting<'_> {
         let is_there = |shown_by: &[SensorKind]| shown_by.iter().any(|kind| self.kinds.contains(kind));
         match effect.part {
             Part::TriadTerm => is_there(effect.sensors),
-            Part::RigTerm(shown_by) => is_there(shown_by),
+            Part::RigTerm(shown_by) => self.provided.base && is_there(shown_by),
             Part::ClockTerm => self.provided.clock,
+            Part::ClockRateTerm => self.provided.clock_rate,
             Part::Candidate | Part::Nuisance(_) | Part::Fault(_) => false,
         }
     }
@@ -59,7 +62,7 @@ impl Setting<'_> {
     fn is_free(&self, nuisance: &Effect) -> bool {
         let Part::Nuisance(free) = nuisance.part else { return false };
         match free {
-            Free::NoGimbals => !self.provided.gimbals,
+            Free::ReadApart => self.provided.lags,
             Free::NoGimbalsTriadGiven => !self.provided.gimbals && self.gives(nuisance),
             // Without the vertical, the levelling tilts stand for the dip.
             Free::FieldUnknown => !self.field_known && self.kinds.contains(&SensorKind::Acc),
@@ -74,6 +77,9 @@ impl Setting<'_> {
         match effect.act {
             Act::Rig(_) if !provided.table => {
                 return Some("there is no rig: gravity itself gives the attitude of each rest");
+            }
+            Act::Rig(_) if !provided.base => {
+                return Some("there is no rig: the simulator gives what is sensed in the sensor's own axes");
             }
             Act::Clock(_) if !provided.table => return Some("there is no clock but the sensors' own"),
             _ => {}
@@ -99,21 +105,31 @@ impl Setting<'_> {
 
 impl Candidates {
     /// In a setting; `without` names catalogue entries to be withheld and terms to be taken out of the baseline, which
-    /// then are candidates. Terms of triads that are given are candidates too.
-    pub fn new(setting: &Setting<'_>, without: &[String]) -> Self {
+    /// then are candidates. Terms of triads that are given are candidates too, and so are the user's `own` effects, of
+    /// one id the first.
+    pub fn new(setting: &Setting<'_>, without: &[String], own: &[&'static Effect]) -> Self {
         let named = |effect: &Effect| without.contains(&effect.id);
         let reached = |effect: &&Effect| effect.sensors.iter().any(|sensor| setting.kinds.contains(sensor));
         let is_found = |effect: &&Effect| effect.spoils().is_none() && reached(effect);
+        let is_new = |(at, effect): &(usize, &&'static Effect)| {
+            CATALOGUE.iter().chain(own[..*at].iter().copied()).all(|other| other.id != effect.id)
+        };
+        let own = own.iter().enumerate().filter(is_new).map(|(_, effect)| *effect);
         let (mut baseline, others): (Vec<_>, Vec<_>) =
-            CATALOGUE.iter().filter(is_found).partition(|effect| {
+            CATALOGUE.iter().chain(own).filter(is_found).partition(|effect| {
                 setting.is_term(effect)
                     && !named(effect)
                     && !setting.is_given(effect)
                     && setting.cannot_show(effect).is_none()
             });
         baseline.extend(NUISANCES.iter().filter(|effect| reached(effect) && setting.is_free(effect)));
-        let mut candidates =
-            Self { baseline, effects: Vec::new(), taken_out: Vec::new(), untestable: Vec::new() };
+        let mut candidates = Self {
+            baseline,
+            effects: Vec::new(),
+            taken_out: Vec::new(),
+            untestable: Vec::new(),
+            same: Vec::new(),
+        };
         for effect in others.into_iter().filter(|effect| setting.is_term(effect) || !named(effect)) {
             // What is fixed to a calibrated sensor is iron, and the triad's terms would be the same by another name.
             let is_iron = effect.part == Part::TriadTerm && effect.sensors == [SensorKind::Mag];
@@ -121,7 +137,7 @@ impl Candidates {
                 continue;
             }
             match setting.cannot_show(effect) {
-                Some(why) => candidates.untestable.push((effect, why)),
+                Some(why) => candidates.untestable.push((effect, why.to_owned())),
                 None => {
                     candidates.effects.push(effect);
                     candidates.taken_out.extend(named(effect).then_some(effect));
@@ -129,6 +145,17 @@ impl Candidates {
             }
         }
         candidates
+    }
+
+    /// Takes an effect out, since the recording cannot show it; whether it was a candidate.
+    pub fn withdraw(&mut self, id: &str, why: String) -> bool {
+        let at = self.effects.iter().position(|effect| effect.id == id);
+        at.map(|at| self.untestable.push((self.effects.remove(at), why))).is_some()
+    }
+
+    /// Effects of a user that another stands for.
+    pub fn same_as(&self, effect: &Effect) -> impl Iterator<Item = &'static Effect> {
+        self.same.iter().filter(move |(held, _)| *held == effect).map(|(_, other)| *other)
     }
 
     /// Whether an effect is fitted always.

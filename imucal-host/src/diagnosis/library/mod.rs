@@ -7,6 +7,7 @@
 //! | file | what |
 //! | --- | --- |
 //! | [`candidates`] | which effects are baseline, which are candidates, and which cannot be tested and why |
+//! | [`formulas`] | a user's effects that have a value all over the recording, of those that are the same here one |
 //! | [`nonlinear`] | signatures over a grid of nonlinear parameters |
 //! | [`grid_posterior`] | the likelihood over that grid and its Occam factor |
 //! | [`grid`] | the grid for every candidate of a fit |
@@ -18,6 +19,7 @@
 
 pub mod candidates;
 pub mod evidence;
+pub mod formulas;
 pub mod grid;
 pub mod grid_posterior;
 pub mod nonlinear;

@@ -18,7 +18,7 @@ use crate::{
         },
         residual::{base_run::Reference, forward_model::ForwardModel},
     },
-    effect::{Effect, Role},
+    effect::{Act, Effect, Parameter, Role},
 };
 
 /// About the best instants, a menu this many times as dense.
@@ -30,6 +30,9 @@ const DURATIONS: [f64; 3] = [0.6, 1.0, 1.7];
 const DENSER: f64 = 2.0;
 /// A duration is between a usual one divided by this and times it two times of three.
 const WITHIN: f64 = 2.0;
+/// Values of a formula's shape are so far apart, as a factor, and at most so many.
+const FACTOR: f64 = 2.0;
+const MOST_STEPS: f64 = 8.0;
 /// Signatures judged at once.
 const BATCH: usize = 12;
 
@@ -78,8 +81,12 @@ pub fn best(
     Ok(GridPosterior { values, spread })
 }
 
-/// ln of a shape's prior, but for a constant: durations are lognormal, all else is as likely here as there.
+/// ln of a shape's prior, but for a constant: durations are lognormal, all else is as likely here as there, and so are
+/// the shapes of a user's formula within their range.
 fn prior(effect: &Effect, shape: &[f64]) -> f64 {
+    if is_formula(effect) {
+        return 0.0;
+    }
     let durations = effect.parameters.iter().zip(shape).filter(|(parameter, _)| parameter.range.0 >= 0.0);
     let squares = durations.filter_map(|(parameter, value)| match parameter.role {
         Role::Shape { usual } => Some(((value / usual).ln() / WITHIN.ln()).powi(2)),
@@ -120,6 +127,34 @@ fn instants(about: f64, scene: &ForwardModel<'_>) -> Vec<f64> {
 fn grid(scene: &ForwardModel<'_>) -> f64 {
     let (least, share) = scene.settings.library.grid;
     least.max(share * scene.duration())
+}
+
+fn is_formula(effect: &Effect) -> bool {
+    matches!(effect.act, Act::Formula(..))
+}
+
+/// Values of a formula's shape over its range and its usual one: by factors where all are positive, else evenly.
+fn over_range(parameter: &Parameter, usual: f64) -> Vec<f64> {
+    let (low, high) = parameter.range;
+    let mut values: Vec<f64> = if low > 0.0 {
+        let steps = (libm::log(high / low) / libm::log(FACTOR)).ceil().clamp(2.0, MOST_STEPS);
+        (0..=steps as usize).map(|k| low * libm::pow(high / low, k as f64 / steps)).collect()
+    } else {
+        (0..=MOST_STEPS as usize).map(|k| low + (high - low) * k as f64 / MOST_STEPS).collect()
+    };
+    values.push(usual);
+    values.iter_mut().for_each(|value| *value = value.clamp(low, high));
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    values
+}
+
+/// A first step of the search for a better value of a shape.
+fn stride(effect: &Effect, parameter: &Parameter, usual: f64, value: f64) -> f64 {
+    match parameter.range {
+        (low, high) if low < 0.0 && is_formula(effect) => 0.5 * (high - low) / MOST_STEPS,
+        (low, _) => 0.5 * if low < 0.0 { usual.abs() } else { value.abs() },
+    }
 }
 
 fn is_timed(effect: &Effect) -> bool {
@@ -178,7 +213,8 @@ fn menu(effect: &Effect, scene: &ForwardModel<'_>) -> Vec<Vec<f64>> {
     let mut menu = vec![effect.neutral(duration)];
     let either: Vec<usize> = (0..effect.parameters.len())
         .filter(|at| {
-            matches!(effect.parameters[*at].role, Role::Shape { .. }) && effect.parameters[*at].range.0 < 0.0
+            let parameter = &effect.parameters[*at];
+            matches!(parameter.role, Role::Shape { .. }) && parameter.range.0 < 0.0 && !is_formula(effect)
         })
         .collect();
     if !either.is_empty() {
@@ -194,6 +230,7 @@ fn menu(effect: &Effect, scene: &ForwardModel<'_>) -> Vec<Vec<f64>> {
     }
     for (at, parameter) in effect.parameters.iter().enumerate() {
         menu = match parameter.role {
+            Role::Shape { usual } if is_formula(effect) => vary(&menu, at, &over_range(parameter, usual)),
             Role::Shape { usual } if parameter.range.0 >= 0.0 => {
                 // What is placed in time as well is scanned broadly and refined afterwards.
                 let factors: &[f64] = if is_timed(effect) { &BROAD } else { &[0.2, 0.5, 1.0, 2.0, 5.0] };
@@ -309,7 +346,7 @@ pub fn refine(
         .zip(start)
         .map(|(parameter, value)| match parameter.role {
             Role::Instant { .. } if value.is_finite() => 0.5 * grid(backdrop.scene),
-            Role::Shape { usual } => 0.5 * if parameter.range.0 < 0.0 { usual.abs() } else { value.abs() },
+            Role::Shape { usual } => stride(effect, parameter, usual, *value),
             _ => 0.0,
         })
         .collect();

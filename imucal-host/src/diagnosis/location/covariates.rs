@@ -40,6 +40,11 @@ pub fn drivers(scene: &ForwardModel<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<
         }
         None => attitude_covariates::drivers(&scene.plain(), &scene.kinds),
     };
+    if let Some(speeds) = scene.speeds() {
+        let square = speeds.iter().map(|speed| speed * speed).collect();
+        let functions = vec![Function::new("linear", speeds), Function::new("quadratic", square)];
+        drivers.push(Covariate { name: "speed".into(), functions });
+    }
     let duration = scene.duration().max(1.0);
     let wave = |order: usize| {
         let values = scene.blocks.iter().map(|b| libm::cos(PI * order as f64 * b.time / duration)).collect();

@@ -188,7 +188,12 @@ impl<'s> Weighing<'s> {
             ChannelBlocks { weights: self.weights(channel, noise, &|_| true), offsets: offsets(channel) }
         };
         let rows = channels.iter().map(rows).collect();
-        let effects = Arc::new(RandomEffects::new(Knots::at(&self.times), rows, count, DRIFTS));
+        let effects = Arc::new(RandomEffects::new(
+            Knots::at(&self.times, self.scene.settings.noise.knots),
+            rows,
+            count,
+            DRIFTS,
+        ));
         ChannelGroup { channels, effects }
     }
 
@@ -205,7 +210,8 @@ impl<'s> Weighing<'s> {
     /// Variance of a block's mean by noise alone.
     pub fn variance(&self, channel: &Channel, noise: &Noise, block: usize) -> f64 {
         let sensor = &noise.sensors[channel.kind as usize];
-        let count = self.scene.counts[channel.kind as usize][block].max(1) as f64;
+        let count = self.scene.worth(channel.kind, block);
+        let count = if count > 0.0 { count } else { 1.0 };
         let rest = self.scene.blocks[block].rest.is_some();
         let white = if rest { sensor.white } else { sensor.moving }[channel.axis];
         let scatter = sensor.scatter * sensor.scatter * self.scattered(channel).variance(block);
@@ -226,18 +232,22 @@ impl<'s> Weighing<'s> {
     ) -> RandomEffects {
         let weights = self.weights(channel, noise, inside);
         let (count, offsets) = self.scattered(channel).offsets();
-        RandomEffects::new(Knots::at(&self.times), vec![ChannelBlocks { weights, offsets }], count, DRIFTS)
+        RandomEffects::new(
+            Knots::at(&self.times, self.scene.settings.noise.knots),
+            vec![ChannelBlocks { weights, offsets }],
+            count,
+            DRIFTS,
+        )
     }
 
     fn weights(&self, channel: &Channel, noise: &Noise, inside: &(dyn Fn(usize) -> bool + Sync)) -> Vec<f64> {
         let sensor = &noise.sensors[channel.kind as usize];
-        let counts = &self.scene.counts[channel.kind as usize];
-        let weight = |(at, (block, count)): (usize, (&Block, &usize))| {
+        let weight = |(at, block): (usize, &Block)| {
             let sigma = if block.rest.is_some() { sensor.white } else { sensor.moving }[channel.axis];
             let measured = inside(at) && self.scene.measures(channel.kind, at, channel.axis);
-            if measured { *count as f64 / (sigma * sigma) } else { 0.0 }
+            if measured { self.scene.worth(channel.kind, at) / (sigma * sigma) } else { 0.0 }
         };
-        self.scene.blocks.iter().zip(counts).enumerate().map(weight).collect()
+        self.scene.blocks.iter().enumerate().map(weight).collect()
     }
 
     /// The noise of a sensor under which its residual, less `columns`, is likeliest; the search begins at `start`, by
@@ -275,9 +285,10 @@ impl<'s> Weighing<'s> {
         SensorNoise { breadth, ..best }
     }
 
-    /// Standard deviations of a sensor that are searched; a gyroscope does not see how the table stands.
+    /// Standard deviations of a sensor that are searched; a gyroscope does not see how the table stands, nor has a stream a
+    /// table.
     fn coordinates(&self, kind: SensorKind) -> std::ops::Range<usize> {
-        0..if kind == SensorKind::Gyr { 2 } else { 3 }
+        0..if kind == SensorKind::Gyr || !self.scene.settings.noise.scatters { 2 } else { 3 }
     }
 
     /// Standard deviations changed one by one while `objective` falls, and its end.

@@ -43,7 +43,7 @@ impl PointingErrors<'_> {
     /// for each gimbal and stretch of a movement.
     pub fn offsets(&self) -> (usize, SparseRows) {
         let blocks = &self.scene.blocks;
-        if self.kind == SensorKind::Gyr {
+        if self.kind == SensorKind::Gyr || !self.scene.settings.noise.scatters {
             return (0, SparseRows::empty(blocks.len()));
         }
         let (mut count, mut rows) = (0, SparseRows::default());
@@ -71,7 +71,7 @@ impl PointingErrors<'_> {
 
     /// Variance that a scatter of 1 rad gives a block.
     pub fn variance(&self, block: usize) -> f64 {
-        if self.kind == SensorKind::Gyr {
+        if self.kind == SensorKind::Gyr || !self.scene.settings.noise.scatters {
             return 0.0;
         }
         self.courses(block..block + 1).iter().map(|course| course[0] * course[0]).sum()

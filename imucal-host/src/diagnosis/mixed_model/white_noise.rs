@@ -20,8 +20,10 @@ impl Weighing<'_> {
     pub fn white(&self, residual: &Means) -> Noise {
         let scatter = 100.0 * self.least_scatter();
         let sensors = SensorKind::ALL.map(|kind| {
-            let white = self.still(kind, residual);
-            let moving = self.moving(kind, residual, &white);
+            let still = self.still(kind, residual);
+            let moving = self.moving(kind, residual, &still);
+            // Without a rest nothing is known of it, and nothing is asked.
+            let white = if still.iter().all(|sigma| *sigma > f64::MIN_POSITIVE) { still } else { moving };
             let typical = white.iter().fold(0.0f64, |a, b| a.max(*b));
             let drift = [0.05 * typical, 0.1 * typical];
             SensorNoise { white, moving, drift, slow: USUAL, scatter, breadth: 0.0 }
@@ -97,7 +99,7 @@ impl Weighing<'_> {
             let group = |which: usize| {
                 let blocks = from + which * length..from + (which + 1) * length;
                 blocks.fold((Vector3::zeros(), 0.0), |(sum, count), k| {
-                    let n = counts[k] as f64;
+                    let n = self.scene.worth(kind, k);
                     (sum + values[k] * n, count + n)
                 })
             };

@@ -2,17 +2,18 @@
 //!
 //! | goes in | comes out |
 //! | --- | --- |
-//! | a recording with encoders (`gimbal_*`), a reference attitude (`ref_q*`) or neither; a calibration made elsewhere | a movement that gives the truth at any instant; the triads that the simulator starts from, with their standard errors |
+//! | a recording with encoders (`gimbal_*`), a reference attitude (`ref_q*`), a simulator's stream (`sim_*`) or none of them; a calibration made elsewhere | a movement that gives the truth at any instant; the triads that the simulator starts from, with their standard errors |
 //!
 //! | file | what |
 //! | --- | --- |
 //! | [`model`] | the simulator's present model of the unit: a stored calibration as triads in SI |
-//! | [`movement`] | which of the three movements a recording has, and its place on Earth |
+//! | [`movement`] | which of the movements a recording has, and its place on Earth |
 //! | [`rest_to_rest`] | a movement reconstructed from the sensor's own rests and turns (this runs a whole calibration) |
+//! | [`stream`] | the movement of a simulator's stream, and what is wrong with one that gives none |
+//! | [`stream_clock`] | its clock against that of the sensor, roughly |
 //! | [`revisits`] | whether attitudes are held more than once, without which repeatability cannot be estimated |
 //!
-//! Encoders are replayed and reference attitudes differentiated by `simulator`. A further reference, such as a simulator's
-//! own stream, is one more arm of [`movement::reference`].
+//! Encoders are replayed, reference attitudes differentiated and streams interpolated by `simulator`.
 //!
 //! Not done here: a reference attitude holds no linear acceleration; its clock is put right in `screening`.
 
@@ -20,3 +21,5 @@ pub mod model;
 pub mod movement;
 pub mod rest_to_rest;
 pub mod revisits;
+pub mod stream;
+pub mod stream_clock;

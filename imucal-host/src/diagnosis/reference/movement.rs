@@ -1,15 +1,16 @@
-//! What an ideal sensor would have been through: the movement of a rig's encoders, of a reference attitude, or of the
-//! sensor's own rests.
+//! What an ideal sensor would have been through: the movement of a rig's encoders, of a reference attitude, of a
+//! simulator's stream, or of the sensor's own rests.
 
 use nalgebra::Vector3;
 
-use super::{model::Model, rest_to_rest::RestToRest};
+use super::{model::Model, rest_to_rest::RestToRest, stream};
 use crate::{
     observe::{motion, motion::Attitudes},
     recording::{
-        Recording, SensorKind, check::integrity::Integrity, manifest::Axis, median, unit::STANDARD_GRAVITY,
+        Recording, SensorKind, Stream, check::integrity::Integrity, manifest::Axis, median,
+        unit::STANDARD_GRAVITY,
     },
-    simulator::{Place, Recorded, Replay, Tracked},
+    simulator::{Place, Recorded, Replay, StreamClock, Tracked},
 };
 
 /// Recordings are at least this long, s.
@@ -33,10 +34,12 @@ pub struct Reference {
     pub movement: Box<dyn Recorded>,
     /// The rests that it is reconstructed from, where neither encoders nor a reference attitude were recorded.
     pub held: Option<RestToRest>,
+    /// What a reader ought to know of it.
+    pub remarks: Vec<String>,
 }
 
-/// The movement of a recording; a reference attitude is moved by `offset`, s: the row of t then shows the movement of
-/// t + offset.
+/// The movement of a recording, of `stream` where a simulator gives one; a reference attitude and a stream are read by
+/// `clock`.
 ///
 /// # Errors
 ///
@@ -45,7 +48,8 @@ pub fn reference(
     recording: &Recording,
     integrity: &Integrity,
     model: &Model,
-    offset: f64,
+    stream: Option<&Stream>,
+    clock: StreamClock,
 ) -> Result<Reference, String> {
     let site = &recording.manifest.site;
     let place = Place {
@@ -55,9 +59,15 @@ pub fn reference(
         field_n: site.field_ned_ut.unwrap_or_default().into(),
     };
     let temperature = recording.temperature.clone().unwrap_or_else(|| vec![25.0; recording.rows()]);
-    let mut held = None;
-    let movement: Box<dyn Recorded> = match (recording.gimbal.as_deref(), recording.reference.as_deref()) {
-        (Some(gimbal), _) => {
+    let (mut held, mut remarks) = (None, Vec::new());
+    let sources = (stream, recording.gimbal.as_deref(), recording.reference.as_deref());
+    let movement: Box<dyn Recorded> = match sources {
+        (Some(stream), ..) => {
+            let given = stream::movement(recording, stream, clock, temperature, place)?;
+            remarks = given.remarks;
+            Box::new(given.movement)
+        }
+        (None, Some(gimbal), _) => {
             let axes = axes(recording)?;
             if recording.mag.is_some() && site.field_ned_ut.is_none() {
                 return Err(
@@ -68,7 +78,7 @@ pub fn reference(
             let replay = Replay::new(&recording.time, gimbal, temperature, axes, place);
             Box::new(replay.ok_or("no row has a reading of all three encoders")?)
         }
-        (None, Some(reference)) => {
+        (None, None, Some(reference)) => {
             let attitudes = motion::of_reference(reference);
             let tracked = |attitudes: &Attitudes| {
                 let mut place = place;
@@ -78,12 +88,12 @@ pub fn reference(
                 let tracked = Tracked::new(&recording.time, attitudes, temperature.clone(), place);
                 tracked.ok_or("no row has a reference attitude")
             };
-            Box::new(match offset {
+            Box::new(match clock.offset {
                 0.0 => tracked(&attitudes)?,
-                _ => tracked(&motion::later(&recording.time, &attitudes, -offset))?,
+                offset => tracked(&motion::later(&recording.time, &attitudes, -offset))?,
             })
         }
-        (None, None) => {
+        (None, None, None) => {
             let rests = RestToRest::new(recording, integrity, model, temperature, place)?;
             held = Some(rests.clone());
             Box::new(rests)
@@ -98,7 +108,7 @@ pub fn reference(
     if !movement.moving().iter().any(|moves| *moves) {
         return Err("the rig does not move: no effect can be distinguished from a bias".to_owned());
     }
-    Ok(Reference { movement, held })
+    Ok(Reference { movement, held, remarks })
 }
 
 /// The field in the frame of a reference, µT: the median of what the magnetometer shows there, component by component.

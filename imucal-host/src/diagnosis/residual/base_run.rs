@@ -97,7 +97,7 @@ impl<'s> Reference<'s> {
             Act::Field(_) => {
                 self.scene.outputs(&doses, effect.sensors, &self.scene.inputs(&doses, self.nodes))?
             }
-            Act::Triad(..) | Act::Sensor(..) | Act::Signal(..) | Act::Data(..) => {
+            Act::Triad(..) | Act::Sensor(..) | Act::Formula(..) | Act::Signal(..) | Act::Data(..) => {
                 self.scene.outputs(&doses, effect.sensors, &self.input)?
             }
         };
@@ -114,7 +114,9 @@ impl<'s> Reference<'s> {
 fn step(parameter: &Parameter) -> f64 {
     match parameter.role {
         Role::Amplitude | Role::Choice => STEP.0 * parameter.prior_scale,
-        Role::Shape { usual } => STEP.1 * usual.abs(),
+        Role::Detail { usual } => STEP.0 * usual,
+        Role::Shape { usual } if usual != 0.0 => STEP.1 * usual.abs(),
+        Role::Shape { .. } => STEP.1 * parameter.prior_scale,
         Role::Instant { .. } => STEP.2,
     }
 }

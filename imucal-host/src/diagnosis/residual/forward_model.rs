@@ -3,7 +3,7 @@
 //! Residuals are means over blocks of recorded less simulated samples, at the recording's full rate. A signature is the
 //! simulator's own derivative, from a run at nodes a few rows apart, since it need not hold what a residual must.
 
-use std::sync::OnceLock;
+use std::{ops::Range, sync::OnceLock};
 
 use imucal_core::triad::Triad;
 use nalgebra::Vector3;
@@ -41,6 +41,8 @@ pub struct ForwardModel<'a> {
     pub swings: Option<&'a [[Swing; 3]]>,
     /// Usable rows of each block, by sensor.
     pub counts: [Vec<usize>; 3],
+    /// Variance of a sample in each block, by sensor, against the usual one; none where all are alike.
+    pub vibration: [Option<Vec<f64>>; 3],
     motion: &'a dyn Recorded,
     /// Rows of each sensor that are used, by [`SensorKind::ALL`].
     pub usable: [Vec<bool>; 3],
@@ -95,6 +97,7 @@ impl<'a> ForwardModel<'a> {
             swings: motion.swings(),
             counts,
             motion,
+            vibration: Default::default(),
             usable,
             triads,
             fine,
@@ -121,6 +124,24 @@ impl<'a> ForwardModel<'a> {
         self
     }
 
+    /// Takes all rows of some stretches of time, s, out of use.
+    pub fn leave_out(&mut self, stretches: &[Range<f64>]) {
+        let time = &self.recording.time;
+        for (usable, counts) in self.usable.iter_mut().zip(&mut self.counts) {
+            for stretch in stretches {
+                let from = time.partition_point(|t| *t < stretch.start);
+                let to = time.partition_point(|t| *t <= stretch.end);
+                if let Some(rows) = usable.get_mut(from..to) {
+                    rows.fill(false);
+                }
+            }
+            for (count, block) in counts.iter_mut().zip(&self.cuts) {
+                let rows = usable.get(block.rows.clone()).unwrap_or_default();
+                *count = (*count).min(rows.iter().filter(|usable| **usable).count());
+            }
+        }
+    }
+
     /// Without the blocks in which something is brought near the magnetometer or taken away, where no rig guides it.
     #[must_use]
     pub fn without_passages(mut self) -> Self {
@@ -139,6 +160,12 @@ impl<'a> ForwardModel<'a> {
             Some(view) => view.of(&means),
             None => means,
         }
+    }
+
+    /// Number of a sensor's usual samples that those of a block are worth.
+    pub fn worth(&self, kind: SensorKind, block: usize) -> f64 {
+        let variance = self.vibration[kind as usize].as_ref().map_or(1.0, |ratios| ratios[block]);
+        self.counts[kind as usize][block] as f64 / variance
     }
 
     /// Sensors whose blocks an effect may alter: by way of an attitude, others than its own.
@@ -164,6 +191,16 @@ impl<'a> ForwardModel<'a> {
         }
     }
 
+    /// Mean speed of each block, m/s; `None` where it is not known.
+    pub fn speeds(&self) -> Option<Vec<f64>> {
+        let speeds = self.motion.speeds().filter(|_| self.view.is_none())?;
+        let mean = |block: &Block| {
+            let rows = speeds.get(block.rows.clone()).unwrap_or_default();
+            rows.iter().sum::<f64>() / rows.len().max(1) as f64
+        };
+        Some(self.cuts.iter().map(mean).collect())
+    }
+
     /// Length of the recording, s.
     pub fn duration(&self) -> f64 {
         self.motion.duration()
@@ -175,6 +212,16 @@ impl<'a> ForwardModel<'a> {
 
     pub(super) fn inputs(&self, doses: &[Dose], nodes: &SamplePoints) -> Vec<Input> {
         Chain::new(doses).inputs(self.motion.steady(), &nodes.times)
+    }
+
+    /// What a unit is given at each row, without any effect.
+    pub fn given_rows(&self) -> Vec<Input> {
+        Chain::default().inputs(self.motion, &self.recording.time)
+    }
+
+    /// Likewise at the nodes for signatures.
+    pub fn given_nodes(&self) -> Vec<Input> {
+        self.inputs(&[], &self.fine)
     }
 
     /// The truth in the middle of each block, without any effect.
@@ -245,7 +292,6 @@ impl<'a> ForwardModel<'a> {
         kind: SensorKind,
         input: &[Input],
     ) -> Result<Vec<Vector3<f64>>, DiagnosisError> {
-        let output = chain.output(kind, &self.triads[kind as usize], input);
-        output.ok_or(DiagnosisError::Simulation { sensor: kind })
+        Ok(chain.output(kind, &self.triads[kind as usize], input)?)
     }
 }

@@ -12,6 +12,7 @@
 //! | [`base_run`] | a simulated run and its derivatives by difference quotients |
 //! | [`gimbal_derivatives`] | what a radian of a gimbal's offset changes |
 //! | [`gravity_observables`] | what rests and turns of a hand show whatever the heading was |
+//! | [`vibration`] | how much noise a shaking machine makes, block by block |
 //! | [`transient`] | blocks in which a magnet is brought near or taken away are left out |
 //!
 //! Not done here: nothing is estimated; noise is weighed in `mixed_model`.
@@ -23,3 +24,4 @@ pub mod gimbal_derivatives;
 pub mod gravity_observables;
 pub mod sample_points;
 pub mod transient;
+pub mod vibration;

@@ -117,7 +117,9 @@ pub fn check(
     let rows = rows(recording);
     let truth = truth(recording, motion, &rows, 0.0);
     // Without the heading there is no field to compare a magnetometer with.
-    let is_compared = |kind: SensorKind| source.heading || kind != SensorKind::Mag;
+    let is_compared = |kind: SensorKind| {
+        motion.gives(kind) && (source.heading || source.followed || kind != SensorKind::Mag)
+    };
     let mut pairs = SensorKind::ALL.map(|kind| {
         let pairs = is_compared(kind).then(|| Pairs::of(recording, integrity, kind, &rows, &truth));
         pairs.flatten()
@@ -128,7 +130,8 @@ pub fn check(
         found.beyond_movement = Some(SensorKind::Acc);
         pairs[SensorKind::Acc as usize] = None;
     }
-    match gimbal_order::remark(recording, integrity, motion, &rows, &truth, &pairs) {
+    let contradicted = || gimbal_order::remark(recording, integrity, motion, &rows, &truth, &pairs);
+    match if source.followed { None } else { contradicted() } {
         // Against a wrong movement no sensor's axes mean anything.
         Some(remark) => found.contradiction = Some(remark),
         None => {

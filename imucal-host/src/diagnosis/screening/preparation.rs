@@ -13,16 +13,18 @@ use super::{
 use crate::{
     diagnosis::{
         error::DiagnosisError,
-        reference::{model::Model, movement, movement::Reference, rest_to_rest::RestToRest, revisits},
+        reference::{
+            model::Model, movement, movement::Reference, rest_to_rest::RestToRest, revisits, stream,
+        },
         settings::Settings,
     },
     effect::{Act, DataRun, Effect, Spoils, axis_swap},
     noise::white,
     recording::{
-        Recording, SensorKind, Triple,
+        Recording, SensorKind, Stream, Triple,
         check::{integrity, integrity::Integrity},
     },
-    simulator::Recorded,
+    simulator::{Recorded, StreamClock},
     store::StoredCalibration,
 };
 
@@ -37,8 +39,9 @@ pub struct Preparation {
     pub movement: Box<dyn Recorded>,
     /// The rests that it was reconstructed from, where there is neither a rig nor a reference.
     pub held: Option<RestToRest>,
-    /// What a reference was moved by in time to follow the samples, s: see [`reference_offset::coarse`].
-    pub moved: f64,
+    /// The clock that a reference was read by to follow the samples: see [`reference_offset::coarse`] and
+    /// [`stream::clock`].
+    pub clock: StreamClock,
     /// Rows of each sensor that can be used, by [`SensorKind::ALL`].
     pub usable: [Vec<bool>; 3],
     /// Triads to start from, nominal SI to SI: those of the model, or such as put axes and units right.
@@ -52,37 +55,45 @@ pub struct Preparation {
 }
 
 impl Preparation {
-    /// Of a recording, with the model of its unit where there is one.
+    /// Of a recording, with the simulator's stream and the model of its unit where there are such.
     ///
     /// # Errors
     ///
     /// Why the recording cannot be diagnosed, for a reader.
     pub fn new(
         recording: &Recording,
+        stream: Option<&Stream>,
         model: Option<&StoredCalibration>,
         settings: &Settings,
     ) -> Result<Self, DiagnosisError> {
         let model = model.map(|model| Model::new(recording, model)).transpose();
         let model = model.map_err(DiagnosisError::Recording)?.unwrap_or_default();
         let integrity = integrity::inspect(recording);
-        let reference = |moved: f64| {
-            movement::reference(recording, &integrity, &model, moved).map_err(DiagnosisError::Recording)
+        let reference = |clock: StreamClock| {
+            movement::reference(recording, &integrity, &model, stream, clock)
+                .map_err(DiagnosisError::Recording)
         };
-        let mut as_read = reference(0.0)?;
-        let mut moved = 0.0;
-        if settings.source.clock {
-            moved = reference_offset::coarse(recording, &integrity, &*as_read.movement);
-            if moved != 0.0 {
-                as_read = reference(moved)?;
+        let mut clock = match stream {
+            Some(given) => stream::clock(recording, &integrity, given).map_err(DiagnosisError::Recording)?,
+            None => StreamClock::default(),
+        };
+        let mut as_read = reference(clock)?;
+        if settings.source.clock && stream.is_none() {
+            clock.offset = reference_offset::coarse(recording, &integrity, &*as_read.movement);
+            if clock.offset != 0.0 {
+                as_read = reference(clock)?;
             }
         }
-        let Reference { movement, held } = as_read;
+        let Reference { movement, held, remarks: of_reference } = as_read;
         let conventions = conventions::check(recording, &integrity, &*movement, settings.source);
         if let Some(contradiction) = conventions.contradiction {
             return Err(DiagnosisError::Recording(contradiction));
         }
         let mut usable = SensorKind::ALL.map(|kind| usable_rows(recording, &integrity, &conventions, kind));
         if let Some(kind) = conventions.beyond_movement {
+            usable[kind as usize].fill(false);
+        }
+        for kind in SensorKind::ALL.into_iter().filter(|kind| !movement.gives(*kind)) {
             usable[kind as usize].fill(false);
         }
         for usable in &mut usable {
@@ -106,11 +117,13 @@ impl Preparation {
             return Err(DiagnosisError::Recording("no sensor has a usable row".to_owned()));
         }
         let mut remarks = conventions.remarks;
+        remarks.extend(of_reference);
         remarks.extend(model.remark.clone());
-        remarks.extend(revisits::remark(&*movement));
+        // A machine's attitudes are no rests of a table, whose pointing errors repeat.
+        remarks.extend(revisits::remark(&*movement).filter(|_| settings.noise.scatters));
         remarks.extend(shortcomings(recording));
         let findings = conventions.findings;
-        Ok(Self { movement, held, moved, usable, triads, model, findings, remarks })
+        Ok(Self { movement, held, clock, usable, triads, model, findings, remarks })
     }
 }
 

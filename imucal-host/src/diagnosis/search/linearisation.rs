@@ -213,18 +213,18 @@ impl<'s> Linearisation<'s> {
         Some(Self::of(self.scene, self.candidates, self.scan.clone(), fit, design, weighing, shapes))
     }
 
-    /// The same problem with a term of the baseline as an effect, the last of `candidates`, of these values.
-    pub fn with_effect<'c>(
+    /// The same problem with terms of the baseline as effects of these values, the last of `candidates` in their order.
+    pub fn with_effects<'c>(
         &'c self,
         candidates: &'c Candidates,
         fit: &Fit,
-        effect: &'static Effect,
-        values: Vec<f64>,
+        terms: Vec<(&'static Effect, Vec<f64>)>,
     ) -> Linearisation<'c> {
         let mut design = self.design.clone();
-        restore(&mut design, [&Dose { effect, values }].into_iter());
-        let neutral = GridPosterior::alone(effect.neutral(self.scene.duration()));
-        let shapes = self.shapes.iter().cloned().chain([neutral]).collect();
+        let doses: Vec<Dose> = terms.into_iter().map(|(effect, values)| Dose { effect, values }).collect();
+        restore(&mut design, doses.iter());
+        let neutral = |dose: &Dose| GridPosterior::alone(dose.effect.neutral(self.scene.duration()));
+        let shapes = self.shapes.iter().cloned().chain(doses.iter().map(neutral)).collect();
         let weighing = Weighing::new(self.scene, self.weighing.given.clone());
         Linearisation::of(self.scene, candidates, self.scan.clone(), fit, design, weighing, shapes)
     }

@@ -13,6 +13,7 @@
 //! | [`score`] | evidence of a set, axis by axis and jointly |
 //! | [`memo`] | results that are asked for again |
 //! | [`neighbours`] | sets one addition, removal or exchange away |
+//! | [`motion_mismatch`] | stretches in which the machine moved otherwise than its simulator |
 //! | [`stepwise`] | the search: neighbours are screened and scored until none is better |
 //!
 //! Not done here: sets of more than a few effects are not enumerated; the search climbs.
@@ -20,6 +21,7 @@
 pub mod hypothesis;
 pub mod linearisation;
 pub mod memo;
+pub mod motion_mismatch;
 pub mod neighbours;
 pub mod refit;
 pub mod score;

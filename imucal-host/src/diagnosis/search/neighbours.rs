@@ -103,7 +103,32 @@ impl Linearisation<'_> {
             }
             sets.push((fewer, taken.sensors.to_vec()));
         }
+        if self.settings().removes_pairs {
+            sets.extend(self.without_pairs(&from.set));
+        }
         Ok(self.best_of(sets, from))
+    }
+
+    /// The best set with one effect replaced by another of its class.
+    pub fn exchanged_in_class(&self, from: &Scored) -> Result<Option<Scored>, DiagnosisError> {
+        let mut sets = Vec::new();
+        for at in 0..from.set.len() {
+            let (fewer, taken) = without(&from.set, at);
+            let fellow = |effect: &'static Effect| effect != taken && class(&effect.id) == class(&taken.id);
+            sets.extend(self.replaced(&fewer, taken.sensors, &fellow, &from.noise)?);
+        }
+        Ok(self.best_of(sets, from))
+    }
+
+    /// Sets with two effects fewer.
+    fn without_pairs(&self, set: &[&'static Effect]) -> Vec<Reaching> {
+        let pairs = (0..set.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
+        let fewer = |(i, j): (usize, usize)| {
+            let kept = set.iter().enumerate().filter(|(at, _)| *at != i && *at != j);
+            let reach = either(self.scene.reach(set[i]), self.scene.reach(set[j]));
+            (kept.map(|(_, effect)| *effect).collect(), reach)
+        };
+        pairs.map(fewer).collect()
     }
 
     /// The best set with one effect replaced by another, or all those of a sensor by one or two, in the shapes that are

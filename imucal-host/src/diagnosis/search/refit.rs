@@ -43,9 +43,9 @@ pub struct Fit {
     pub residual: Means,
 }
 
-/// All amplitudes of some effects.
+/// All amplitudes and details of some effects.
 pub fn columns(effects: &[&'static Effect]) -> Vec<Column> {
-    let of = |effect: &'static Effect| effect.amplitudes().map(move |parameter| Column { effect, parameter });
+    let of = |effect: &'static Effect| effect.linear().map(move |parameter| Column { effect, parameter });
     effects.iter().flat_map(|effect| of(effect)).collect()
 }
 

@@ -173,6 +173,11 @@ fn improved<'s>(at: &Solution<'s>) -> Result<Option<Step<'s>>, DiagnosisError> {
     // What the data would rather be without is not asserted: fewer effects need not gain.
     let change = |judged: &Scored| if judged.set.len() < best.set.len() { 0.0 } else { by.change_gain };
     let room = by.most.saturating_sub(best.set.len());
+    if by.settles_classes
+        && let Some(next) = linear.exchanged_in_class(best)?.filter(|next| gains(next, by.change_gain))
+    {
+        return Ok(Some(Step::to(next)));
+    }
     if room > 0
         && let Some(next) = linear.added(best, &|_| true)?.filter(|next| gains(next, gain))
     {

@@ -41,6 +41,7 @@ pub fn untestable(recording: &Recording, why: String) -> Diagnosis {
         absent: Vec::new(),
         not_testable: Vec::new(),
         next_experiment: Vec::new(),
+        user_effects: Vec::new(),
     }
 }
 
@@ -142,10 +143,11 @@ pub fn answer(
     let left = tested.left(&settings.location);
     let mut asserted = Asserted::of(explained, &tested)?;
     let found = asserted.causes.clone();
-    let apart = reference_clock::candidates(explained.linear.candidates);
     let remainder = left.map_or(0.0, |left| left.size);
+    let terms = reference_clock::terms(explained, preparation.clock)?;
+    let apart = reference_clock::candidates(explained.linear.candidates, &terms);
     let clock = match &apart {
-        Some(apart) => reference_clock::clock(explained, apart, preparation.moved, remainder)?,
+        Some(apart) => reference_clock::clock(explained, apart, &terms, remainder)?,
         None => None,
     };
     let closed = clock.as_ref().map_or(&tested.closed, |clock| &clock.closed);
@@ -154,7 +156,7 @@ pub fn answer(
     asserted.take_out_errors(&preparation.model, &settings.verdict);
     let evidence = Evidence {
         causes: &found,
-        clock: clock.as_ref().map(|clock| &clock.cause),
+        clock: clock.as_ref().map_or(&[], |clock| &clock.causes),
         closed: if found.is_empty() { closed } else { &tested.closed },
         left,
         refuted: asserted.refuted,
@@ -165,7 +167,7 @@ pub fn answer(
     let mut total = is_closed.then_some(closed.total);
     if let Some(clock) = &clock {
         share_with(clock, &mut asserted.causes);
-        asserted.put_first(clock.cause.clone());
+        clock.causes.iter().rev().for_each(|cause| asserted.put_first(cause.clone()));
     }
     preparation.findings.iter().rev().for_each(|finding| asserted.put_first(fault::cause(finding)));
     let faults = fault::faults(recording, &preparation.findings, explained);
@@ -246,7 +248,7 @@ fn located(
     Ok(places(&before, shares::size(linear, set, noise)?, &linear.scene.settings.location))
 }
 
-/// The problem and the set that the gap is seen from: with the offset of a clock among the effects, where it is one.
+/// The problem and the set that the gap is seen from: with the terms of a clock among the effects, where they are such.
 fn seen_from<'e>(
     explained: &'e Solution<'e>,
     clock: Option<&'e Clock<'e>>,
@@ -272,8 +274,8 @@ fn credible_set(
     Ok(ids)
 }
 
-/// The causes were judged with the clock's offset in the baseline: what they close is now a share of the gap that it is a
-/// part of.
+/// The causes were judged with the clock's terms in the baseline: what they close is now a share of the gap that these are
+/// a part of.
 fn share_with(clock: &Clock<'_>, causes: &mut [Cause]) {
     for cause in causes {
         let mut shares = clock.set.iter().zip(&clock.closed.each);
@@ -291,7 +293,9 @@ fn next_experiment(
     let axes = movement::axes(recording).ok()?;
     let mut pairs: Vec<(&'static Effect, &'static Effect)> = Vec::new();
     for (cause, standing) in explained.best.set.iter().zip(&tested.standings) {
-        pairs.extend(standing.equivalents.iter().map(|other| (*cause, *other)));
+        // What is the same here has no columns of its own.
+        let is_fitted = |other: &&&'static Effect| explained.linear.candidates.effects.contains(*other);
+        pairs.extend(standing.equivalents.iter().filter(is_fitted).map(|other| (*cause, *other)));
     }
     experiment::next(explained, axes, &pairs)
 }

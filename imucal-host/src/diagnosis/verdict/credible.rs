@@ -35,7 +35,12 @@ pub fn suspects(linear: &Linearisation<'_>, none: &Scored) -> Result<Vec<&'stati
     let likely = ranked
         .into_iter()
         .take_while(|(value, _)| odds(*value) > 1.0 - linear.scene.settings.verdict.credible);
-    Ok(likely.map(|(_, effect)| effect).collect())
+    Ok(likely.flat_map(|(_, effect)| alike(linear, effect)).collect())
+}
+
+/// An effect and those it stands for.
+fn alike(linear: &Linearisation<'_>, effect: &'static Effect) -> impl Iterator<Item = &'static Effect> {
+    std::iter::once(effect).chain(linear.candidates.same_as(effect))
 }
 
 /// The standing of one cause of a set.
@@ -69,18 +74,20 @@ pub fn standing(
     judged.extend(instead.into_iter().flatten());
     judged.sort_by(|a, b| b.0.total_cmp(&a.0));
     let most = judged[0].0;
-    let total: f64 = judged.iter().map(|(value, _)| (value - most).exp()).sum();
+    let count =
+        |effect: &Option<&'static Effect>| effect.map_or(1, |effect| alike(linear, effect).count()) as f64;
+    let total: f64 = judged.iter().map(|(value, effect)| count(effect) * (value - most).exp()).sum();
     let probability = |value: f64| (value - most).exp() / total;
     let mut set = Vec::new();
     let mut held = 0.0;
     for (value, effect) in &judged {
         if held < linear.scene.settings.verdict.credible {
-            set.extend(*effect);
+            set.extend(effect.iter().flat_map(|effect| alike(linear, effect)));
         }
-        held += probability(*value);
+        held += count(effect) * probability(*value);
     }
     if !set.contains(&cause) {
-        set.push(cause);
+        set.extend(alike(linear, cause));
     }
     Ok(Standing {
         probability: probability(best.log_evidence),

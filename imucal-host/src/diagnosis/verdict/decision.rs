@@ -12,8 +12,8 @@ use crate::diagnosis::{
 pub struct Evidence<'a> {
     /// Causes of the search that held-out data confirm.
     pub causes: &'a [Cause],
-    /// The offset of the reference's clock, where it is a cause.
-    pub clock: Option<&'a Cause>,
+    /// Terms of the reference's clock that are causes.
+    pub clock: &'a [Cause],
     /// Shares of the gap that the causes close.
     pub closed: &'a Closed,
     /// The covariate that the residual still depends on most clearly.
@@ -30,9 +30,9 @@ impl Evidence<'_> {
     /// The verdict.
     pub fn verdict(&self, by: &VerdictSettings) -> Verdict {
         let of_search = match (self.refuted, self.causes, self.clock) {
-            (true, [], None) => Verdict::Unknown,
+            (true, [], []) => Verdict::Unknown,
             (true, ..) => Verdict::Partly,
-            (false, [], Some(clock)) => self.judged(std::slice::from_ref(clock), by),
+            (false, [], clock) => self.judged(clock, by),
             (false, causes, _) => self.judged(causes, by),
         };
         let beyond_model = match of_search {
@@ -102,7 +102,7 @@ mod tests {
         let (closed, left) = (closed(share), size.map(left));
         let mut evidence = Evidence {
             causes,
-            clock: None,
+            clock: &[],
             closed: &closed,
             left: left.as_ref(),
             refuted: false,
@@ -145,11 +145,11 @@ mod tests {
 
     #[test]
     fn the_clock_of_the_reference_is_a_cause_where_no_other_is() {
-        let clock = cause(&[]);
+        let clock = [cause(&[])];
         let (closed, left) = (closed(0.9), left(0.0));
         let evidence = Evidence {
             causes: &[],
-            clock: Some(&clock),
+            clock: &clock,
             closed: &closed,
             left: Some(&left),
             refuted: false,

@@ -23,9 +23,9 @@ pub fn testable(
     let projected = Projected::new(&linear.normal(noise), &fitted, &others)?;
     let seen = linear.scene.settings.verdict.detectable;
     let mut absent = Vec::new();
-    let not_testable = |(effect, why): &(&'static Effect, &str)| NotTestable {
+    let not_testable = |(effect, why): &(&'static Effect, String)| NotTestable {
         effect: effect.id.clone(),
-        because: (*why).to_owned(),
+        because: why.clone(),
     };
     let mut untestable: Vec<NotTestable> = linear.candidates.untestable.iter().map(not_testable).collect();
     for effect in &linear.candidates.effects {
@@ -60,6 +60,12 @@ pub fn testable(
             });
         }
     }
+    for (held, other) in &linear.candidates.same {
+        let of_absent = absent.iter().find(|absent| absent.effect == held.id).cloned();
+        absent.extend(of_absent.map(|absent| Absent { effect: other.id.clone(), ..absent }));
+        let of_untestable = untestable.iter().find(|not| not.effect == held.id).cloned();
+        untestable.extend(of_untestable.map(|not| NotTestable { effect: other.id.clone(), ..not }));
+    }
     Ok((absent, untestable))
 }
 
@@ -69,9 +75,10 @@ fn because(effect: &Effect, projected: &Projected, places: &[usize]) -> String {
     }
     let taken = places.iter().all(|p| projected.information[(*p, *p)] < RETAINED * projected.before[*p]);
     match effect.confusables.first() {
-        Some(other) if taken => {
+        Some(other) if taken && !other.parted_by.is_empty() => {
             format!("here the same as {}, which is fitted; distinguish by: {}", other.id, other.parted_by)
         }
+        _ if taken => format!("what is fitted takes it up; it needs: {}", effect.words.needs),
         _ => format!("it would have to be implausibly large to be seen; it needs: {}", effect.words.needs),
     }
 }

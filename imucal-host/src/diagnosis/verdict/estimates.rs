@@ -34,7 +34,8 @@ pub fn amounts_of(
     let dose = |effect: &Effect| explained.fit.doses.iter().find(|dose| dose.effect == effect);
     let shaped = |dose: &Dose| -> Vec<Column> {
         let effect = dose.effect;
-        effect.shapes_at(&dose.values).map(|parameter| Column { effect, parameter }).collect()
+        let others = effect.shapes_at(&dose.values).filter(|at| effect.linear().all(|linear| linear != *at));
+        others.map(|parameter| Column { effect, parameter }).collect()
     };
     let shape_columns: Vec<Column> = set.iter().filter_map(|effect| dose(effect)).flat_map(shaped).collect();
     let signatures: Vec<Signature> = shape_columns

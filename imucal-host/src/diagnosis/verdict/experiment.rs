@@ -99,7 +99,7 @@ pub fn next(
 
 fn parted_by(cause: &Effect, other: &Effect) -> Option<&'static str> {
     let of = |a: &Effect, b: &Effect| a.confusables.iter().find(|c| c.id == b.id).map(|c| c.parted_by);
-    of(cause, other).or_else(|| of(other, cause))
+    of(cause, other).or_else(|| of(other, cause)).filter(|parted_by| !parted_by.is_empty())
 }
 
 /// Information of the recording's columns in a segment that follows it, and the segment's length.

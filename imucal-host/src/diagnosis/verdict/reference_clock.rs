@@ -1,8 +1,7 @@
-//! The clock of a reference attitude: how far the samples are ahead of it or behind it.
+//! The clock of a reference: how far the samples are ahead of it or behind it, and whether it runs at another rate.
 //!
-//! The offset is a term of the baseline, so that no other effect stands for it, and it is named where it is one that
-//! matters. A large one is looked for first, by the share of the samples' variance that no gain and bias explain, and the
-//! reference is moved by it: the fit is linear in what is left.
+//! Offset and rate are terms of the baseline, so that no other effect stands for them, and each is named where it is one that
+//! matters. A large one is looked for first, and the reference is read by that clock: the fit is linear in what is left.
 
 use super::{estimates, shares, shares::Closed};
 use crate::{
@@ -13,63 +12,96 @@ use crate::{
         search::{linearisation::Linearisation, stepwise::Solution},
     },
     effect::{Effect, Part},
+    simulator::StreamClock,
 };
 
-/// The offset as a cause, and what all causes close together with it.
+/// An offset beyond this adds no more to the gap that is shown, s: the fit is linear in it.
+const LINEAR: f64 = 0.25;
+
+/// A term of the clock that is named.
+pub struct Term {
+    effect: &'static Effect,
+    parameters: Vec<Amount>,
+}
+
+/// The terms that are causes, and what all causes close together with them.
 pub struct Clock<'s> {
-    /// The cause.
-    pub cause: Cause,
-    /// What the causes of the set close of the gap that the offset is a part of; the offset's own share stands last.
+    /// The causes.
+    pub causes: Vec<Cause>,
+    /// What the causes of the set close of the gap that the terms are a part of; the terms' own shares stand last.
     pub closed: Closed,
-    /// The set and the offset.
+    /// The set and the terms.
     pub set: Vec<&'static Effect>,
-    /// The problem with the offset among its effects.
+    /// The problem with the terms among its effects.
     pub linear: Linearisation<'s>,
 }
 
-/// The baseline's candidates with the offset among the effects, where it stands in the baseline.
-pub fn candidates(candidates: &Candidates) -> Option<(&'static Effect, Candidates)> {
-    let offset = *candidates.baseline.iter().find(|term| term.part == Part::ClockTerm)?;
-    let mut with = candidates.clone();
-    with.baseline.retain(|term| *term != offset);
-    with.effects.push(offset);
-    with.taken_out.push(offset);
-    Some((offset, with))
+/// The terms of the clock that are known and matter; the reference was read by `clock`.
+pub fn terms(explained: &Solution<'_>, clock: StreamClock) -> Result<Vec<Term>, DiagnosisError> {
+    let is_term = |term: &&'static Effect| matches!(term.part, Part::ClockTerm | Part::ClockRateTerm);
+    let terms: Vec<&'static Effect> =
+        explained.linear.candidates.baseline.iter().copied().filter(is_term).collect();
+    let errors = explained.linear.scene.settings.verdict.clock_errors;
+    let amounts = estimates::amounts_of(explained, &terms)?;
+    let fitted = |part: Part| {
+        let own = terms.iter().zip(&amounts).find(|(term, _)| term.part == part);
+        own.and_then(|(_, amounts)| amounts.first()?.value).unwrap_or(0.0)
+    };
+    let rate = fitted(Part::ClockRateTerm);
+    let named = terms.iter().zip(&amounts).filter_map(|(term, amounts)| {
+        let whole = |value: f64| match term.part {
+            Part::ClockTerm => value + clock.offset * (1.0 + rate),
+            _ => (1.0 + value) * (1.0 + clock.error) - 1.0,
+        };
+        let amount = |amount: &Amount| Amount { value: amount.value.map(whole), ..amount.clone() };
+        let parameters: Vec<Amount> = amounts.iter().map(amount).collect();
+        let matters =
+            estimates::is_material(term, &parameters) && estimates::is_sized(term, &parameters, errors);
+        matters.then_some(Term { effect: term, parameters })
+    });
+    Ok(named.collect())
 }
 
-/// The offset, where it is known, matters and held-out blocks bear it out; `moved` is what the reference was moved by, s,
-/// and `remainder` the whitened size of what a driver still follows. `None` where nothing can be fitted.
+/// The baseline's candidates with the named terms among the effects; `None` without one.
+pub fn candidates(candidates: &Candidates, terms: &[Term]) -> Option<Candidates> {
+    let named: Vec<&'static Effect> = terms.iter().map(|term| term.effect).collect();
+    let mut with = candidates.clone();
+    with.baseline.retain(|term| !named.contains(term));
+    with.effects.extend(&named);
+    with.taken_out.extend(&named);
+    (!named.is_empty()).then_some(with)
+}
+
+/// The named terms that held-out blocks bear out; `remainder` is the whitened size of what a driver still follows. `None`
+/// where there is none.
 pub fn clock<'s>(
     explained: &'s Solution<'s>,
-    (offset, candidates): &'s (&'static Effect, Candidates),
-    moved: f64,
+    candidates: &'s Candidates,
+    terms: &[Term],
     remainder: f64,
 ) -> Result<Option<Clock<'s>>, DiagnosisError> {
     let Solution { linear, best, fit, .. } = explained;
-    let Some(mut parameters) = estimates::amounts_of(explained, &[offset])?.pop() else { return Ok(None) };
-    parameters.iter_mut().for_each(|amount| amount.value = amount.value.map(|value| value + moved));
-    if !estimates::is_material(offset, &parameters)
-        || !estimates::is_sized(offset, &parameters, linear.scene.settings.verdict.clock_errors)
-    {
-        return Ok(None);
-    }
-    let set: Vec<&'static Effect> = best.set.iter().copied().chain([*offset]).collect();
-    let values = parameters.iter().map(|amount| amount.value.unwrap_or_default()).collect();
-    let linear = linear.with_effect(candidates, fit, offset, values);
+    let set: Vec<&'static Effect> =
+        best.set.iter().copied().chain(terms.iter().map(|term| term.effect)).collect();
+    let shown = |term: &Term| {
+        let value = |amount: &Amount| amount.value.unwrap_or_default().clamp(-LINEAR, LINEAR);
+        (term.effect, term.parameters.iter().map(value).collect())
+    };
+    let linear = linear.with_effects(candidates, fit, terms.iter().map(shown).collect());
     let closed = shares::closed(&linear, &set, &best.noise, remainder)?;
-    let Some(share) = closed.each.last().copied().filter(|share| share.interval[0] > 0.0) else {
-        return Ok(None);
-    };
-    let cause = Cause {
-        effect: offset.id.clone(),
-        probability: 1.0 - chance(&parameters),
-        equivalents: Vec::new(),
-        parameters,
-        material: true,
-        gap_closed: Some(share.value),
-        gap_closed_ci95: Some(share.interval),
-    };
-    Ok(Some(Clock { cause, closed, set, linear }))
+    let own = terms.iter().zip(&closed.each[best.set.len()..]).filter(|(_, share)| share.interval[0] > 0.0);
+    let causes: Vec<Cause> = own
+        .map(|(term, share)| Cause {
+            effect: term.effect.id.clone(),
+            probability: 1.0 - chance(&term.parameters),
+            equivalents: Vec::new(),
+            parameters: term.parameters.clone(),
+            material: true,
+            gap_closed: Some(share.value),
+            gap_closed_ci95: Some(share.interval),
+        })
+        .collect();
+    Ok((!causes.is_empty()).then_some(Clock { causes, closed, set, linear }))
 }
 
 /// Probability that an offset of zero would be estimated as far from zero.

@@ -182,7 +182,7 @@ impl RobotScene {
     ///
     /// # Errors
     ///
-    /// As [`Self::planned`], and [`SimulationError::Singular`] for an effect beyond reason.
+    /// As [`Self::planned`], and [`SimulationError::Output`] for an effect beyond reason.
     pub fn record(&self, name: &str) -> Result<RobotPair, SimulationError> {
         Ok(RobotPair {
             real: self.real(&format!("{name}-real.csv"))?,
@@ -214,8 +214,7 @@ impl RobotScene {
         let vibration = Vibration::draw(self.kind, self.vibration, &mut shaken);
         for kind in SensorKind::ALL {
             let triad = unit.triad(kind);
-            let clean =
-                chain.output(kind, &triad.triad, &input).ok_or(SimulationError::Singular { sensor: kind })?;
+            let clean = chain.output(kind, &triad.triad, &input)?;
             let shaken = match self.noise && self.vibration > 0.0 {
                 true => vibration.rows(kind, &motion.trajectory, &shown, self.real_rate, &mut shaken),
                 false => Vec::new(),

@@ -1,0 +1,417 @@
+//! A simulator's stream: what it says ideal sensors would have read, as a source of truth.
+//!
+//! Between two samples each component is a cubic with the slopes of its neighbours; the angular acceleration is the slope
+//! of the rate. A row of the recording shows the stream at
+//!
+//! ```text
+//! s = (t + offset) / (1 + error)
+//! ```
+//!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | t | time of the row on the sensor's clock, s |
+//! | s | time of the stream on the simulator's clock, s |
+//! | offset, error | [`StreamClock`], as `clk.time_offset` and `clk.rate_error` count them |
+//!
+//! The attitude is the integral of the rate; its base is levelled by the mean of the specific force, since a machine
+//! that comes to rest has not been accelerated on average, and its heading is that of the first row. Not modelled: noise of
+//! the stream, and Earth's rotation, which the stream's rate holds or does not.
+
+use imucal_core::rotation::exp;
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+use super::{
+    place::Place,
+    recent::Recent,
+    truth::{Motion, Recorded, in_the_open},
+};
+use crate::{
+    effect::{Machine, Truth},
+    recording::{
+        SensorKind, Stream,
+        manifest::{Rig, RigKind},
+    },
+};
+
+/// It moves where, within this time to each side of a row, s,
+const WINDOW: f64 = 0.1;
+/// it turns faster than this, rad/s,
+const TURNS: f64 = 0.02;
+/// or its specific force changes by more than this, m/s².
+const SWAYS: f64 = 0.1;
+
+/// How the clock of a stream stands to that of the sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StreamClock {
+    /// The row of t shows the stream of t + offset, s.
+    pub offset: f64,
+    /// The sensor's clock gains on the stream's by this share.
+    pub error: f64,
+}
+
+impl StreamClock {
+    /// Time of the stream that a row of `time` shows, s.
+    pub fn stream_time(&self, time: f64) -> f64 {
+        (time + self.offset) / (1.0 + self.error)
+    }
+}
+
+/// One sensor's stream with the slope of each sample.
+#[derive(Clone, Debug)]
+struct Channel {
+    values: Vec<Vector3<f64>>,
+    slopes: Vec<Vector3<f64>>,
+}
+
+/// The movement of a simulator's stream, at the rows of a recording.
+#[derive(Clone, Debug)]
+pub struct Streamed {
+    time: Vec<f64>,
+    channels: [Option<Channel>; 3],
+    attitudes: Vec<Matrix3<f64>>,
+    clock: StreamClock,
+    duration: f64,
+    rows: Vec<f64>,
+    temperature: Vec<f64>,
+    moving: Vec<bool>,
+    known: Vec<bool>,
+    speeds: Option<Vec<f64>>,
+    place: Place,
+}
+
+impl Streamed {
+    /// The movement of a stream for rows of these times, s, and temperatures, °C. `None` where the stream has fewer than
+    /// two samples.
+    pub fn new(
+        stream: &Stream,
+        clock: StreamClock,
+        rows: &[f64],
+        temperature: Vec<f64>,
+        place: Place,
+    ) -> Option<Self> {
+        if stream.time.len() < 2 {
+            return None;
+        }
+        let time = stream.time.clone();
+        let sampled = |kind: SensorKind| stream.values.sensor(kind);
+        let channels = SensorKind::ALL.map(|kind| Some(Channel::new(&time, sampled(kind)?)));
+        let attitudes = attitudes(&time, &channels);
+        let mut streamed = Self {
+            channels,
+            attitudes,
+            clock,
+            duration: rows.last().copied().unwrap_or(0.0),
+            rows: rows.to_vec(),
+            temperature,
+            moving: Vec::new(),
+            known: Vec::new(),
+            speeds: None,
+            place,
+            time,
+        };
+        let measured = measured(stream);
+        streamed.known = rows.iter().map(|row| streamed.is_covered(*row, &measured)).collect();
+        streamed.moving = streamed.movement();
+        streamed.speeds = streamed.travelled();
+        Some(streamed)
+    }
+
+    /// The clock that rows are read by.
+    pub fn clock(&self) -> StreamClock {
+        self.clock
+    }
+
+    /// The samples on both sides of a row's time were given.
+    fn is_covered(&self, row: f64, measured: &[bool]) -> bool {
+        let s = self.clock.stream_time(row);
+        let after = self.time.partition_point(|t| *t < s);
+        let (Some(before), true) = (after.checked_sub(2), after + 1 < self.time.len()) else { return false };
+        measured[before..=after + 1].iter().all(|measured| *measured)
+    }
+
+    /// Speed at each row, by the specific force less its mean: what a machine gains on the whole it loses until it comes to
+    /// rest again. `None` without an accelerometer.
+    fn travelled(&self) -> Option<Vec<f64>> {
+        let acc = self.channels[SensorKind::Acc as usize].as_ref()?;
+        let forces: Vec<Vector3<f64>> = self.attitudes.iter().zip(&acc.values).map(|(c, f)| c * f).collect();
+        let steps = || self.time.windows(2).zip(forces.windows(2));
+        let gained =
+            |(time, force): (&[f64], &[Vector3<f64>])| (force[0] + force[1]) * (0.5 * (time[1] - time[0]));
+        let length = self.time.last()? - self.time.first()?;
+        let gravity = steps().map(gained).sum::<Vector3<f64>>() / length;
+        let mut speed = Vector3::zeros();
+        let mut speeds = vec![0.0];
+        for step in steps() {
+            speed += gained(step) - gravity * (step.0[1] - step.0[0]);
+            speeds.push(speed.norm());
+        }
+        let at = |row: &f64| {
+            let sample = super::replay::nearest(&self.time, self.clock.stream_time(*row));
+            speeds.get(sample).copied().unwrap_or(0.0)
+        };
+        Some(self.rows.iter().map(at).collect())
+    }
+
+    /// Whether it turns or sways at each row.
+    fn movement(&self) -> Vec<bool> {
+        let samples: Vec<bool> = (0..self.time.len())
+            .map(|k| {
+                let turns = |c: &Channel| c.values[k].norm() > TURNS;
+                let sways = |c: &Channel| c.slopes[k].norm() * WINDOW > SWAYS;
+                let [acc, gyr, _] = &self.channels;
+                gyr.as_ref().is_some_and(turns) || acc.as_ref().is_some_and(sways)
+            })
+            .collect();
+        let mut sums = vec![0usize; samples.len() + 1];
+        for (k, moves) in samples.iter().enumerate() {
+            sums[k + 1] = sums[k] + usize::from(*moves);
+        }
+        let moves = |row: &f64| {
+            let s = self.clock.stream_time(*row);
+            let from = self.time.partition_point(|t| *t < s - WINDOW);
+            let to = self.time.partition_point(|t| *t <= s + WINDOW);
+            sums[to] > sums[from]
+        };
+        self.rows.iter().map(moves).collect()
+    }
+}
+
+impl Motion for Streamed {
+    fn duration(&self) -> f64 {
+        self.duration
+    }
+
+    /// No rig acts: the stream is in the sensor's own axes.
+    fn truth_among(&self, time: f64, _: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
+        let s = self.clock.stream_time(time);
+        let k = self.time.partition_point(|t| *t <= s).clamp(1, self.time.len() - 1) - 1;
+        let of = |kind: SensorKind| self.channels[kind as usize].as_ref().map(|c| c.at(&self.time, k, s));
+        let still = (Vector3::zeros(), Vector3::zeros());
+        let (w, dw) = of(SensorKind::Gyr).unwrap_or(still);
+        let since = (s - self.time[k]).clamp(0.0, self.time[k + 1] - self.time[k]);
+        let from = self.channels[SensorKind::Gyr as usize].as_ref().map_or(w, |c| c.values[k]);
+        let c_t_n = self.attitudes[k] * exp(&((w + from) * (0.5 * since)));
+        let mut truth = in_the_open(time, &c_t_n, w, dw, &self.place, recent);
+        truth.w_ie_t = Vector3::zeros();
+        (truth.w_it_t, truth.dw_it_t) = (w, dw);
+        truth.f_t = of(SensorKind::Acc).unwrap_or(still).0;
+        truth.b_t = of(SensorKind::Mag).unwrap_or(still).0;
+        let row = super::replay::nearest(&self.rows, time);
+        truth.temperature = self.temperature.get(row).copied().unwrap_or(truth.temperature);
+        truth
+    }
+
+    fn gives(&self, kind: SensorKind) -> bool {
+        self.channels[kind as usize].is_some()
+    }
+
+    fn rig(&self) -> Rig {
+        Rig { kind: RigKind::Hand, axes: None }
+    }
+
+    fn place(&self) -> Place {
+        self.place
+    }
+}
+
+impl Recorded for Streamed {
+    fn moving(&self) -> &[bool] {
+        &self.moving
+    }
+
+    fn known(&self) -> &[bool] {
+        &self.known
+    }
+
+    fn speeds(&self) -> Option<&[f64]> {
+        self.speeds.as_deref()
+    }
+
+    fn steady(&self) -> &dyn Motion {
+        self
+    }
+}
+
+impl Channel {
+    /// Missing samples lie on the line between their neighbours.
+    fn new(time: &[f64], values: &[Vector3<f64>]) -> Self {
+        let values = bridged(time, values);
+        let slope = |k: usize| {
+            let (before, after) = (k.saturating_sub(1), (k + 1).min(values.len() - 1));
+            let over = |a: usize, b: usize| (values[b] - values[a]) / (time[b] - time[a]);
+            if before == k || after == k {
+                return over(before, after);
+            }
+            // The slope of the parabola through three samples.
+            let (left, right) = (time[k] - time[before], time[after] - time[k]);
+            (over(before, k) * right + over(k, after) * left) / (left + right)
+        };
+        Self { slopes: (0..values.len()).map(slope).collect(), values }
+    }
+
+    /// Value and slope at a time between two samples; beyond the ends those of the end.
+    fn at(&self, time: &[f64], k: usize, s: f64) -> (Vector3<f64>, Vector3<f64>) {
+        let span = time[k + 1] - time[k];
+        let x = ((s - time[k]) / span).clamp(0.0, 1.0);
+        let (from, to) = (self.values[k], self.values[k + 1]);
+        let (leaves, arrives) = (self.slopes[k] * span, self.slopes[k + 1] * span);
+        let (square, cube) = (to - from, leaves + arrives - (to - from) * 2.0);
+        let bend = square - leaves - cube;
+        let value = from + (leaves + (bend + cube * x) * x) * x;
+        let slope = (leaves + (bend * 2.0 + cube * (3.0 * x)) * x) / span;
+        (value, slope)
+    }
+}
+
+/// Samples with missing ones put on the line between their neighbours.
+fn bridged(time: &[f64], values: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let given: Vec<usize> =
+        (0..values.len()).filter(|k| values[*k].iter().all(|value| value.is_finite())).collect();
+    let mut bridged = values.to_vec();
+    let (Some(first), Some(last)) = (given.first().copied(), given.last().copied()) else {
+        return vec![Vector3::zeros(); values.len()];
+    };
+    bridged[..first].fill(values[first]);
+    bridged[last..].fill(values[last]);
+    for pair in given.windows(2) {
+        for k in pair[0] + 1..pair[1] {
+            let share = (time[k] - time[pair[0]]) / (time[pair[1]] - time[pair[0]]);
+            bridged[k] = values[pair[0]] + (values[pair[1]] - values[pair[0]]) * share;
+        }
+    }
+    bridged
+}
+
+/// Samples at which every sensor of the stream has a value, and no gap lies before.
+fn measured(stream: &Stream) -> Vec<bool> {
+    let interval = crate::recording::median(stream.time.windows(2).map(|t| t[1] - t[0]).collect());
+    let longest = GAP * interval.unwrap_or(f64::INFINITY);
+    (0..stream.time.len())
+        .map(|k| {
+            let given = |kind: &SensorKind| {
+                stream.values.sensor(*kind).is_none_or(|values| values[k].iter().all(|v| v.is_finite()))
+            };
+            let near = k == 0 || stream.time[k] - stream.time[k - 1] <= longest;
+            near && SensorKind::ALL.iter().all(given)
+        })
+        .collect()
+}
+
+/// Samples further apart than so many intervals have a gap between them.
+const GAP: f64 = 3.5;
+
+/// Attitude at each sample, table to a base with its third axis down and the heading of the first sample.
+fn attitudes(time: &[f64], [acc, gyr, _]: &[Option<Channel>; 3]) -> Vec<Matrix3<f64>> {
+    let mut attitudes = vec![Matrix3::identity(); time.len()];
+    if let Some(gyr) = gyr {
+        for k in 1..time.len() {
+            let turn = (gyr.values[k - 1] + gyr.values[k]) * (0.5 * (time[k] - time[k - 1]));
+            attitudes[k] = attitudes[k - 1] * exp(&turn);
+        }
+    }
+    let Some(acc) = acc else { return attitudes };
+    let mean: Vector3<f64> = attitudes.iter().zip(&acc.values).map(|(c, f)| c * f).sum();
+    let Some(level) = Rotation3::rotation_between(&mean, &-Vector3::z()) else { return attitudes };
+    attitudes.iter().map(|attitude| level.matrix() * attitude).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{recording::Simulated, simulator::Tumble};
+
+    /// The stream of a tumbling hand at 250 Hz, its own clock by `clock`.
+    fn stream(tumble: &Tumble, clock: StreamClock) -> Stream {
+        let time: Vec<f64> = (0..7500).map(|k| 0.004 * f64::from(k)).collect();
+        let shown = |s: &f64| tumble.truth(s * (1.0 + clock.error) - clock.offset, &|_| ());
+        let truth: Vec<Truth> = time.iter().map(shown).collect();
+        let of = |value: &dyn Fn(&Truth) -> Vector3<f64>| Some(truth.iter().map(value).collect());
+        let values = Simulated {
+            acc: of(&|row| row.f_t),
+            gyr: of(&|row| row.w_it_t),
+            mag: of(&|row| row.b_t),
+            temperature: None,
+        };
+        Stream { name: "sim.csv".into(), time, values }
+    }
+
+    fn streamed(clock: StreamClock, alter: impl Fn(&mut Stream)) -> (Tumble, Streamed) {
+        let tumble = Tumble::new(5, 3);
+        let mut stream = stream(&tumble, clock);
+        alter(&mut stream);
+        let rows: Vec<f64> = (0..2900).map(|k| 0.3 + 0.01 * f64::from(k)).collect();
+        let streamed = Streamed::new(&stream, clock, &rows, vec![25.0; 2900], tumble.place()).unwrap();
+        (tumble, streamed)
+    }
+
+    #[test]
+    fn a_row_shows_the_stream_at_its_own_time_on_the_sensor_s_clock() {
+        let (tumble, streamed) = streamed(StreamClock { offset: 0.0371, error: 3e-4 }, |_| ());
+        for k in 0..400 {
+            let t = 10.5 + 0.0371 * f64::from(k);
+            let (here, there) = (streamed.truth(t, &|_| ()), tumble.truth(t, &|_| ()));
+            assert!((here.f_t - there.f_t).norm() < 1e-4, "{t}");
+            assert!((here.w_it_t - there.w_it_t).norm() < 1e-4, "{t}");
+            assert!((here.b_t - there.b_t).norm() < 1e-3, "{t}");
+            assert!((here.dw_it_t - there.dw_it_t).norm() < 0.05 * (1.0 + there.dw_it_t.norm()), "{t}");
+        }
+    }
+
+    #[test]
+    fn the_attitude_is_level_and_follows_the_rate() {
+        let (tumble, streamed) = streamed(StreamClock::default(), |_| ());
+        for t in [12.0, 17.3, 25.1] {
+            let (here, there) = (streamed.truth(t, &|_| ()), tumble.truth(t, &|_| ()));
+            let up = |truth: &Truth| (truth.c_p_n * truth.c_t_p * truth.f_t).normalize();
+            assert!((up(&here) - up(&there)).norm() < 2e-3, "{t}: {} {}", up(&here), up(&there));
+        }
+    }
+
+    #[test]
+    fn rows_in_a_gap_of_the_stream_and_beyond_its_ends_are_not_known() {
+        let (_, streamed) = streamed(StreamClock::default(), |stream| {
+            for values in stream.values.gyr.as_mut().unwrap().iter_mut().skip(3000).take(40) {
+                *values = Vector3::repeat(f64::NAN);
+            }
+        });
+        let at = |t: f64| streamed.known()[((t - 0.3) / 0.01).round() as usize];
+        assert!(at(11.9) && !at(12.05) && at(12.3));
+        assert!(streamed.truth(12.05, &|_| ()).w_it_t.iter().all(|w| w.is_finite()));
+        let late = StreamClock { offset: 5.0, error: 0.0 };
+        let rows: Vec<f64> = (0..2900).map(|k| 0.01 * f64::from(k)).collect();
+        let stream = stream(&Tumble::new(5, 3), StreamClock::default());
+        let cut = Streamed::new(&stream, late, &rows, vec![25.0; 2900], Place::ankara()).unwrap();
+        assert!(cut.known()[2400] && !cut.known()[2600]);
+    }
+
+    #[test]
+    fn the_speed_is_the_integral_of_what_is_not_gravity() {
+        let (_, streamed) = streamed(StreamClock::default(), |stream| {
+            // To and fro along the first axis in a first rest, 0.5 m/s² for a second each way.
+            for (time, force) in stream.time.iter().zip(stream.values.acc.as_mut().unwrap()) {
+                force.x += if (4.0..5.0).contains(time) {
+                    0.5
+                } else if (6.0..7.0).contains(time) {
+                    -0.5
+                } else {
+                    0.0
+                };
+            }
+        });
+        let at = |t: f64| streamed.speeds().unwrap()[((t - 0.3) / 0.01).round() as usize];
+        assert!(
+            (at(5.5) - 0.5).abs() < 0.03 && at(2.0) < 0.03 && at(8.0) < 0.03,
+            "{} {} {}",
+            at(5.5),
+            at(2.0),
+            at(8.0)
+        );
+    }
+
+    #[test]
+    fn a_stream_at_rest_does_not_move() {
+        let (_, streamed) = streamed(StreamClock::default(), |_| ());
+        assert!(streamed.moving()[..900].iter().all(|moves| !moves));
+        assert!(streamed.moving()[1050..1150].iter().all(|moves| *moves));
+    }
+}
