@@ -23,6 +23,17 @@ pub struct Asserted {
     pub equivalents: Vec<String>,
     /// Its parameters; none for an episode that has not ended.
     pub parameters: Vec<(String, Option<f64>)>,
+    /// Their standard errors.
+    #[serde(default)]
+    pub std_errors: Vec<(String, Option<f64>)>,
+}
+
+impl Asserted {
+    /// A parameter and its standard error, where both are numbers.
+    pub fn amount(&self, name: &str) -> Option<(f64, f64)> {
+        let of = |list: &[(String, Option<f64>)]| list.iter().find(|(own, _)| own == name)?.1;
+        Some((of(&self.parameters)?, of(&self.std_errors)?))
+    }
 }
 
 /// What is kept of a diagnosis.
@@ -61,6 +72,11 @@ impl Answer {
             probability: finite(cause.probability),
             equivalents: cause.equivalents.clone(),
             parameters: cause.parameters.iter().map(|p| (p.name.clone(), p.value.and_then(finite))).collect(),
+            std_errors: cause
+                .parameters
+                .iter()
+                .map(|p| (p.name.clone(), p.std_error.and_then(finite)))
+                .collect(),
         };
         let place = |place: &finding::Place| format!("{} {}", place.sensor, place.driver);
         Self {
@@ -169,6 +185,7 @@ pub(super) mod tests {
             probability: Some(0.99),
             equivalents: Vec::new(),
             parameters: parameters.clone(),
+            std_errors: Vec::new(),
         };
         Answer {
             verdict: Some(verdict),

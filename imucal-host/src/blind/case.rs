@@ -214,6 +214,10 @@ fn doses(
     passed_over: &mut Vec<String>,
     random: &mut Random,
 ) -> Result<Vec<Dose>, SimulationError> {
+    let size_of = |dose: &Dose| -> Result<f64, SimulationError> {
+        let signal = difference(&lambda.run(std::slice::from_ref(dose))?, &lambda.healthy);
+        Ok(largest(&lambda.of(&signal, &[])))
+    };
     random.shuffle(&mut pool);
     let mut doses: Vec<Dose> = Vec::new();
     for effect in pool {
@@ -225,7 +229,7 @@ fn doses(
         }
         let wanted = logarithmic(SIZES, random);
         let unit = shaped(effect, seed, lambda.duration(), random);
-        match sized(lambda, &unit, wanted)? {
+        match sized(&size_of, &unit, wanted)? {
             Some(dose) => doses.push(dose),
             None => passed_over.push(effect.id.clone()),
         }
@@ -235,7 +239,7 @@ fn doses(
 
 /// An effect of its usual size. Directions are those of [`Dose::sized`], or one parameter alone; shapes and times are
 /// drawn from more than the simulator does by itself.
-fn shaped(effect: &'static Effect, seed: u64, duration: f64, random: &mut Random) -> Dose {
+pub(super) fn shaped(effect: &'static Effect, seed: u64, duration: f64, random: &mut Random) -> Dose {
     let mut dose = Dose::sized(effect, if random.share() < 0.5 { -1.0 } else { 1.0 }, seed, duration);
     let roles: Vec<Role> = effect.parameters.iter().map(|parameter| parameter.role).collect();
     let amplitudes: Vec<usize> = (0..roles.len()).filter(|at| roles[*at] == Role::Amplitude).collect();
@@ -262,14 +266,17 @@ fn shaped(effect: &'static Effect, seed: u64, duration: f64, random: &mut Random
     dose
 }
 
-/// The effect in a size of this λ; `None` where no plausible size has it.
-fn sized(lambda: &Lambda, unit: &Dose, wanted: f64) -> Result<Option<Dose>, SimulationError> {
+/// The effect in a size of this λ, which `size_of` measures; `None` where no plausible size has it.
+pub(super) fn sized(
+    size_of: &dyn Fn(&Dose) -> Result<f64, SimulationError>,
+    unit: &Dose,
+    wanted: f64,
+) -> Result<Option<Dose>, SimulationError> {
     let (mut low, mut high, mut size) = (0.0f64, f64::INFINITY, 1.0f64);
     let mut best: Option<(f64, Dose)> = None;
     for _ in 0..TRIES {
         let Some(dose) = times(unit, size) else { break };
-        let signal = difference(&lambda.run(std::slice::from_ref(&dose))?, &lambda.healthy);
-        let found = largest(&lambda.of(&signal, &[]));
+        let found = size_of(&dose)?;
         let miss = libm::log(found / wanted);
         if best.as_ref().is_none_or(|(least, _)| miss.abs() < *least) {
             best = Some((miss.abs(), dose));

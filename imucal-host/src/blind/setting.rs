@@ -1,9 +1,7 @@
 //! Under what a trial's recording is made: drawn for each, wider than the simulator's defaults.
 
-use nalgebra::Vector3;
-
 use crate::{
-    recording::manifest::{Axis, gravity::normal_gravity},
+    recording::manifest::Axis,
     simulator::{
         Conditions, DriftKind, NoiseLevel, Place, Programme, Simulation, SimulationError, UnitKind,
         random::Random,
@@ -65,27 +63,18 @@ fn fitting(simulation: Simulation) -> Simulation {
     }
 }
 
-fn conditions(random: &mut Random) -> Conditions {
-    let level = |random: &mut Random| NoiseLevel {
+/// Noise of a sensor.
+pub(super) fn level(random: &mut Random) -> NoiseLevel {
+    NoiseLevel {
         white: logarithmic(WHITE, random),
         drift: logarithmic(DRIFT, random),
         kind: DriftKind::ALL[random.below(DriftKind::ALL.len())],
-    };
-    let noise = [level(random), level(random), level(random)];
-    Conditions { place: place(random), noise, scatter: logarithmic(SCATTER, random).to_radians() }
+    }
 }
 
-/// Somewhere on Earth; the field is that of a dipole, give or take.
-fn place(random: &mut Random) -> Place {
-    let latitude_deg = random.between(-60.0, 65.0);
-    let height = random.between(0.0, 1500.0);
-    let (sin, cos) = libm::sincos(f64::to_radians(latitude_deg));
-    let declination = random.between(-0.25, 0.25);
-    let strength = random.between(28.0, 32.0);
-    let level = strength * cos;
-    let field_n =
-        Vector3::new(level * libm::cos(declination), level * libm::sin(declination), 2.0 * strength * sin);
-    Place { latitude_deg, height, gravity: normal_gravity(latitude_deg, height), field_n }
+fn conditions(random: &mut Random) -> Conditions {
+    let noise = [level(random), level(random), level(random)];
+    Conditions { place: Place::draw(random), noise, scatter: logarithmic(SCATTER, random).to_radians() }
 }
 
 #[cfg(test)]

@@ -14,8 +14,7 @@ impl Score {
         let mut text = format!(
             "{healthy} healthy and {afflicted} afflicted recordings; 95 % intervals of Clopper and Pearson.\n\n"
         );
-        let _ =
-            writeln!(text, "{:<58}{:>9}{:>8}  {:<14}{:>8}{:>9}", "", "trials", "", "interval", "must", "aim");
+        text += &head();
         self.shares.iter().for_each(|share| text += &line(share));
         let [_, bound] = self.shares.first().map_or([0.0, 1.0], Share::interval);
         let _ = writeln!(
@@ -62,7 +61,13 @@ impl Score {
     }
 }
 
-fn line(share: &Share) -> String {
+/// The heads of the columns.
+pub(super) fn head() -> String {
+    format!("{:<58}{:>9}{:>8}  {:<14}{:>8}{:>9}\n", "", "trials", "", "interval", "must", "aim")
+}
+
+/// A figure.
+pub(super) fn line(share: &Share) -> String {
     let counts = format!("{}/{}", share.hits, share.trials);
     let (estimate, interval) = match share.estimate() {
         Some(estimate) => (percent(estimate), interval(share.interval())),

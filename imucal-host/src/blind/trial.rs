@@ -6,21 +6,20 @@
 use std::{
     fs::{self, File, OpenOptions},
     io::{self, Write},
-    panic::{AssertUnwindSafe, catch_unwind},
     path::{Path, PathBuf},
     sync::{
         Mutex,
         atomic::{AtomicUsize, Ordering},
     },
-    time::Instant,
 };
 
 use serde::{Deserialize, Serialize};
 
 use super::{
-    answer::{Answer, Finished, truly_closed},
-    case::{Case, draw_among},
+    answer::Finished,
+    case::Case,
     seal::{Nonce, digest},
+    world::{Outcome, RigWorld, World, WorldKind},
 };
 use crate::{
     diagnosis::Diagnosis,
@@ -58,6 +57,12 @@ pub enum TrialError {
         path.display()
     )]
     OtherSet { path: PathBuf, found: String, expected: String },
+    /// The folder holds trials of another world.
+    #[error(
+        "{}: found trials of the world `{found}`, expected `{expected}`; choose another folder, or --world {found} to go on with it",
+        path.display()
+    )]
+    OtherWorld { path: PathBuf, found: &'static str, expected: &'static str },
     /// A line that cannot be read, and is not the last.
     #[error("{}, line {line}: found {found}, expected a finished trial; remove the line and run again", path.display())]
     Damaged { path: PathBuf, line: usize, found: String },
@@ -82,6 +87,8 @@ const ANSWERS: &str = "answers.jsonl";
 struct Set {
     format: String,
     nonce: String,
+    #[serde(default, skip_serializing_if = "WorldKind::is_rig")]
+    world: WorldKind,
     /// Hash of the user's own effects that are drawn.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     drawn: Option<String>,
@@ -113,6 +120,13 @@ impl OwnEffects {
     }
 }
 
+/// What a folder's set is.
+struct FolderSet {
+    nonce: Nonce,
+    world: WorldKind,
+    drawn: Option<String>,
+}
+
 /// The seal of one case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Seal {
@@ -125,31 +139,60 @@ struct Seal {
 pub struct Folder {
     path: PathBuf,
     nonce: Nonce,
+    world: WorldKind,
     drawn: Option<String>,
     own: OwnEffects,
 }
 
 impl Folder {
-    /// Opens a folder or makes it, with this nonce, or its own, or a fresh one.
+    /// Opens a folder of trials with the rig or makes it, with this nonce, or its own, or a fresh one.
     ///
     /// # Errors
     ///
-    /// [`TrialError::OtherSet`], [`TrialError::File`].
+    /// As [`Self::open_of`].
     pub fn open(path: &Path, nonce: Option<Nonce>) -> Result<Self, TrialError> {
-        Self::open_with(path, nonce, OwnEffects::default())
+        Self::open_of(WorldKind::Rig, path, nonce, OwnEffects::default())
     }
 
-    /// Likewise, to be run with a user's own effects.
+    /// The folder of a set that is there, of whichever world.
     ///
     /// # Errors
     ///
-    /// As [`Self::open`].
-    pub fn open_with(path: &Path, nonce: Option<Nonce>, own: OwnEffects) -> Result<Self, TrialError> {
+    /// [`TrialError::Damaged`], [`TrialError::File`].
+    pub fn existing(path: &Path) -> Result<Option<Self>, TrialError> {
+        let own = OwnEffects::default();
+        let of = |set: FolderSet| Self {
+            path: path.to_owned(),
+            nonce: set.nonce,
+            world: set.world,
+            drawn: set.drawn,
+            own,
+        };
+        Ok(Self::set_of(path)?.map(of))
+    }
+
+    /// Opens a folder of trials of a world or makes it, with this nonce, or its own, or a fresh one, to be
+    /// run with a user's own effects.
+    ///
+    /// # Errors
+    ///
+    /// [`TrialError::OtherSet`], [`TrialError::OtherWorld`], [`TrialError::File`].
+    pub fn open_of(
+        world: WorldKind,
+        path: &Path,
+        nonce: Option<Nonce>,
+        own: OwnEffects,
+    ) -> Result<Self, TrialError> {
         let set_path = path.join("set.json");
         let failed = |cause| TrialError::File { path: set_path.clone(), cause };
-        if let Some((found, drawn)) = Self::set_of(path)? {
+        if let Some(folder) = Self::existing(path)? {
+            if folder.world != world {
+                let (found, expected) = (folder.world.name(), world.name());
+                return Err(TrialError::OtherWorld { path: set_path, found, expected });
+            }
+            let found = folder.nonce;
             return match nonce.filter(|wanted| *wanted != found) {
-                None => Ok(Self { path: path.to_owned(), nonce: found, drawn, own }),
+                None => Ok(Self { own, ..folder }),
                 Some(wanted) => {
                     Err(TrialError::OtherSet { path: set_path, found: found.hex(), expected: wanted.hex() })
                 }
@@ -166,19 +209,23 @@ impl Folder {
             None => Nonce::fresh().map_err(|cause| failed(io::Error::other(cause.to_string())))?,
         };
         let drawn = own.digest();
-        let set = Set { format: "imucal-blind/1".to_owned(), nonce: nonce.hex(), drawn: drawn.clone() };
+        let set =
+            Set { format: "imucal-blind/1".to_owned(), nonce: nonce.hex(), world, drawn: drawn.clone() };
         let text = serde_json::to_string_pretty(&set).unwrap_or_default() + "\n";
         let mut files = OutputSet::sparing_all_but(Vec::new());
         files.add(&set_path, text.as_bytes())?;
         files.commit()?;
-        Ok(Self { path: path.to_owned(), nonce, drawn, own })
+        Ok(Self { path: path.to_owned(), nonce, world, drawn, own })
     }
 
-    fn set_of(path: &Path) -> Result<Option<(Nonce, Option<String>)>, TrialError> {
+    fn set_of(path: &Path) -> Result<Option<FolderSet>, TrialError> {
         let path = path.join("set.json");
         let Some(text) = text_of(&path, Limits::read_small)? else { return Ok(None) };
         let set = serde_json::from_str::<Set>(&text).ok();
-        match set.and_then(|set| Some((Nonce::parse(&set.nonce)?, set.drawn))) {
+        let known = |set: Set| {
+            Some(FolderSet { nonce: Nonce::parse(&set.nonce)?, world: set.world, drawn: set.drawn })
+        };
+        match set.and_then(known) {
             Some(set) => Ok(Some(set)),
             None => Err(TrialError::Damaged { path, line: 1, found: text.chars().take(80).collect() }),
         }
@@ -187,6 +234,16 @@ impl Folder {
     /// Its nonce.
     pub fn nonce(&self) -> Nonce {
         self.nonce
+    }
+
+    /// A user's own effects that it is run with.
+    pub fn own(&self) -> &OwnEffects {
+        &self.own
+    }
+
+    /// Its world.
+    pub fn world(&self) -> WorldKind {
+        self.world
     }
 
     /// Trials that are over, in the order of their names, each against its seal.
@@ -211,7 +268,7 @@ impl Folder {
         Ok(finished)
     }
 
-    /// Runs those of the cases that are not over yet, so many at a time; `heard` is given how many of all are over.
+    /// Runs trials with the rig, see [`Self::run_in`].
     ///
     /// # Errors
     ///
@@ -221,6 +278,21 @@ impl Folder {
         cases: &[Case],
         jobs: usize,
         diagnose: &(dyn Fn(&Recording) -> Diagnosis + Sync),
+        heard: &(dyn Fn(usize) + Sync),
+    ) -> Result<(), TrialError> {
+        self.run_in(&RigWorld { diagnose, own: &self.own }, cases, jobs, heard)
+    }
+
+    /// Runs those of the cases that are not over yet, so many at a time; `heard` is given how many of all are over.
+    ///
+    /// # Errors
+    ///
+    /// [`TrialError`].
+    pub fn run_in(
+        &self,
+        world: &dyn World,
+        cases: &[Case],
+        jobs: usize,
         heard: &(dyn Fn(usize) + Sync),
     ) -> Result<(), TrialError> {
         if self.drawn != self.own.digest() {
@@ -233,7 +305,7 @@ impl Folder {
         let failure: Mutex<Option<TrialError>> = Mutex::new(None);
         let work = || {
             while let Some(case) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
-                if let Err(error) = trial(&self.nonce, *case, &self.own, diagnose, &writer) {
+                if let Err(error) = trial(&self.nonce, *case, world, &writer) {
                     next.store(left.len(), Ordering::Relaxed);
                     failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_or_insert(error);
                 }
@@ -266,25 +338,14 @@ pub fn mingled(healthy: usize, afflicted: usize) -> Vec<Case> {
 }
 
 /// One trial: drawn, sealed, recorded, diagnosed, opened.
-fn trial(
-    nonce: &Nonce,
-    case: Case,
-    own: &OwnEffects,
-    diagnose: &(dyn Fn(&Recording) -> Diagnosis + Sync),
-    writer: &Writer,
-) -> Result<(), TrialError> {
+fn trial(nonce: &Nonce, case: Case, world: &dyn World, writer: &Writer) -> Result<(), TrialError> {
     let name = case.name();
     let failed = |cause| TrialError::Simulation { case: name.clone(), cause };
-    let drawn = draw_among(nonce, case, own.drawn()).map_err(failed)?;
-    let label = serde_json::to_string(&drawn.label).unwrap_or_default();
+    let pending = world.draw(nonce, case).map_err(failed)?;
+    let label = pending.label;
     writer.seals.write(&Seal { case: name.clone(), sha256: digest(&label) })?;
-    let recording = drawn.simulation.record(&format!("{name}.csv")).map_err(failed)?;
-    let start = Instant::now();
-    // A diagnosis that panics has failed this trial, and not the set.
-    let diagnosis = catch_unwind(AssertUnwindSafe(|| diagnose(&recording))).ok();
-    let seconds = start.elapsed().as_secs_f64();
-    let answer = Answer::of(diagnosis.as_ref());
-    let truly_closed = truly_closed(&drawn, &answer, &own.effects).unwrap_or(None);
+    let outcome = (pending.finish)().map_err(failed)?;
+    let Outcome { answer, truly_closed, seconds } = outcome;
     writer.answers.write(&Finished { case: name, label, answer, truly_closed, seconds })
 }
 

@@ -1,10 +1,14 @@
 //! `imucal blind`
 
-use std::{num::NonZeroUsize, path::PathBuf};
+use std::{
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+};
 
 use anyhow::Context;
 use clap::Args;
 
+use super::simulate::unknown;
 use super::{
     Ending,
     output::{self, say},
@@ -16,16 +20,23 @@ use crate::{
     blind::{
         case::{Case, draw_among},
         judgement::Judgement,
+        robot,
         score::score,
         seal::Nonce,
         trial::{Folder, OwnEffects, mingled},
+        world::{RigWorld, World, WorldKind},
     },
-    diagnosis::{Options, diagnose},
+    diagnosis::{Diagnosis, Options, diagnose},
     file::Limits,
+    recording::{Recording, Stream},
+    simulator::robot::RobotPair,
 };
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
+    /// What is simulated: rig, or robot: pairs of a recording and its simulator's stream
+    #[arg(long, value_name = "WORLD", default_value = "rig", value_parser = world)]
+    world: WorldKind,
     /// Recordings with one, two or three effects of the catalogue, or with one from outside; the published figures are of 600
     #[arg(long, value_name = "N", default_value_t = 24)]
     cases: usize,
@@ -45,7 +56,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     misses: bool,
     /// Only score what the folder DIR holds
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["cases", "healthy", "out", "nonce", "jobs", "open", "effects"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["world", "cases", "healthy", "out", "nonce", "jobs", "open", "effects"])]
     score: Option<PathBuf>,
     /// Only write the recording of this case, such as afflicted-0003, and its label into --out
     #[arg(long, value_name = "CASE", value_parser = case, requires = "nonce")]
@@ -62,6 +73,10 @@ pub(super) struct Arguments {
 
 fn nonce(text: &str) -> Result<Nonce, String> {
     Nonce::parse(text).ok_or_else(|| format!("`{text}` is no nonce; expected one to 64 hexadecimal digits"))
+}
+
+fn world(text: &str) -> Result<WorldKind, String> {
+    WorldKind::find(text).ok_or_else(|| unknown("world", text, WorldKind::ALL.map(WorldKind::name)))
 }
 
 fn case(text: &str) -> Result<Case, String> {
@@ -85,31 +100,64 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
                 "{}: found no set of trials, expected the folder of an earlier run",
                 path.display()
             );
-            Folder::open(path, None)?
+            match Folder::existing(path)? {
+                Some(folder) => folder,
+                None => Folder::open(path, None)?,
+            }
         }
         None => trials(arguments)?,
     };
-    let judged: Vec<Judgement> = folder.finished()?.iter().filter_map(Judgement::of).collect();
     say!("Set of nonce {}.", folder.nonce().hex());
-    output::text(&score(&judged).table())?;
-    if arguments.misses {
-        for judgement in judged.iter().filter(|judgement| judgement.is_missed()) {
-            say!("{}", judgement.line());
-        }
+    let (table, misses) = scored(&folder)?;
+    output::text(&table)?;
+    for line in misses.iter().filter(|_| arguments.misses) {
+        say!("{line}");
     }
     Ok(Ending::Done)
+}
+
+/// The table of a folder's trials, and the missed ones.
+fn scored(folder: &Folder) -> anyhow::Result<(String, Vec<String>)> {
+    let finished = folder.finished()?;
+    Ok(match folder.world() {
+        WorldKind::Rig => {
+            let judged: Vec<Judgement> = finished.iter().filter_map(Judgement::of).collect();
+            let missed = judged.iter().filter(|judgement| judgement.is_missed());
+            (score(&judged).table(), missed.map(Judgement::line).collect())
+        }
+        WorldKind::Robot => {
+            let of = robot::judgement::RobotJudgement::of;
+            let judged: Vec<_> = finished.iter().filter_map(of).collect();
+            let missed = judged.iter().filter(|judgement| judgement.is_missed());
+            (robot::score::score(&judged).table(), missed.map(|judgement| judgement.line()).collect())
+        }
+    })
+}
+
+/// Diagnoses a robot's recording against its simulator's stream.
+fn diagnose_pair(pair: &RobotPair, options: &Options) -> Diagnosis {
+    let options = Options { stream: Stream::of(&pair.simulated), ..options.clone() };
+    diagnose(&pair.real, &options, &|_| ())
 }
 
 fn trials(arguments: &Arguments) -> anyhow::Result<Folder> {
     let own = own(arguments)?;
     let options = Options { effects: own.effects.clone(), ..Options::default() };
-    let folder = Folder::open_with(&arguments.out, arguments.nonce, own)?;
+    let folder = Folder::open_of(arguments.world, &arguments.out, arguments.nonce, own)?;
     let cases = mingled(arguments.healthy, arguments.cases);
     let cores = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let jobs = arguments.jobs.unwrap_or(cores).get();
     let progress = Progress::start();
     let heard = |over: usize| progress.stage(&format!("{over} of {} cases", cases.len()));
-    folder.run(&cases, jobs, &|recording| diagnose(recording, &options, &|_| ()), &heard)?;
+    let diagnose_recording = |recording: &Recording| diagnose(recording, &options, &|_| ());
+    let diagnose_pair = |pair: &RobotPair| diagnose_pair(pair, &options);
+    let rig = RigWorld { diagnose: &diagnose_recording, own: folder.own() };
+    let robots = robot::trial::RobotWorld(&diagnose_pair);
+    let world: &dyn World = match arguments.world {
+        WorldKind::Rig => &rig,
+        WorldKind::Robot => &robots,
+    };
+    folder.run_in(world, &cases, jobs, &heard)?;
     Ok(folder)
 }
 
@@ -122,8 +170,12 @@ fn own(arguments: &Arguments) -> anyhow::Result<OwnEffects> {
 fn open(nonce: Nonce, case: Case, arguments: &Arguments) -> anyhow::Result<Ending> {
     let folder = &arguments.out;
     std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    let label = folder.join(format!("{}.label.json", case.name()));
+    if arguments.world == WorldKind::Robot {
+        return open_pair(&robot::case::draw(&nonce, case)?, case, &label, arguments);
+    }
     let name = format!("{}.csv.gz", case.name());
-    let (path, label) = (folder.join(&name), folder.join(format!("{}.label.json", case.name())));
+    let path = folder.join(&name);
     let mut planned = Planned::recording(&path);
     planned.push(Planned::new(&label));
     let mut files = arguments.overwrite.plan(&[], &planned)?;
@@ -132,5 +184,28 @@ fn open(nonce: Nonce, case: Case, arguments: &Arguments) -> anyhow::Result<Endin
     files.add(&label, (serde_json::to_string_pretty(&drawn.label)? + "\n").as_bytes())?;
     files.commit()?;
     say!("{}", path.display());
+    Ok(Ending::Done)
+}
+
+/// Likewise for a pair.
+fn open_pair(
+    drawn: &robot::case::RobotDrawn,
+    case: Case,
+    label: &Path,
+    arguments: &Arguments,
+) -> anyhow::Result<Ending> {
+    let [real, simulated] =
+        ["real", "sim"].map(|part| arguments.out.join(format!("{}-{part}.csv.gz", case.name())));
+    let mut planned = Planned::recording(&real);
+    planned.extend(Planned::recording(&simulated));
+    planned.push(Planned::new(label));
+    let mut files = arguments.overwrite.plan(&[], &planned)?;
+    let pair = drawn.scene.record(&case.name())?;
+    pair.real.write_into(&real, &mut files)?;
+    pair.simulated.write_into(&simulated, &mut files)?;
+    files.add(label, (serde_json::to_string_pretty(&drawn.label)? + "\n").as_bytes())?;
+    files.commit()?;
+    say!("{}", real.display());
+    say!("{}", simulated.display());
     Ok(Ending::Done)
 }

@@ -25,6 +25,7 @@ mod output;
 mod overwrite;
 mod progress;
 mod reading;
+mod robot;
 mod simulate;
 mod study;
 mod verify;

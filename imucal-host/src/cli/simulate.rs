@@ -10,7 +10,7 @@ use super::{
     Ending,
     output::{self, say},
     overwrite::{Overwrite, Planned},
-    own_effects,
+    own_effects, robot,
 };
 use crate::{
     blind::{
@@ -25,8 +25,9 @@ use crate::{
     },
     report,
     simulator::{
-        Conditions, Programme, Simulation, UnitKind,
+        Conditions, Dose, Programme, Simulation, UnitKind,
         random::{Purpose, Random},
+        robot::{MismatchKind, RobotKind, RobotScene},
     },
 };
 
@@ -44,6 +45,16 @@ pub(super) struct Arguments {
     /// The unit: mtx or 3dm-gx2
     #[arg(long, value_name = "UNIT", default_value = "mtx", value_parser = unit)]
     unit: UnitKind,
+    /// Simulate a robot instead of the rig: legged, wheeled or flying. Writes what it recorded, NAME-real, and what its
+    /// simulator says, NAME-sim; 120 s if no length is given
+    #[arg(long, value_name = "KIND", value_parser = robot_kind, conflicts_with_all = ["programme", "axes", "sealed"])]
+    robot: Option<RobotKind>,
+    /// Sampling rate of the robot's simulator
+    #[arg(long, value_name = "HZ", default_value_t = 200.0, requires = "robot")]
+    sim_rate: f64,
+    /// Stretches in which the robot moves otherwise than its simulator says: slip, gait or contact
+    #[arg(long, value_name = "KIND", value_parser = mismatch, requires = "robot")]
+    mismatch: Option<MismatchKind>,
     /// What the rig does: multi-position, rates, sinusoids, gyroscope, thermal, full or mixed
     #[arg(long, value_name = "NAME", default_value = "full", value_parser = programme)]
     programme: Programme,
@@ -81,6 +92,15 @@ pub(super) struct Arguments {
 
 fn unit(text: &str) -> Result<UnitKind, String> {
     UnitKind::find(text).ok_or_else(|| unknown("unit", text, UnitKind::ALL.map(UnitKind::name)))
+}
+
+fn robot_kind(text: &str) -> Result<RobotKind, String> {
+    RobotKind::find(text).ok_or_else(|| unknown("robot", text, RobotKind::ALL.map(RobotKind::name)))
+}
+
+fn mismatch(text: &str) -> Result<MismatchKind, String> {
+    let names = MismatchKind::ALL.map(MismatchKind::name);
+    MismatchKind::find(text).ok_or_else(|| unknown("mismatch", text, names))
 }
 
 fn programme(text: &str) -> Result<Programme, String> {
@@ -139,6 +159,15 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         output::text(&report::catalogue::catalogue(&own))?;
         return Ok(Ending::Done);
     };
+    let sized = |(id, size): &(String, f64)| -> anyhow::Result<(&'static Effect, f64)> {
+        let effect = known(id, &own).map_err(|unknown| anyhow::anyhow!("--effect: {unknown}"))?;
+        Ok((effect, *size))
+    };
+    let effects: Vec<_> = arguments.doses.iter().map(sized).collect::<Result<_, _>>()?;
+    let inputs: Vec<PathBuf> = arguments.effects.iter().cloned().collect();
+    if let Some(kind) = arguments.robot {
+        return robot::simulate(scene(kind, arguments), &effects, &inputs, out, arguments.overwrite);
+    }
     let mut simulation = Simulation {
         unit: arguments.unit,
         programme: arguments.programme,
@@ -155,22 +184,43 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if arguments.sealed {
         return sealed(simulation, out, arguments.overwrite);
     }
-    let inputs: Vec<PathBuf> = arguments.effects.iter().cloned().collect();
     let mut files = arguments.overwrite.plan(&inputs, &Planned::recording(out))?;
-    for (id, size) in &arguments.doses {
-        let effect = known(id, &own).map_err(|unknown| anyhow::anyhow!("--effect: {unknown}"))?;
-        simulation.add(effect, *size)?;
+    for (effect, size) in effects {
+        simulation.add(effect, size)?;
     }
     let done = write(&simulation, out, &mut files)?;
     files.commit()?;
     say!("{done}");
-    for dose in &simulation.doses {
+    say_doses(&simulation.doses)?;
+    Ok(Ending::Done)
+}
+
+/// What the arguments say of a robot.
+fn scene(kind: RobotKind, arguments: &Arguments) -> RobotScene {
+    let usual = RobotScene::default();
+    RobotScene {
+        kind,
+        seed: arguments.seed,
+        duration: arguments.duration.unwrap_or(usual.duration),
+        real_rate: arguments.rate,
+        sim_rate: arguments.sim_rate,
+        unit: arguments.unit,
+        noise: !arguments.no_noise,
+        counts: !arguments.si,
+        mismatch: arguments.mismatch.map(|kind| (kind, 1.0)),
+        ..usual
+    }
+}
+
+/// A line for each effect.
+pub(super) fn say_doses(doses: &[Dose]) -> anyhow::Result<()> {
+    for dose in doses {
         let values = dose.effect.parameters.iter().zip(&dose.values);
         let values: Vec<String> =
             values.map(|(p, value)| format!("{} = {value:.4e} {}", p.name, p.unit)).collect();
         say!("  {}: {}", dose.effect.id, values.join(", "));
     }
-    Ok(Ending::Done)
+    Ok(())
 }
 
 /// Adds the recording to a set of files; what is to be said of it.

@@ -4,7 +4,6 @@ use super::{
     place::Place,
     unit::{DriftKind, UnitUnderTest},
 };
-use crate::recording::SensorKind;
 
 /// Noise of one sensor against its sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,12 +47,7 @@ impl Default for Conditions {
 impl Conditions {
     /// The unit with the noise it has under these conditions.
     pub(super) fn applied_to(&self, mut unit: UnitUnderTest) -> UnitUnderTest {
-        for (kind, level) in SensorKind::ALL.into_iter().zip(self.noise) {
-            let triad = unit.triad_mut(kind);
-            triad.noise *= level.white;
-            triad.drift.sigma *= level.drift;
-            triad.drift.kind = level.kind;
-        }
+        unit.apply(self.noise);
         unit
     }
 }

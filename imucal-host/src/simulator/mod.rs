@@ -6,6 +6,7 @@
 pub mod chain;
 pub mod climate;
 pub mod conditions;
+mod converter;
 pub mod course;
 pub mod dose;
 mod error;
@@ -16,6 +17,7 @@ pub mod random;
 pub mod recent;
 pub mod recorder;
 pub mod replay;
+pub mod robot;
 pub mod run;
 pub mod streamed;
 pub mod tracked;

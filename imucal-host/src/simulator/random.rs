@@ -25,6 +25,14 @@ pub enum Purpose {
     Effect,
     /// Which effects a sealed case has.
     Case,
+    /// Where a robot goes, and how.
+    Route,
+    /// How a robot shakes its sensors.
+    Vibration,
+    /// Where a robot departs from its plan.
+    Deviation,
+    /// Which samples are lost.
+    Loss,
 }
 
 /// A source of random numbers.

@@ -1,24 +1,21 @@
 //! A recording of the flight motion simulator: programme, unit, effects and a seed.
 
-use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{
     SimulationError,
     chain::Chain,
     conditions::Conditions,
+    converter::{self, Chance},
     dose::Dose,
     programme::{Programme, Schedule, wrap},
     random::{Purpose, Random},
     truth::Motion,
-    unit::{TriadUnderTest, UnitKind, UnitUnderTest},
+    unit::{UnitKind, UnitUnderTest},
 };
 use crate::{
-    effect::{Effect, Input, SignalRun, Truth},
-    recording::{
-        Manifest, Recording, SensorKind, Unit,
-        manifest::{Axis, Identity, PerSensor, Site},
-    },
+    effect::{Effect, Input, Truth},
+    recording::{Manifest, Recording, SensorKind, manifest::Axis},
 };
 
 /// Rates there is a recording of, Hz.
@@ -29,8 +26,6 @@ const LONGEST: f64 = 21_600.0;
 const ENCODER_STEP: f64 = std::f64::consts::TAU / 1_048_576.0;
 /// An arc second, rad.
 const ARC_SECOND: f64 = std::f64::consts::PI / 648_000.0;
-/// Noise and step of the thermometer, K.
-const THERMOMETER: (f64, f64) = (0.03, 0.01);
 
 /// What to simulate.
 #[derive(Clone, Debug)]
@@ -136,7 +131,9 @@ impl Simulation {
         for kind in SensorKind::ALL {
             let triad = unit.triad(kind);
             let clean = chain.output(kind, &triad.triad, &input)?;
-            let samples = self.convert(kind, triad, &chain, clean, &recording.time, &mut random);
+            let chance =
+                self.noise.then(|| Chance { random: &mut random, interval: 1.0 / self.rate, shaken: &[] });
+            let samples = converter::samples(kind, triad, &chain, clean, &recording.time, chance);
             // Its own manifest has every conversion it needs.
             let triple = manifest.triple(kind, samples).ok();
             match kind {
@@ -150,42 +147,9 @@ impl Simulation {
         Ok(recording)
     }
 
-    /// Noise, limit and steps of the converter, and what becomes of the samples behind it; SI units.
-    fn convert(
-        &self,
-        kind: SensorKind,
-        triad: &TriadUnderTest,
-        chain: &Chain<'_>,
-        clean: Vec<Vector3<f64>>,
-        time: &[f64],
-        random: &mut Random,
-    ) -> Vec<Vector3<f64>> {
-        let mut samples = clean;
-        let mut noise = vec![Vector3::zeros(); samples.len()];
-        if self.noise {
-            noise.iter_mut().for_each(|noise| *noise = random.normals() * triad.noise);
-            let drift = triad.drift.draw(samples.len(), 1.0 / self.rate, random);
-            samples.iter_mut().zip(drift).for_each(|(sample, drift)| *sample += drift);
-        }
-        let mut limit = triad.full_scale;
-        chain.signal(kind, SignalRun { time, noise: &mut noise, limit: &mut limit });
-        for (sample, noise) in samples.iter_mut().zip(&noise) {
-            *sample = (*sample + noise).map(|value| value.clamp(-limit, limit));
-            if self.noise {
-                *sample = sample.map(|value| (value * triad.counts.per_unit).round() / triad.counts.per_unit);
-            }
-        }
-        chain.data(kind, &mut samples);
-        samples
-    }
-
     fn thermometer(&self, truth: &[Truth]) -> Vec<f64> {
         let mut random = Random::new(self.seed, Purpose::Thermometer);
-        let (sigma, step) = THERMOMETER;
-        let read = |row: &Truth| match self.noise {
-            true => ((row.temperature + sigma * random.normal()) / step).round() * step,
-            false => row.temperature,
-        };
+        let read = |row: &Truth| converter::thermometer(row.temperature, self.noise.then_some(&mut random));
         truth.iter().map(read).collect()
     }
 
@@ -206,36 +170,7 @@ impl Simulation {
     }
 
     fn manifest(&self, motion: &dyn Motion, unit: &UnitUnderTest) -> Manifest {
-        let place = motion.place();
-        let mut manifest = Manifest {
-            site: Site {
-                latitude_deg: Some(place.latitude_deg),
-                height_m: Some(place.height),
-                gravity: Some(place.gravity),
-                field_ned_ut: Some(place.field_n.into()),
-            },
-            rig: Some(motion.rig()),
-            sensor: Identity { name: Some(unit.name.to_owned()), serial: Some(unit.serial.clone()) },
-            ..Manifest::default()
-        };
-        let of = |value: &dyn Fn(&TriadUnderTest) -> f64| PerSensor {
-            acc: Some(value(&unit.acc)),
-            gyr: Some(value(&unit.gyr)),
-            mag: Some(value(&unit.mag)),
-        };
-        if self.counts {
-            (manifest.units.acc, manifest.units.gyr, manifest.units.mag) =
-                (Unit::Counts, Unit::Counts, Unit::Counts);
-            manifest.counts = PerSensor {
-                acc: Some(unit.acc.counts),
-                gyr: Some(unit.gyr.counts),
-                mag: Some(unit.mag.counts),
-            };
-            manifest.ranges = of(&|triad| triad.full_scale * triad.counts.per_unit);
-        } else {
-            manifest.ranges = of(&|triad| triad.full_scale);
-        }
-        manifest
+        unit.manifest(motion.place().site(), motion.rig(), self.counts)
     }
 }
 

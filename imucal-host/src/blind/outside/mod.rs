@@ -45,7 +45,7 @@ pub fn find(id: &str) -> Option<&'static Effect> {
     OUTSIDE.iter().find(|effect| effect.id == id)
 }
 
-fn mechanism(
+pub(super) fn mechanism(
     kind: SensorKind,
     name: &str,
     act: Act,
@@ -73,7 +73,7 @@ fn mechanism(
 }
 
 /// Amplitudes that a size of one makes this large; none is implausible.
-fn amplitudes(names: &[&str], scale: f64) -> Vec<Parameter> {
+pub(super) fn amplitudes(names: &[&str], scale: f64) -> Vec<Parameter> {
     let amplitude = |name: &&str| Parameter {
         name: (*name).to_owned(),
         unit: "SI".to_owned(),
@@ -85,7 +85,7 @@ fn amplitudes(names: &[&str], scale: f64) -> Vec<Parameter> {
     names.iter().map(amplitude).collect()
 }
 
-fn shape(name: &str, usual: f64) -> Parameter {
+pub(super) fn shape(name: &str, usual: f64) -> Parameter {
     Parameter {
         name: name.to_owned(),
         unit: "SI".to_owned(),
@@ -96,19 +96,19 @@ fn shape(name: &str, usual: f64) -> Parameter {
     }
 }
 
-const XYZ: [&str; 3] = ["x", "y", "z"];
+pub(super) const XYZ: [&str; 3] = ["x", "y", "z"];
 
-fn vector(values: &[f64], at: usize) -> Vector3<f64> {
+pub(super) fn vector(values: &[f64], at: usize) -> Vector3<f64> {
     Vector3::from_fn(|k, _| values.get(at + k).copied().unwrap_or(0.0))
 }
 
 /// y, z, x of x, y, z: what the neighbouring axis has.
-fn neighbour(v: &Vector3<f64>) -> Vector3<f64> {
+pub(super) fn neighbour(v: &Vector3<f64>) -> Vector3<f64> {
     Vector3::new(v.y, v.z, v.x)
 }
 
 /// One of three, by sensor.
-fn of(kind: SensorKind, acc: f64, gyr: f64, mag: f64) -> f64 {
+pub(super) fn of(kind: SensorKind, acc: f64, gyr: f64, mag: f64) -> f64 {
     match kind {
         SensorKind::Acc => acc,
         SensorKind::Gyr => gyr,

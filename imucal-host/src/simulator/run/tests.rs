@@ -1,5 +1,6 @@
 use std::sync::LazyLock;
 
+use nalgebra::Vector3;
 use sha2::{Digest, Sha256};
 
 use super::*;

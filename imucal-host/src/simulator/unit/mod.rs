@@ -12,8 +12,14 @@
 use imucal_core::{rotation, triad::Triad};
 use nalgebra::{Matrix3, Vector3};
 
-use super::random::{Purpose, Random};
-use crate::recording::{SensorKind, manifest::Counts};
+use super::{
+    NoiseLevel,
+    random::{Purpose, Random},
+};
+use crate::recording::{
+    Manifest, SensorKind, Unit,
+    manifest::{Counts, Identity, PerSensor, Rig, Site},
+};
 
 mod drift;
 mod gx2;
@@ -152,12 +158,41 @@ impl UnitUnderTest {
         }
     }
 
-    /// One triad, to be altered.
-    pub(super) fn triad_mut(&mut self, kind: SensorKind) -> &mut TriadUnderTest {
-        match kind {
-            SensorKind::Acc => &mut self.acc,
-            SensorKind::Gyr => &mut self.gyr,
-            SensorKind::Mag => &mut self.mag,
+    /// The manifest of a recording of it, in raw counts or in SI units.
+    pub(super) fn manifest(&self, site: Site, rig: Rig, in_counts: bool) -> Manifest {
+        let mut manifest = Manifest {
+            site,
+            rig: Some(rig),
+            sensor: Identity { name: Some(self.name.to_owned()), serial: Some(self.serial.clone()) },
+            ..Manifest::default()
+        };
+        let of = |value: &dyn Fn(&TriadUnderTest) -> f64| PerSensor {
+            acc: Some(value(&self.acc)),
+            gyr: Some(value(&self.gyr)),
+            mag: Some(value(&self.mag)),
+        };
+        if in_counts {
+            (manifest.units.acc, manifest.units.gyr, manifest.units.mag) =
+                (Unit::Counts, Unit::Counts, Unit::Counts);
+            manifest.counts = PerSensor {
+                acc: Some(self.acc.counts),
+                gyr: Some(self.gyr.counts),
+                mag: Some(self.mag.counts),
+            };
+            manifest.ranges = of(&|triad| triad.full_scale * triad.counts.per_unit);
+        } else {
+            manifest.ranges = of(&|triad| triad.full_scale);
+        }
+        manifest
+    }
+
+    /// Gives it noise of these levels, by [`SensorKind::ALL`].
+    pub(super) fn apply(&mut self, levels: [NoiseLevel; 3]) {
+        let triads = [&mut self.acc, &mut self.gyr, &mut self.mag];
+        for (triad, level) in triads.into_iter().zip(levels) {
+            triad.noise *= level.white;
+            triad.drift.sigma *= level.drift;
+            triad.drift.kind = level.kind;
         }
     }
 }

@@ -1,0 +1,138 @@
+//! One opened trial with a robot held against its answer. Of the diagnosis and the label it is a function, and of nothing
+//! else.
+
+use super::{
+    case::{Content, RobotLabel},
+    setting::DELAY,
+};
+use crate::{
+    blind::answer::{Answer, Asserted, Finished},
+    diagnosis::Verdict,
+    effect::class::class,
+};
+
+/// Causes that are true of every pair: each stream has a clock of its own.
+const CLOCK: [&str; 2] = ["clk.time_offset", "clk.rate_error"];
+/// The cause that says that the robot moved otherwise.
+const MOTION: &str = "ref.motion_mismatch";
+/// A delay is right within so many standard errors,
+const ERRORS: f64 = 3.0;
+/// and within this share of it, or this time, s.
+const CLOSE: (f64, f64) = (0.1, 2e-4);
+
+/// A trial, judged.
+#[derive(Clone, Debug)]
+pub struct RobotJudgement {
+    /// Its label.
+    pub label: RobotLabel,
+    /// Its answer.
+    pub answer: Answer,
+    /// λ of what is there; 0 without.
+    pub lambda: f64,
+    /// Something other than the clock is said to be there.
+    pub alarmed: bool,
+    /// Besides the clock the asserted classes are those that are there, and none besides.
+    pub class_right: bool,
+    /// It is said that the robot moved otherwise, and no sensor is blamed.
+    pub motion_said: bool,
+    /// The verdict is that something unknown is there.
+    pub flagged: bool,
+    /// The delay, and whether it was reported rightly; none where it is too short or too long to be asked for.
+    pub delay: Option<bool>,
+    /// Likewise the clock's rate, by its standard errors alone; none where none is reported.
+    pub rate: Option<bool>,
+    /// Time of the diagnosis, s.
+    pub seconds: f64,
+}
+
+impl RobotJudgement {
+    /// Of a finished trial; `None` where its label cannot be read.
+    pub fn of(trial: &Finished) -> Option<Self> {
+        let label: RobotLabel = serde_json::from_str(&trial.label).ok()?;
+        let answer = trial.answer.clone();
+        let besides: Vec<&Asserted> =
+            answer.causes.iter().filter(|cause| !CLOCK.contains(&cause.effect.as_str())).collect();
+        let flagged = matches!(answer.verdict, Some(Verdict::Unknown | Verdict::Partly));
+        let answered = !matches!(answer.verdict, None | Some(Verdict::NotTestable));
+        let of_class = |id: &str| besides.iter().all(|cause| class(&cause.effect) == class(id));
+        let there = label.effect.as_ref();
+        let lambda = [there.map(|present| present.lambda), label.mismatch.as_ref().map(|m| m.lambda)];
+        Some(Self {
+            lambda: lambda.into_iter().flatten().fold(0.0, f64::max),
+            alarmed: !answered || flagged || !besides.is_empty(),
+            class_right: there.is_some_and(|present| !besides.is_empty() && of_class(&present.effect)),
+            motion_said: !besides.is_empty() && of_class(MOTION),
+            flagged,
+            delay: delay(&label, &answer),
+            rate: rate(&label, &answer),
+            seconds: trial.seconds,
+            label,
+            answer,
+        })
+    }
+
+    /// It is not what it ought to be.
+    pub fn is_missed(&self) -> bool {
+        let wrong = match self.label.content {
+            Content::Healthy => self.alarmed,
+            Content::Effect => !self.class_right,
+            Content::Motion => !self.motion_said,
+            Content::Spoken | Content::Unspoken => !self.flagged,
+        };
+        wrong || self.delay == Some(false)
+    }
+
+    /// A line that says what was there and what was answered.
+    pub fn line(&self) -> String {
+        let label = &self.label;
+        let there = match (&label.effect, &label.mismatch) {
+            (Some(present), _) => present.effect.clone(),
+            (None, Some(departed)) => format!("{MOTION} by {}", departed.kind),
+            (None, None) => "nothing".to_owned(),
+        };
+        let amount = |cause: &Asserted| {
+            let delay = cause.amount("offset").filter(|_| cause.effect == CLOCK[0]);
+            delay.map_or(String::new(), |(value, error)| {
+                format!(" {:.3} ± {:.3} ms", 1e3 * value, 1e3 * error)
+            })
+        };
+        let cause = |cause: &Asserted| {
+            format!("{}{} p {:.3}", cause.effect, amount(cause), cause.probability.unwrap_or(f64::NAN))
+        };
+        let causes: Vec<String> = self.answer.causes.iter().map(cause).collect();
+        let verdict = self.answer.verdict.and_then(|verdict| serde_json::to_value(verdict).ok());
+        let verdict = verdict.as_ref().and_then(|verdict| verdict.as_str()).unwrap_or("no answer").to_owned();
+        let setting = &label.setting;
+        format!(
+            "{}: {there} [λ {:.0}], delay {:.3} ms | {verdict}: {} | credible {} | {} {} {:.0}/{:.0} Hz {:.0} s",
+            label.case,
+            self.lambda,
+            1e3 * setting.clock_offset,
+            if causes.is_empty() { "nothing".to_owned() } else { causes.join(" + ") },
+            self.answer.credible_set.join(", "),
+            setting.machine,
+            setting.unit,
+            setting.rates[0],
+            setting.rates[1],
+            setting.duration,
+        )
+    }
+}
+
+fn delay(label: &RobotLabel, answer: &Answer) -> Option<bool> {
+    let truth = label.setting.clock_offset;
+    if !(DELAY.0..=DELAY.1).contains(&truth.abs()) {
+        return None;
+    }
+    let said = answer.causes.iter().find(|cause| cause.effect == CLOCK[0]);
+    Some(said.and_then(|cause| cause.amount("offset")).is_some_and(|(value, error)| {
+        let miss = (value - truth).abs();
+        miss <= ERRORS * error && miss <= f64::max(CLOSE.0 * truth.abs(), CLOSE.1)
+    }))
+}
+
+fn rate(label: &RobotLabel, answer: &Answer) -> Option<bool> {
+    let said = answer.causes.iter().find(|cause| cause.effect == CLOCK[1])?;
+    let (value, error) = said.amount("error")?;
+    Some((value - label.setting.clock_rate_error).abs() <= ERRORS * error)
+}

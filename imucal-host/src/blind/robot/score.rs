@@ -1,0 +1,147 @@
+//! The frozen scorer of trials with robots: the figures of the contract's table, from judged trials.
+
+use super::{case::Content, judgement::RobotJudgement};
+use crate::blind::score::{Goal, Share};
+
+use Goal::{AtLeast, AtMost};
+
+/// All figures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RobotScore {
+    /// Healthy and afflicted pairs.
+    pub trials: [usize; 2],
+    /// The figures of the contract, in its order.
+    pub shares: Vec<Share>,
+    /// Figures besides the contract's.
+    pub further: Vec<Share>,
+    /// Median and largest time of a diagnosis, s.
+    pub seconds: [f64; 2],
+}
+
+/// A share of trials: among which, which of them hit, and what the contract asks of it.
+struct Figure {
+    name: &'static str,
+    of: fn(&RobotJudgement) -> bool,
+    hit: fn(&RobotJudgement) -> bool,
+    must: Option<Goal>,
+    aim: Option<Goal>,
+}
+
+impl Figure {
+    fn of(&self, judged: &[RobotJudgement]) -> Share {
+        let trials: Vec<&RobotJudgement> = judged.iter().filter(|j| (self.of)(j)).collect();
+        let hits = trials.iter().filter(|j| (self.hit)(j)).count();
+        Share { name: self.name, hits, trials: trials.len(), must: self.must, aim: self.aim }
+    }
+
+    const fn besides(
+        name: &'static str,
+        of: fn(&RobotJudgement) -> bool,
+        hit: fn(&RobotJudgement) -> bool,
+    ) -> Self {
+        Self { name, of, hit, must: None, aim: None }
+    }
+}
+
+fn holds(j: &RobotJudgement, content: Content) -> bool {
+    j.label.content == content
+}
+
+/// Where nothing else moves or bends what the clock is found from.
+fn has_delay(j: &RobotJudgement) -> bool {
+    j.delay.is_some() && matches!(j.label.content, Content::Healthy | Content::Effect)
+}
+
+/// The contract's figures.
+const CONTRACT: [Figure; 4] = [
+    Figure {
+        name: "healthy pairs, false alarm",
+        of: |j| holds(j, Content::Healthy),
+        hit: |j| j.alarmed,
+        must: Some(AtMost(0.05)),
+        aim: Some(AtMost(0.02)),
+    },
+    Figure {
+        name: "one effect beside clock and mount, class-correct, λ ≥ 100",
+        of: |j| holds(j, Content::Effect) && j.lambda >= 100.0,
+        hit: |j| j.class_right,
+        must: Some(AtLeast(0.95)),
+        aim: Some(AtLeast(0.98)),
+    },
+    Figure {
+        name: "delay of 2 to 50 ms, within 3 errors and 10 % or 0.2 ms",
+        of: has_delay,
+        hit: |j| j.delay == Some(true),
+        must: Some(AtLeast(0.95)),
+        aim: Some(AtLeast(1.0)),
+    },
+    Figure {
+        name: "motion that the simulator lacks: said, no sensor blamed",
+        of: |j| holds(j, Content::Motion),
+        hit: |j| j.motion_said,
+        must: Some(AtLeast(0.90)),
+        aim: Some(AtLeast(0.98)),
+    },
+];
+
+/// Figures next to the contract's.
+const FURTHER: [Figure; 10] = [
+    Figure::besides(
+        "one effect, class-correct, λ < 100",
+        |j| holds(j, Content::Effect) && j.lambda < 100.0,
+        |j| j.class_right,
+    ),
+    Figure::besides(
+        "one effect, class-correct, λ 300 and more",
+        |j| holds(j, Content::Effect) && j.lambda >= 300.0,
+        |j| j.class_right,
+    ),
+    Figure::besides(
+        "one effect, λ ≥ 100, said to be motion",
+        |j| holds(j, Content::Effect) && j.lambda >= 100.0,
+        |j| j.motion_said,
+    ),
+    Figure::besides(
+        "clock's rate, where reported, within 3 errors",
+        |j| j.rate.is_some(),
+        |j| j.rate == Some(true),
+    ),
+    Figure::besides(
+        "delay of 2 to 50 ms beside other motion or mechanisms",
+        |j| j.delay.is_some() && !has_delay(j),
+        |j| j.delay == Some(true),
+    ),
+    Figure::besides(
+        "outside, a formula says it, flagged, λ ≥ 200",
+        |j| holds(j, Content::Spoken) && j.lambda >= 200.0,
+        |j| j.flagged,
+    ),
+    Figure::besides(
+        "outside, no formula says it, flagged, λ ≥ 200",
+        |j| holds(j, Content::Unspoken) && j.lambda >= 200.0,
+        |j| j.flagged,
+    ),
+    Figure::besides(
+        "outside, an effect of the catalogue asserted",
+        |j| matches!(j.label.content, Content::Spoken | Content::Unspoken),
+        |j| j.alarmed && !j.flagged,
+    ),
+    Figure::besides("within the catalogue, flagged", |j| holds(j, Content::Effect), |j| j.flagged),
+    Figure::besides("without an answer", |_| true, |j| j.answer.verdict.is_none()),
+];
+
+/// Scores judged trials.
+pub fn score(judged: &[RobotJudgement]) -> RobotScore {
+    let mut seconds: Vec<f64> = judged.iter().map(|j| j.seconds).collect();
+    seconds.sort_by(f64::total_cmp);
+    let healthy = judged.iter().filter(|j| holds(j, Content::Healthy)).count();
+    RobotScore {
+        trials: [healthy, judged.len() - healthy],
+        shares: CONTRACT.iter().map(|figure| figure.of(judged)).collect(),
+        further: FURTHER.iter().map(|figure| figure.of(judged)).collect(),
+        seconds: [seconds.get(seconds.len() / 2), seconds.last()].map(|s| s.copied().unwrap_or(0.0)),
+    }
+}
+
+#[cfg(test)]
+mod tests;

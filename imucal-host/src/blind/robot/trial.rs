@@ -1,0 +1,34 @@
+//! Trials with robots, as a folder of sealed trials runs them.
+
+use super::case::draw;
+use crate::{
+    blind::{
+        answer::Answer,
+        case::Case,
+        seal::Nonce,
+        world::{Outcome, Pending, World, WorldKind, timed},
+    },
+    diagnosis::Diagnosis,
+    simulator::{SimulationError, robot::RobotPair},
+};
+
+/// Pairs of robots, and what diagnoses them.
+#[allow(missing_debug_implementations)] // A function has no text.
+pub struct RobotWorld<'d>(pub &'d (dyn Fn(&RobotPair) -> Diagnosis + Sync));
+
+impl World for RobotWorld<'_> {
+    fn kind(&self) -> WorldKind {
+        WorldKind::Robot
+    }
+
+    fn draw(&self, nonce: &Nonce, case: Case) -> Result<Pending<'_>, SimulationError> {
+        let drawn = draw(nonce, case)?;
+        let label = serde_json::to_string(&drawn.label).unwrap_or_default();
+        let finish = move || {
+            let pair = drawn.scene.record(&case.name())?;
+            let (diagnosis, seconds) = timed(|| (self.0)(&pair));
+            Ok(Outcome { answer: Answer::of(diagnosis.as_ref()), truly_closed: None, seconds })
+        };
+        Ok(Pending { label, finish: Box::new(finish) })
+    }
+}
