@@ -1,6 +1,7 @@
 //! An effect of one's own: how it is defined, simulated, and what a diagnosis says of it.
 //!
-//! The simulator takes any effect. The diagnosis looks for those of [`CATALOGUE`] alone. To have it look for a new one:
+//! The simulator takes any effect. The diagnosis looks for those of [`CATALOGUE`] and of
+//! `diagnosis::Options::effects`. To have it look for a new one:
 //!
 //! 1. Write `imucal-host/src/effect/NAME.rs` like `scale_cubic.rs`: a function `effect`, which says what the effect is,
 //!    and a function `alter`, which does it.

@@ -22,7 +22,7 @@
 //! | stage | goes in | comes out |
 //! | --- | --- | --- |
 //! | [`recording`] | a CSV or Parquet file and its manifest | samples in SI, warnings, which rows can be used |
-//! | [`effect`] | – | the only list of what a simulator may lack |
+//! | [`effect`] | – | the only list of what a simulator may lack; a user's own, from a file |
 //! | [`simulator`] | a movement, effects | what ideal or afflicted sensors put out |
 //! | [`noise`], [`observe`], [`ellipsoid`] | samples | rests, motions, turns, and the noise of their means |
 //! | [`calibrate`] | observations | triads with standard errors; accepted, suspect or refused |

@@ -4,7 +4,13 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use super::{fault::EntryFault, formula::Formula, function, history::History, parser, quantity};
+use super::{
+    fault::EntryFault,
+    formula::{Formula, Layout},
+    function,
+    history::History,
+    parser, quantity,
+};
 use crate::{
     effect::{Act, CATALOGUE, Confusable, Effect, NUISANCES, Parameter, Role, Words, XYZ},
     recording::SensorKind,
@@ -165,8 +171,7 @@ impl Entry {
     }
 
     /// Names of the amplitudes, and for each axis which of them multiplies which part.
-    #[allow(clippy::type_complexity)]
-    fn amplitudes(&self) -> Result<(Vec<String>, [Option<(usize, usize)>; 3]), EntryFault> {
+    fn amplitudes(&self) -> Result<(Vec<String>, Layout), EntryFault> {
         let expected = "\"each\", \"common\" or a list of x, y and z, each once";
         let part = |axis: usize| if matches!(self.formula, Texts::Three(_)) { axis } else { 0 };
         match &self.axes {

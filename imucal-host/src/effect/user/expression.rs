@@ -1,6 +1,10 @@
 //! A formula as a tree, evaluated column by column.
 
-use super::{history::History, quantity::Quantity, quantity::Rows};
+use super::{
+    function,
+    history::History,
+    quantity::{Quantity, Rows},
+};
 
 /// A part of a formula.
 #[derive(Clone, Debug)]
@@ -12,9 +16,9 @@ pub(crate) enum Expression {
     /// An input.
     Input(Quantity),
     /// A function of one argument.
-    Unary(fn(f64) -> f64, Box<Expression>),
+    Unary(function::Unary, Box<Expression>),
     /// An operation or function of two.
-    Binary(fn(f64, f64) -> f64, Box<[Expression; 2]>),
+    Binary(function::Binary, Box<[Expression; 2]>),
     /// What a part was before; the time, s, is a number or a shape.
     History(History, Box<[Expression; 2]>),
 }
@@ -93,7 +97,7 @@ impl Expression {
     }
 }
 
-fn combined(function: fn(f64, f64) -> f64, left: Column, right: Column) -> Column {
+fn combined(function: function::Binary, left: Column, right: Column) -> Column {
     match (left, right) {
         (Column::Same(a), Column::Same(b)) => Column::Same(function(a, b)),
         (Column::Each(mut values), Column::Same(b)) => {

@@ -103,7 +103,7 @@ pub enum UserEffectError {
     Count { path: PathBuf, found: usize, most: usize },
     /// Of one entry.
     #[error("{}, line {line}: effect `{id}`: {cause}", path.display())]
-    Entry { path: PathBuf, line: usize, id: String, cause: EntryFault },
+    Entry { path: PathBuf, line: usize, id: String, cause: Box<EntryFault> },
 }
 
 impl UserEffectError {

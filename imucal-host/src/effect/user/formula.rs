@@ -13,6 +13,9 @@ use crate::effect::{Input, Needs, SensorRun};
 /// Larger values of a formula are none, since their squares would swamp a fit.
 const LARGEST: f64 = 1e12;
 
+/// For each axis of the sensor: which amplitude, and which part it multiplies. `None` where the axis is left as it is.
+pub(super) type Layout = [Option<(usize, usize)>; 3];
+
 /// A formula of a user's effect, ready to be evaluated.
 #[derive(Debug)]
 pub struct Formula {
@@ -21,8 +24,8 @@ pub struct Formula {
     /// Its parts, as they were written.
     pub(super) texts: Vec<String>,
     pub(super) parts: Vec<Expression>,
-    /// For each axis of the sensor: which amplitude, and which part it multiplies. `None` where the axis is left as it is.
-    pub(super) axes: [Option<(usize, usize)>; 3],
+    /// What acts on each axis.
+    pub(super) axes: Layout,
     /// Number of amplitudes; shapes follow them in the parameter vector.
     pub(super) amplitudes: usize,
 }
@@ -116,7 +119,7 @@ impl Formula {
         let mut columns: [Option<Column>; 3] = [const { None }; 3];
         // The part that is the same on each axis, and its column.
         let mut shared: Option<(usize, Column)> = None;
-        for axis in 0..3 {
+        for (axis, asked) in columns.iter_mut().enumerate() {
             let Some((_, part)) = self.axes[axis].filter(|_| is_asked(axis)) else { continue };
             let known = shared.as_ref().filter(|(of, _)| *of == part).map(|(_, column)| column.clone());
             let column = match known {
@@ -131,7 +134,7 @@ impl Formula {
             if !self.parts[part].depends_on_axis() {
                 shared = Some((part, column.clone()));
             }
-            columns[axis] = Some(column);
+            *asked = Some(column);
         }
         Ok(columns)
     }

@@ -3,8 +3,13 @@
 //! All are those of `libm` by name, so that a formula has one value on every machine. What is not a number stays so:
 //! neither a comparison nor `min` hides it.
 
+/// A function of one argument.
+pub(super) type Unary = fn(f64) -> f64;
+/// One of two.
+pub(super) type Binary = fn(f64, f64) -> f64;
+
 /// Names of functions of one argument, and the functions.
-const UNARY: [(&str, fn(f64) -> f64); 20] = [
+const UNARY: [(&str, Unary); 20] = [
     ("abs", libm::fabs),
     ("acos", libm::acos),
     ("asin", libm::asin),
@@ -28,11 +33,11 @@ const UNARY: [(&str, fn(f64) -> f64); 20] = [
 ];
 
 /// Likewise of two.
-const BINARY: [(&str, fn(f64, f64) -> f64); 5] =
+const BINARY: [(&str, Binary); 5] =
     [("atan2", libm::atan2), ("hypot", libm::hypot), ("max", max), ("min", min), ("pow", libm::pow)];
 
 /// Comparisons, the longer ones first: 1 where they hold, else 0.
-pub(super) const COMPARISONS: [(&str, fn(f64, f64) -> f64); 5] = [
+pub(super) const COMPARISONS: [(&str, Binary); 5] = [
     ("<=", |a, b| whether(a, b, a <= b)),
     (">=", |a, b| whether(a, b, a >= b)),
     ("==", |a, b| whether(a, b, a == b)),
@@ -41,12 +46,12 @@ pub(super) const COMPARISONS: [(&str, fn(f64, f64) -> f64); 5] = [
 ];
 
 /// The function of one argument of a name.
-pub(super) fn unary(name: &str) -> Option<fn(f64) -> f64> {
+pub(super) fn unary(name: &str) -> Option<Unary> {
     UNARY.iter().find(|(own, _)| *own == name).map(|(_, function)| *function)
 }
 
 /// The function of two arguments of a name.
-pub(super) fn binary(name: &str) -> Option<fn(f64, f64) -> f64> {
+pub(super) fn binary(name: &str) -> Option<Binary> {
     BINARY.iter().find(|(own, _)| *own == name).map(|(_, function)| *function)
 }
 

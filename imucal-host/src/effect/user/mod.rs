@@ -79,11 +79,11 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<&'static Effect>, UserEffect
     let mut read: Vec<(usize, &'static Effect)> = Vec::new();
     for spanned in &file.effect {
         let (line, entry) = (line_at(text.as_bytes(), spanned.span().start), spanned.get_ref());
-        let failed = |cause| UserEffectError::Entry {
+        let failed = |cause: EntryFault| UserEffectError::Entry {
             path: path.to_owned(),
             line,
             id: entry.id.chars().take(60).flat_map(char::escape_default).collect(),
-            cause,
+            cause: Box::new(cause),
         };
         let is_known = |id: &String| {
             let own = file.effect.iter().any(|other| other.get_ref().id == *id);

@@ -14,7 +14,7 @@
 use super::{
     expression::Expression,
     fault::FormulaFault,
-    function::{self, COMPARISONS, power},
+    function::{self, Binary, COMPARISONS, power},
     history::History,
     quantity,
 };
@@ -90,7 +90,7 @@ impl<'t> Parser<'t> {
 
     fn binary(
         &mut self,
-        function: fn(f64, f64) -> f64,
+        function: Binary,
         left: Expression,
         right: Expression,
     ) -> Result<Expression, FormulaFault> {
@@ -126,7 +126,7 @@ impl<'t> Parser<'t> {
     fn sum(&mut self) -> Result<Expression, FormulaFault> {
         let mut left = self.product()?;
         loop {
-            let function: fn(f64, f64) -> f64 = match self.peek() {
+            let function: Binary = match self.peek() {
                 Some('+') => |a, b| a + b,
                 Some('-') => |a, b| a - b,
                 _ => return Ok(left),
@@ -140,7 +140,7 @@ impl<'t> Parser<'t> {
     fn product(&mut self) -> Result<Expression, FormulaFault> {
         let mut left = self.sign()?;
         loop {
-            let function: fn(f64, f64) -> f64 = match self.peek() {
+            let function: Binary = match self.peek() {
                 Some('*') => |a, b| a * b,
                 Some('/') => |a, b| a / b,
                 _ => return Ok(left),

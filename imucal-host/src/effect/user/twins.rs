@@ -155,6 +155,6 @@ fn an_effect_of_the_catalogue_has_a_twin_or_there_is_a_reason() {
     for effect in CATALOGUE.iter() {
         let (_, name) = effect.id.split_once('.').unwrap();
         let reason = NO_FORMULAS.iter().find(|(id, _)| *id == effect.id || *id == format!("P.{name}"));
-        assert!(reason.is_some() != !twins_of(effect).is_empty(), "{}", effect.id);
+        assert_eq!(reason.is_some(), twins_of(effect).is_empty(), "{}", effect.id);
     }
 }

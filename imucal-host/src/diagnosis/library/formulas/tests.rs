@@ -66,6 +66,9 @@ fn effects_that_are_the_same_are_named_together_and_one_without_a_value_cannot_b
         (0..40).map(|k| entry(&format!("mag.own_{k:02}"), &format!("a_y * {k}.5 * a_z"))).collect();
     text += &entry("mag.rooted", "sqrt(a_y)");
     text += &entry("mag.huge", "exp(100 * t)");
+    // It has a value at its usual and extreme shapes, and none at some that the search tries.
+    text += &entry("mag.hidden", "sqrt((s - 5)^2 - 1) * a_y");
+    text += "shape = { s = { typical = 3, low = 0.5, high = 10, unit = '-' } }\n";
     let own = parse(&text, Path::new("own.toml")).unwrap();
     let recording = simulated(&own, "mag.own_07", 0.05).unwrap();
     let diagnosis = diagnosed(&recording, &own);
@@ -74,7 +77,11 @@ fn effects_that_are_the_same_are_named_together_and_one_without_a_value_cannot_b
     let same = (1..40).filter(|k| cause.equivalents.contains(&format!("mag.own_{k:02}"))).count();
     assert_eq!((same, diagnosis.verdict), (39, Verdict::Ambiguous), "{diagnosis:#?}");
     assert!(cause.probability < 0.03 && diagnosis.user_effects.len() == 40, "{diagnosis:#?}");
-    for (id, told) in [("mag.rooted", "gives NaN on axis x at"), ("mag.huge", "`exp(100 * t)` gives")] {
+    for (id, told) in [
+        ("mag.rooted", "gives NaN on axis x at"),
+        ("mag.huge", "`exp(100 * t)` gives"),
+        ("mag.hidden", "gives NaN on axis x at"),
+    ] {
         let not = diagnosis.not_testable.iter().find(|not| not.effect == id).unwrap();
         assert!(not.because.contains(told), "{not:?}");
     }
