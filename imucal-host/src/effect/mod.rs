@@ -43,6 +43,7 @@ mod lag;
 mod level_tilt;
 mod lever_arm;
 mod machine;
+mod matrices;
 mod misalignment;
 pub mod motion_mismatch;
 mod motor_current;
@@ -74,6 +75,8 @@ mod wobble;
 mod words;
 
 use SensorKind::{Acc, Gyr, Mag};
+
+use self::matrices::{MATRIX, SYMMETRIC, matrix, symmetric, vector};
 
 pub use self::{
     machine::{Machine, Swing},
@@ -300,28 +303,6 @@ fn of<T>(kind: SensorKind, acc: T, gyr: T, mag: T) -> T {
 
 /// The axes' names, for parameters of which there is one an axis.
 const XYZ: [&str; 3] = ["x", "y", "z"];
-
-/// A symmetric matrix from xx, yy, zz, xy, xz, yz; missing values are zero.
-fn symmetric(values: &[f64]) -> nalgebra::Matrix3<f64> {
-    let at = |k: usize| values.get(k).copied().unwrap_or(0.0);
-    nalgebra::Matrix3::new(at(0), at(3), at(4), at(3), at(1), at(5), at(4), at(5), at(2))
-}
-
-/// The parameters' names of [`symmetric`].
-const SYMMETRIC: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
-
-/// The vector of three values from `at` on; missing values are zero.
-fn vector(values: &[f64], at: usize) -> nalgebra::Vector3<f64> {
-    nalgebra::Vector3::from_fn(|k, _| values.get(at + k).copied().unwrap_or(0.0))
-}
-
-/// The matrix of nine values, row by row; missing values are zero.
-fn matrix(values: &[f64]) -> nalgebra::Matrix3<f64> {
-    nalgebra::Matrix3::from_fn(|row, column| values.get(3 * row + column).copied().unwrap_or(0.0))
-}
-
-/// The parameters' names of [`matrix`].
-const MATRIX: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
 
 /// Every effect there is, in the order of the chain.
 pub static CATALOGUE: LazyLock<Vec<Effect>> = LazyLock::new(|| {
