@@ -40,6 +40,9 @@ const UNITS: [(f64, &str); 6] = [
     (1e-9, "billions of seconds"),
 ];
 
+/// Times, s, and what is sensed at them, without its direction.
+type Sizes = Vec<(f64, f64)>;
+
 /// A size at even times from a first one.
 struct Even {
     from: f64,
@@ -102,7 +105,7 @@ fn sizes<'r>(
     integrity: &Integrity,
     stream: &'r Stream,
     kind: SensorKind,
-) -> Option<(Vec<(f64, f64)>, Vec<(f64, f64)>)> {
+) -> Option<(Sizes, Sizes)> {
     let (values, usable) = (&recording.sensor(kind)?.values, &integrity.sensor(kind)?.usable);
     let size = |(time, value): (&f64, &Vector3<f64>)| {
         let size = value.norm();
