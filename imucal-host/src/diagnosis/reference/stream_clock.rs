@@ -15,6 +15,8 @@ use crate::{
 /// Step of the first search, s; longer where there would be more than [`MOST`] steps.
 const STEP: f64 = 0.1;
 const MOST: f64 = 6000.0;
+/// The shorter of two streams has at least so many steps.
+const FINEST: f64 = 200.0;
 /// Step of the search within windows, s.
 const FINE: f64 = 0.02;
 /// Length of a window, s; how far about the line it is searched in each round, s.
@@ -59,7 +61,8 @@ pub fn coarse(recording: &Recording, integrity: &Integrity, stream: &Stream) -> 
     for kind in [SensorKind::Gyr, SensorKind::Acc, SensorKind::Mag] {
         let Some((real, ideal)) = sizes(recording, integrity, stream, kind) else { continue };
         let Some((lag, agreement)) = first_lag(&real, &ideal, 1.0) else {
-            return Err(no_overlap(recording, stream));
+            let unit = other_unit(recording, integrity, stream, kind);
+            return Err(unit.unwrap_or_else(|| no_overlap(recording, stream)));
         };
         if best.is_none_or(|(_, _, most)| agreement > most) {
             best = Some((lag, kind, agreement));
@@ -123,7 +126,7 @@ fn first_lag(real: &[(f64, f64)], ideal: &[(f64, f64)], per_second: f64) -> Opti
     let ideal: Vec<(f64, f64)> = ideal.iter().map(|(time, size)| (time / per_second, *size)).collect();
     let span = |of: &[(f64, f64)]| Some(of.last()?.0 - of.first()?.0);
     let (long, short) = (span(real)?.max(span(&ideal)?), span(real)?.min(span(&ideal)?));
-    let step = STEP.max(long / MOST);
+    let step = STEP.max(long / MOST).min(short / FINEST);
     let shared = LEAST.max(SHARED * short);
     if short < shared {
         return None;

@@ -13,7 +13,8 @@ use crate::{
 };
 
 /// Effects of the catalogue that are no formula, `P.` for each sensor, and why.
-const NO_FORMULAS: [(&str, &str); 31] = [
+const NO_FORMULAS: [(&str, &str); 32] = [
+    ("ref.motion_mismatch", "it moves the machine"),
     ("rig.level_tilt", "it moves the rig"),
     ("rig.heading", "it moves the rig"),
     ("rig.encoder_offset", "it moves the rig"),
