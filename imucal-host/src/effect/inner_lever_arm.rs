@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, vector};
 
 const NAMES: [&str; 9] = ["x_x", "x_y", "x_z", "y_x", "y_y", "y_z", "z_x", "z_y", "z_z"];
 
@@ -18,6 +18,7 @@ pub(super) fn effect() -> Effect {
     };
     let act = Act::Sensor(SensorKind::Acc, alter);
     Effect::new("acc.inner_lever_arm", act, Parameter::amplitudes(&NAMES, "m", 0.01), words)
+        .needing(Needs::POSITION)
         .like("acc.lever_arm", "none for its common part; constant rates about all three axes for the rest")
 }
 

@@ -4,7 +4,7 @@
 //! f = f₀ + ẇ × r + w × (w × r)
 //! ```
 
-use super::{Act, Effect, Parameter, SensorKind, Truth, Words, XYZ, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, Truth, Words, XYZ, vector};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -13,6 +13,7 @@ pub(super) fn effect() -> Effect {
         needs: "Rates above 1 rad/s about two axes, or brisk sinusoids.",
     };
     Effect::new("acc.lever_arm", Act::Field(alter), Parameter::amplitudes(&XYZ, "m", 0.02), words)
+        .needing(Needs::POSITION)
         .on(SensorKind::Acc)
         .like("acc.inner_lever_arm", "constant rates about all three axes of the table")
         .like("acc.vibration_rectification", "the same rate about another axis")

@@ -64,6 +64,8 @@ pub struct Needs {
     pub other_calibration: bool,
     /// An attitude without noise and filter of its own: of encoders, or of rests.
     pub exact_attitude: bool,
+    /// A place, or a sensor that is not moved to and fro.
+    pub position: bool,
 }
 
 impl Needs {
@@ -74,6 +76,7 @@ impl Needs {
         heading: false,
         other_calibration: false,
         exact_attitude: false,
+        position: false,
     };
     /// Gimbals.
     pub const GIMBALS: Self = Self { gimbals: true, ..Self::NOTHING };
@@ -83,6 +86,8 @@ impl Needs {
     pub const HEADING: Self = Self { heading: true, ..Self::NOTHING };
     /// A calibration made elsewhere.
     pub const OTHER_CALIBRATION: Self = Self { other_calibration: true, ..Self::NOTHING };
+    /// A place.
+    pub const POSITION: Self = Self { position: true, ..Self::NOTHING };
     /// An exact attitude.
     pub const EXACT_ATTITUDE: Self = Self { exact_attitude: true, ..Self::NOTHING };
 }

@@ -6,7 +6,6 @@
 //! | weights of block means at rest: [`at_rest`] | steps between neighbouring pieces of a tenth of a second |
 //! | weights of block means in motion: [`second_differences`] | second differences of residuals, since movements are smooth |
 //! | size of a sample's noise, at rest or not: [`of_samples`] | median of steps from sample to sample |
-//! | the same along a smooth movement: [`of_smooth`] | median of fourth differences |
 //!
 //! ```text
 //! S = τ · ½ ⟨(ȳ_{k+1} − ȳ_k)²⟩        ȳ: means over τ, both of one rest
@@ -121,19 +120,6 @@ pub fn of_samples(values: &[Vector3<f64>]) -> f64 {
     let of = |axis: usize| {
         let steps = values.windows(2).map(|pair| (pair[1][axis] - pair[0][axis]).abs());
         std_of_median(steps.filter(|step| step.is_finite()).collect()).unwrap_or(0.0) / 2.0f64.sqrt()
-    };
-    (0..3).map(of).fold(0.0, f64::max)
-}
-
-/// Standard deviation of a sample's noise along a smooth movement: the largest of the axes'. Fourth differences leave next
-/// to nothing of the movement, and √70 times a sample's noise.
-pub fn of_smooth(values: &[Vector3<f64>]) -> f64 {
-    let of = |axis: usize| {
-        let bend = |w: &[Vector3<f64>]| {
-            (w[0][axis] - 4.0 * w[1][axis] + 6.0 * w[2][axis] - 4.0 * w[3][axis] + w[4][axis]).abs()
-        };
-        let bends = values.windows(5).map(bend).filter(|bend| bend.is_finite());
-        std_of_median(bends.collect()).unwrap_or(0.0) / 70.0f64.sqrt()
     };
     (0..3).map(of).fold(0.0, f64::max)
 }

@@ -216,13 +216,16 @@ fn known(encoders: &[[f64; 3]], reach: usize) -> Vec<bool> {
 
 /// Standard deviation of each encoder's readings, rad.
 fn noise(angles: &[[f64; 3]]) -> [f64; 3] {
-    [0, 1, 2].map(|axis| {
-        let bend = |w: &[[f64; 3]]| {
-            (w[0][axis] - 4.0 * w[1][axis] + 6.0 * w[2][axis] - 4.0 * w[3][axis] + w[4][axis]).abs()
-        };
-        // Fourth differences, since movements are smooth: of √70 times a reading's standard deviation.
-        std_of_median(angles.windows(5).map(bend).collect()).unwrap_or(0.0) / 70.0f64.sqrt()
-    })
+    [0, 1, 2].map(|axis| reading_noise(angles.iter().map(|angles| angles[axis])))
+}
+
+/// Standard deviation of readings along a smooth movement: by fourth differences, which leave next to nothing of it, and √70
+/// times a reading's standard deviation; those with a missing reading do not count.
+pub fn reading_noise(readings: impl Iterator<Item = f64>) -> f64 {
+    let readings: Vec<f64> = readings.collect();
+    let bend = |w: &[f64]| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs();
+    let bends = readings.windows(5).map(bend).filter(|bend| bend.is_finite());
+    std_of_median(bends.collect()).unwrap_or(0.0) / 70.0f64.sqrt()
 }
 
 /// Rows at which a gimbal moves.

@@ -56,6 +56,11 @@ pub trait Recorded: Motion {
         None
     }
 
+    /// Standard error of the specific force at each row, m/s², where it is estimated; `None` where it is exact.
+    fn force_errors(&self) -> Option<&[f64]> {
+        None
+    }
+
     /// Speed at each row, m/s; `None` where it is not known.
     fn speeds(&self) -> Option<&[f64]> {
         None

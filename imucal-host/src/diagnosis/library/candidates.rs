@@ -72,7 +72,8 @@ impl Setting<'_> {
 
     /// Why the recording cannot show an effect.
     fn cannot_show(&self, effect: &Effect) -> Option<&'static str> {
-        let Needs { gimbals, thermometer, heading, other_calibration, exact_attitude } = effect.needs;
+        let Needs { gimbals, thermometer, heading, other_calibration, exact_attitude, position } =
+            effect.needs;
         let provided = &self.provided;
         match effect.act {
             Act::Rig(_) if !provided.table => {
@@ -94,6 +95,10 @@ impl Setting<'_> {
             Some(
                 "a reference attitude has noise and a filter of its own: nothing distinguishes a sensor's low-pass from \
                  them",
+            )
+        } else if position && !provided.position {
+            Some(
+                "an attitude alone holds no linear acceleration, which an arm looks like; record the position (ref_p*)",
             )
         } else if gimbals && !provided.gimbals {
             Some("no gimbals turn the sensor")

@@ -10,7 +10,7 @@ use crate::{
         Recording, SensorKind, Stream, check::integrity::Integrity, manifest::Axis, median,
         unit::STANDARD_GRAVITY,
     },
-    simulator::{Place, Recorded, Replay, StreamClock, Tracked},
+    simulator::{Place, Posed, Recorded, Replay, StreamClock, Tracked},
 };
 
 /// Recordings are at least this long, s.
@@ -39,7 +39,7 @@ pub struct Reference {
 }
 
 /// The movement of a recording, of `stream` where a simulator gives one; a reference attitude and a stream are read by
-/// `clock`.
+/// `clock`, positions to a `bandwidth`, rad/s.
 ///
 /// # Errors
 ///
@@ -50,6 +50,7 @@ pub fn reference(
     model: &Model,
     stream: Option<&Stream>,
     clock: StreamClock,
+    bandwidth: f64,
 ) -> Result<Reference, String> {
     let site = &recording.manifest.site;
     let place = Place {
@@ -88,10 +89,21 @@ pub fn reference(
                 let tracked = Tracked::new(&recording.time, attitudes, temperature.clone(), place);
                 tracked.ok_or("no row has a reference attitude")
             };
-            Box::new(match clock.offset {
-                0.0 => tracked(&attitudes)?,
-                offset => tracked(&motion::later(&recording.time, &attitudes, -offset))?,
-            })
+            let (attitudes, positions) = match clock.offset {
+                0.0 => (attitudes, recording.position.clone()),
+                offset => {
+                    let later = motion::later(&recording.time, &attitudes, -offset);
+                    let positions = recording.position.as_ref();
+                    (later, positions.map(|positions| moved(&recording.time, positions, offset)))
+                }
+            };
+            let tracked = tracked(&attitudes)?;
+            let posed = positions
+                .and_then(|positions| Posed::new(tracked.clone(), &recording.time, &positions, bandwidth));
+            match posed {
+                Some(posed) => Box::new(posed),
+                None => Box::new(tracked),
+            }
         }
         (None, None, None) => {
             let rests = RestToRest::new(recording, integrity, model, temperature, place)?;
@@ -109,6 +121,21 @@ pub fn reference(
         return Err("the rig does not move: no effect can be distinguished from a bias".to_owned());
     }
     Ok(Reference { movement, held, remarks })
+}
+
+/// Positions of `offset` later, s, on the straight line between two rows; NaN where either of them is missing.
+fn moved(time: &[f64], positions: &[[f64; 3]], offset: f64) -> Vec<[f64; 3]> {
+    let at = |now: &f64| {
+        let then = now + offset;
+        let next = time.partition_point(|t| *t <= then);
+        let pair = next
+            .checked_sub(1)
+            .and_then(|before| Some((before, positions.get(before)?, positions.get(next)?)));
+        let Some((before, from, to)) = pair else { return [f64::NAN; 3] };
+        let share = (then - time[before]) / (time[next] - time[before]);
+        [0, 1, 2].map(|axis| from[axis] + (to[axis] - from[axis]) * share)
+    };
+    time.iter().map(at).collect()
 }
 
 /// The field in the frame of a reference, µT: the median of what the magnetometer shows there, component by component.

@@ -4,9 +4,8 @@ use nalgebra::Vector3;
 
 use super::stream_clock;
 use crate::{
-    noise::white,
     recording::{Recording, SensorKind, Stream, check::integrity::Integrity},
-    simulator::{Motion, Place, Recorded, StreamClock, Streamed},
+    simulator::{Motion, Place, Recorded, StreamClock, Streamed, replay::reading_noise},
 };
 
 /// Noise of a stream above this share of the recorded one hides a part of the gap.
@@ -81,11 +80,16 @@ fn weightless(movement: &Streamed, recording: &Recording, gravity: f64) -> Optio
     (count > 0.0 && mean < WEIGHTLESS * gravity).then_some(mean)
 }
 
+/// Noise of a sample along a smooth movement, the largest of the axes'.
+fn noise_of(values: &[Vector3<f64>]) -> f64 {
+    (0..3).map(|axis| reading_noise(values.iter().map(|value| value[axis]))).fold(0.0, f64::max)
+}
+
 /// A stream with noise of its own hides the gap.
 fn noise(recording: &Recording, stream: &Stream) -> Option<String> {
     let share = |kind: &SensorKind| {
         let (real, ideal) = (recording.sensor(*kind)?, stream.values.sensor(*kind)?);
-        let share = white::of_smooth(ideal) / white::of_smooth(&real.values).max(f64::MIN_POSITIVE);
+        let share = noise_of(ideal) / noise_of(&real.values).max(f64::MIN_POSITIVE);
         (share > NOISY).then(|| format!("{:.0} % of the {kind}'s", 100.0 * share))
     };
     let shares: Vec<String> = SensorKind::ALL.iter().filter_map(share).collect();

@@ -6,6 +6,7 @@
 //!
 //! | file | what |
 //! | --- | --- |
+//! | [`bandwidth`] | how fast a movement recorded positions can be believed to follow |
 //! | [`conventions`] | axis order and signs, units, gimbal order, clipping, repeated samples, noise bursts |
 //! | [`reference_offset`] | a large offset of the reference's clock, by the share of variance that no gain and bias explain |
 //! | [`preparation`] | all of them together: what the rest of the diagnosis starts from |
@@ -15,6 +16,7 @@
 //!
 //! Not done here: effects that leave the samples usable; those are candidates of the search.
 
+pub mod bandwidth;
 pub mod conventions;
 pub mod preparation;
 pub mod reference_offset;

@@ -6,7 +6,7 @@ use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    conventions,
+    bandwidth, conventions,
     conventions::{Conventions, Finding},
     reference_offset,
 };
@@ -69,10 +69,11 @@ impl Preparation {
         let model = model.map(|model| Model::new(recording, model)).transpose();
         let model = model.map_err(DiagnosisError::Recording)?.unwrap_or_default();
         let integrity = integrity::inspect(recording);
-        let reference = |clock: StreamClock| {
-            movement::reference(recording, &integrity, &model, stream, clock)
+        let of_bandwidth = |clock: StreamClock, bandwidth: f64| {
+            movement::reference(recording, &integrity, &model, stream, clock, bandwidth)
                 .map_err(DiagnosisError::Recording)
         };
+        let reference = |clock: StreamClock| of_bandwidth(clock, bandwidth::USUAL);
         let mut clock = match stream {
             Some(given) => stream::clock(recording, &integrity, given).map_err(DiagnosisError::Recording)?,
             None => StreamClock::default(),
@@ -83,6 +84,9 @@ impl Preparation {
             if clock.offset != 0.0 {
                 as_read = reference(clock)?;
             }
+        }
+        if stream.is_none() && recording.position.is_some() {
+            as_read = bandwidth::best(recording, &integrity, as_read, &|width| of_bandwidth(clock, width))?;
         }
         let Reference { movement, held, remarks: of_reference } = as_read;
         let conventions = conventions::check(recording, &integrity, &*movement, settings.source);

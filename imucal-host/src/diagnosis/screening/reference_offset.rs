@@ -15,6 +15,20 @@ const STEP: f64 = 0.01;
 /// An offset must leave less than this share of what none leaves.
 const BETTER: f64 = 0.5;
 
+/// The offset within a step of none at which the samples follow a movement best, s: the bottom of the parabola through three
+/// steps.
+pub fn fine(recording: &Recording, integrity: &Integrity, motion: &dyn Motion) -> f64 {
+    let left = |kind: SensorKind| {
+        let left = [-STEP, 0.0, STEP].map(|offset| unexplained(recording, integrity, kind, motion, offset));
+        Some([left[0]?, left[1]?, left[2]?])
+    };
+    let found = [SensorKind::Gyr, SensorKind::Acc, SensorKind::Mag].into_iter().find_map(left);
+    found.map_or(0.0, |[before, here, after]| {
+        let bend = before - 2.0 * here + after;
+        if bend > 0.0 { (0.5 * (before - after) / bend).clamp(-1.0, 1.0) * STEP } else { 0.0 }
+    })
+}
+
 /// An offset of more than a step at which the samples follow a movement far better than without, s; zero where there is
 /// none. The row of t then shows the movement of t + offset. The gyroscope is looked at, else the accelerometer, else
 /// the magnetometer.

@@ -12,6 +12,7 @@ impl Settings {
         match source {
             Source::Rig => Self::rig(),
             Source::Reference => Self::reference(),
+            Source::Pose => Self::pose(),
             Source::Simulator => Self::simulator(),
             Source::Rests => Self::rests(),
         }
@@ -75,6 +76,16 @@ impl Settings {
             search: SearchSettings { most: 5, staged_start: true, settling: 2, ..rig.search },
             verdict: VerdictSettings { confirms_held_out: true, ..rig.verdict },
             location: rig.location,
+        }
+    }
+
+    /// A reference attitude and position: where a hand moves the sensor to and fro, its acceleration is known as well as the position.
+    fn pose() -> Self {
+        let reference = Self::reference();
+        Self {
+            source: Provided { position: true, ..reference.source },
+            residual: ResidualSettings { weighs_vibration: true, ..reference.residual },
+            ..reference
         }
     }
 

@@ -9,6 +9,8 @@ pub enum Source {
     Rig,
     /// A reference attitude, as of an optical tracker.
     Reference,
+    /// A reference attitude and position.
+    Pose,
     /// A simulator's stream of what ideal sensors would have read.
     Simulator,
     /// The sensor's own rests: a hand, or a turntable without a readout.
@@ -23,6 +25,7 @@ impl Source {
             (Some(_), ..) => Self::Simulator,
             (None, Some(_), ..) => Self::Rig,
             (None, None, Some(_), _) => Self::Simulator,
+            (None, None, None, Some(_)) if recording.position.is_some() => Self::Pose,
             (None, None, None, Some(_)) => Self::Reference,
             (None, None, None, None) => Self::Rests,
         }

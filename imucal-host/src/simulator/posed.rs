@@ -1,0 +1,174 @@
+//! A recorded pose: attitude and position of a reference, as a source of truth with linear acceleration.
+//!
+//! ```text
+//! f_t = C_n_t (a_n − g_n)      a_n: second derivative of the position, smoothed
+//! ```
+//!
+//! The reference point is where the position is measured; an accelerometer elsewhere has an arm (`acc.lever_arm`). Not modelled:
+//! what [`Tracked`] does not, and a position whose clock is not that of the attitude.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::{
+    place::Place,
+    position_smoother::{Readings, Smoothed},
+    recent::Recent,
+    replay::nearest,
+    tracked::Tracked,
+    truth::{Motion, Recorded},
+};
+use crate::{
+    effect::{Machine, Truth},
+    recording::{manifest::Rig, median},
+};
+
+/// It moves above this speed, m/s, or this acceleration, m/s².
+const SPEED: f64 = 0.02;
+const ACCELERATION: f64 = 0.2;
+/// Fewer positions than this are none.
+const FEWEST: usize = 10;
+/// Rows so close to one without a position are not known, s.
+const NEAR: f64 = 0.1;
+
+/// The movement that a pose has followed.
+#[derive(Clone, Debug)]
+pub struct Posed {
+    tracked: Tracked,
+    time: Vec<f64>,
+    accelerations: Vec<Vector3<f64>>,
+    errors: Vec<f64>,
+    speeds: Vec<f64>,
+    moving: Vec<bool>,
+    known: Vec<bool>,
+}
+
+impl Posed {
+    /// A tracked attitude with positions in its frame, m, one a row, NaN where there is none; what is faster than
+    /// `bandwidth`, rad/s, is taken for noise. `None` where hardly a row has one.
+    pub fn new(tracked: Tracked, time: &[f64], positions: &[[f64; 3]], bandwidth: f64) -> Option<Self> {
+        let is_given = |row: &[f64; 3]| row.iter().all(|value| value.is_finite());
+        let interval = median(time.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
+        if positions.iter().filter(|row| is_given(row)).count() < FEWEST {
+            return None;
+        }
+        let axes: Vec<Vec<Smoothed>> = [0, 1, 2]
+            .into_par_iter()
+            .map(|axis| {
+                let position: Vec<f64> = positions.iter().map(|row| row[axis]).collect();
+                Readings { time, position: &position, interval, bandwidth }.smoothed()
+            })
+            .collect();
+        let of = |row: usize, order: usize| Vector3::from_fn(|axis, _| axes[axis][row].state[order]);
+        let is_moved = |row: usize| of(row, 1).norm() > SPEED || of(row, 2).norm() > ACCELERATION;
+        let missing: Vec<f64> =
+            time.iter().zip(positions).filter(|(_, row)| !is_given(row)).map(|(time, _)| *time).collect();
+        let is_near = |time: f64| {
+            let next = missing.partition_point(|gap| *gap < time - NEAR);
+            missing.get(next).is_some_and(|gap| *gap <= time + NEAR)
+        };
+        let error = |row: usize| axes.iter().map(|axis| axis[row].error.powi(2)).sum::<f64>().sqrt();
+        Some(Self {
+            time: time.to_vec(),
+            accelerations: (0..time.len()).map(|row| of(row, 2)).collect(),
+            errors: (0..time.len()).map(error).collect(),
+            speeds: (0..time.len()).map(|row| of(row, 1).norm()).collect(),
+            moving: (0..time.len()).map(|row| tracked.moving()[row] || is_moved(row)).collect(),
+            known: (0..time.len()).map(|row| tracked.known()[row] && !is_near(time[row])).collect(),
+            tracked,
+        })
+    }
+
+    /// Acceleration at a time, on the straight line between two rows, m/s².
+    fn acceleration(&self, time: f64) -> Vector3<f64> {
+        let row = nearest(&self.time, time);
+        let other = if time > self.time[row] { row + 1 } else { row.saturating_sub(1) };
+        let (Some(there), true) = (self.time.get(other), other != row) else {
+            return self.accelerations[row];
+        };
+        let share = ((time - self.time[row]) / (there - self.time[row])).clamp(0.0, 1.0);
+        self.accelerations[row] + (self.accelerations[other] - self.accelerations[row]) * share
+    }
+}
+
+impl Motion for Posed {
+    fn duration(&self) -> f64 {
+        self.tracked.duration()
+    }
+
+    fn truth_among(&self, time: f64, rig: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
+        let mut truth = self.tracked.truth_among(time, rig, recent);
+        truth.f_t += (truth.c_p_n * truth.c_t_p).tr_mul(&(truth.c_p_n * self.acceleration(time)));
+        truth
+    }
+
+    fn rig(&self) -> Rig {
+        self.tracked.rig()
+    }
+
+    fn place(&self) -> Place {
+        self.tracked.place()
+    }
+}
+
+impl Recorded for Posed {
+    fn moving(&self) -> &[bool] {
+        &self.moving
+    }
+
+    fn known(&self) -> &[bool] {
+        &self.known
+    }
+
+    fn speeds(&self) -> Option<&[f64]> {
+        Some(&self.speeds)
+    }
+
+    fn force_errors(&self) -> Option<&[f64]> {
+        Some(&self.errors)
+    }
+
+    fn steady(&self) -> &dyn Motion {
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulator::{
+        Tumble,
+        random::{Purpose, Random},
+    };
+
+    #[test]
+    fn a_hand_that_moves_to_and_fro_is_felt_with_gravity() {
+        let tumble = Tumble::new(5, 3);
+        let time: Vec<f64> = (0..3000).map(|k| 0.01 * f64::from(k)).collect();
+        let way = |t: f64| if t > 5.0 { 0.1 * (3.0 * (t - 5.0)).sin().powi(3) } else { 0.0 };
+        let felt = |t: f64| {
+            let (s, c) = (3.0 * (t - 5.0)).sin_cos();
+            if t > 5.0 { 0.1 * 9.0 * (6.0 * s * c * c - 3.0 * s * s * s) } else { 0.0 }
+        };
+        let mut random = Random::new(5, Purpose::Noise);
+        let positions: Vec<[f64; 3]> =
+            time.iter().map(|t| [way(*t), 0.0, 1.0].map(|p| p + 2e-4 * random.normal())).collect();
+        let attitude = |t: &f64| {
+            let truth = tumble.truth(*t, &|_| ());
+            Some(truth.c_p_n * truth.c_t_p)
+        };
+        let attitudes: Vec<_> = time.iter().map(attitude).collect();
+        let tracked = Tracked::new(&time, &attitudes, vec![25.0; 3000], tumble.place()).unwrap();
+        let posed = Posed::new(tracked, &time, &positions, 60.0).unwrap();
+        let mut left = 0.0;
+        for k in 0..1000 {
+            let t = 8.0 + 0.0203 * f64::from(k);
+            let (here, there) = (posed.truth(t, &|_| ()), tumble.truth(t, &|_| ()));
+            let force = there.f_t + (there.c_p_n * there.c_t_p).tr_mul(&Vector3::new(felt(t), 0.0, 0.0));
+            left += (here.f_t - force).norm_squared() / 1000.0;
+        }
+        assert!(left.sqrt() < 0.25, "{}", left.sqrt());
+        assert!(posed.moving()[900] && !posed.moving()[300]);
+        assert!(Posed::new(posed.tracked.clone(), &time, &vec![[f64::NAN; 3]; 3000], 60.0).is_none());
+    }
+}
