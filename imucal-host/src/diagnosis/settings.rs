@@ -158,6 +158,14 @@ pub struct LocationSettings {
 pub struct VerdictSettings {
     /// Held-out blocks must confirm a cause, and its amplitude: evidence alone is overconfident where the source trembles.
     pub confirms_held_out: bool,
+    /// A cause explains more than what the residual of its sensors still follows: where the source has errors that the
+    /// catalogue does not hold, a smaller effect may stand for a part of them.
+    pub outweighs_remainder: bool,
+    /// A cause closes at least this share of the whole gap.
+    pub least_of_all: f64,
+    /// The field of a room changes by so much from place to place, µT: a smaller cause of the magnetometer alone is not asserted. Zero
+    /// where a rig keeps it in its place, or the source gives the field.
+    pub room: f64,
     /// Share of its own sensors' gap that a confirmed cause closes at least.
     pub least_share: f64,
     /// Standard errors from zero of a confirmed cause's largest amplitude.
@@ -271,6 +279,9 @@ impl Default for VerdictSettings {
     fn default() -> Self {
         Self {
             confirms_held_out: false,
+            outweighs_remainder: false,
+            least_of_all: 0.0,
+            room: 0.0,
             least_share: 0.05,
             amplitude_errors: 2.0,
             clock_errors: 5.0,

@@ -13,8 +13,10 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         needs: "Brisk motion.",
     };
     let lag = Parameter::amplitude("lag", "s", 5e-3);
+    // Without a position an accelerometer shows hardly more than gravity.
+    let free = if kind == SensorKind::Mag { Free::ReadApart } else { Free::Placed };
     Effect::new(&member_id(kind, "lag"), Act::Sensor(kind, alter), vec![lag], words)
-        .part(Part::Nuisance(Free::ReadApart))
+        .part(Part::Nuisance(free))
 }
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {

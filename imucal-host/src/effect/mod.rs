@@ -52,6 +52,7 @@ mod noise_burst;
 mod parameter;
 mod part;
 mod rate_error;
+mod room_gradient;
 mod saturation;
 mod scale;
 mod scale_asymmetry;
@@ -373,7 +374,13 @@ pub static CATALOGUE: LazyLock<Vec<Effect>> = LazyLock::new(|| {
 /// Terms that the baseline has where a rig, a surveyed site or a housing does not fix them. They are fitted, never named
 /// as a cause, and not part of the catalogue.
 pub static NUISANCES: LazyLock<Vec<Effect>> = LazyLock::new(|| {
-    let mut list = vec![field_dip::effect(), field_strength::effect(), lag::effect(Mag)];
+    let mut list = vec![
+        field_dip::effect(),
+        field_strength::effect(),
+        lag::effect(Mag),
+        lag::effect(Acc),
+        room_gradient::effect(),
+    ];
     list.extend(SensorKind::ALL.map(mounting::effect));
     list
 });

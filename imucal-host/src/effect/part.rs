@@ -28,6 +28,8 @@ pub enum Part {
 pub enum Free {
     /// Nothing says that the chip was read when the others were.
     ReadApart,
+    /// Positions are known.
+    Placed,
     /// No gimbals turn the sensor, and its triad is given.
     NoGimbalsTriadGiven,
     /// The site's field is not given, and an accelerometer shows the vertical.

@@ -20,6 +20,8 @@ pub struct Truth {
     pub c_p_n: Matrix3<f64>,
     /// True gimbal angles, outermost first.
     pub gimbals: [Swing; 3],
+    /// Position in the base, m, from the middle of the way; zero where it is not known.
+    pub p_p: Vector3<f64>,
     /// Rate of the table against the base, rad/s.
     pub w_pt_t: Vector3<f64>,
     /// Earth's rotation, rad/s.

@@ -23,9 +23,8 @@ use crate::{
     recording::{manifest::Rig, median},
 };
 
-/// It moves above this speed, m/s, or this acceleration, m/s².
-const SPEED: f64 = 0.02;
-const ACCELERATION: f64 = 0.2;
+/// It moves above this speed, m/s.
+const SPEED: f64 = 0.03;
 /// Fewer positions than this are none.
 const FEWEST: usize = 10;
 /// Rows so close to one without a position are not known, s.
@@ -36,6 +35,7 @@ const NEAR: f64 = 0.1;
 pub struct Posed {
     tracked: Tracked,
     time: Vec<f64>,
+    positions: Vec<Vector3<f64>>,
     accelerations: Vec<Vector3<f64>>,
     errors: Vec<f64>,
     speeds: Vec<f64>,
@@ -60,16 +60,18 @@ impl Posed {
             })
             .collect();
         let of = |row: usize, order: usize| Vector3::from_fn(|axis, _| axes[axis][row].state[order]);
-        let is_moved = |row: usize| of(row, 1).norm() > SPEED || of(row, 2).norm() > ACCELERATION;
+        let is_moved = |row: usize| of(row, 1).norm() > SPEED;
         let missing: Vec<f64> =
             time.iter().zip(positions).filter(|(_, row)| !is_given(row)).map(|(time, _)| *time).collect();
         let is_near = |time: f64| {
             let next = missing.partition_point(|gap| *gap < time - NEAR);
             missing.get(next).is_some_and(|gap| *gap <= time + NEAR)
         };
+        let middle = (0..time.len()).map(|row| of(row, 0)).sum::<Vector3<f64>>() / time.len() as f64;
         let error = |row: usize| axes.iter().map(|axis| axis[row].error.powi(2)).sum::<f64>().sqrt();
         Some(Self {
             time: time.to_vec(),
+            positions: (0..time.len()).map(|row| of(row, 0) - middle).collect(),
             accelerations: (0..time.len()).map(|row| of(row, 2)).collect(),
             errors: (0..time.len()).map(error).collect(),
             speeds: (0..time.len()).map(|row| of(row, 1).norm()).collect(),
@@ -98,6 +100,7 @@ impl Motion for Posed {
 
     fn truth_among(&self, time: f64, rig: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
         let mut truth = self.tracked.truth_among(time, rig, recent);
+        truth.p_p = self.positions[nearest(&self.time, time)];
         truth.f_t += (truth.c_p_n * truth.c_t_p).tr_mul(&(truth.c_p_n * self.acceleration(time)));
         truth
     }

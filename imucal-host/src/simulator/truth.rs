@@ -96,6 +96,7 @@ pub fn at_pose(
         c_t_o: pose.c_t_o,
         c_t_m: pose.c_t_m,
         c_p_n: pose.c_p_n,
+        p_p: Vector3::zeros(),
         gimbals,
         w_pt_t: pose.w_pt_t,
         w_ie_t,

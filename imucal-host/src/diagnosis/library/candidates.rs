@@ -63,6 +63,7 @@ impl Setting<'_> {
         let Part::Nuisance(free) = nuisance.part else { return false };
         match free {
             Free::ReadApart => self.provided.lags,
+            Free::Placed => self.provided.placed,
             Free::NoGimbalsTriadGiven => !self.provided.gimbals && self.gives(nuisance),
             // Without the vertical, the levelling tilts stand for the dip.
             Free::FieldUnknown => !self.field_known && self.kinds.contains(&SensorKind::Acc),

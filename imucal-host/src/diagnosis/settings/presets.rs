@@ -30,6 +30,7 @@ impl Settings {
                 followed: false,
                 lags: false,
                 position: true,
+                placed: false,
                 heading: true,
                 exact_attitude: true,
             },
@@ -55,6 +56,7 @@ impl Settings {
                 followed: false,
                 lags: true,
                 position: false,
+                placed: false,
                 heading: true,
                 exact_attitude: false,
             },
@@ -74,7 +76,14 @@ impl Settings {
             },
             library: LibrarySettings { places_in_quiet_noise: true, ..rig.library },
             search: SearchSettings { most: 5, staged_start: true, settling: 2, ..rig.search },
-            verdict: VerdictSettings { confirms_held_out: true, ..rig.verdict },
+            verdict: VerdictSettings {
+                confirms_held_out: true,
+                outweighs_remainder: true,
+                carried: 10.0,
+                least_of_all: 0.01,
+                room: 3.0,
+                ..rig.verdict
+            },
             location: rig.location,
         }
     }
@@ -83,7 +92,7 @@ impl Settings {
     fn pose() -> Self {
         let reference = Self::reference();
         Self {
-            source: Provided { position: true, ..reference.source },
+            source: Provided { position: true, placed: true, ..reference.source },
             residual: ResidualSettings { weighs_vibration: true, ..reference.residual },
             ..reference
         }
@@ -102,6 +111,7 @@ impl Settings {
                 followed: true,
                 lags: false,
                 position: true,
+                placed: false,
                 heading: false,
                 exact_attitude: true,
             },
@@ -141,6 +151,7 @@ impl Settings {
                 followed: false,
                 lags: true,
                 position: true,
+                placed: false,
                 heading: false,
                 exact_attitude: true,
             },

@@ -51,6 +51,8 @@ pub struct Provided {
     pub lags: bool,
     /// A place: the sensor is not moved to and fro, or its acceleration would be known.
     pub position: bool,
+    /// Positions, row by row.
+    pub placed: bool,
     /// The heading against north.
     pub heading: bool,
     /// An attitude without noise or a filter of its own.

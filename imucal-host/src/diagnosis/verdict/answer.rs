@@ -7,6 +7,7 @@ use super::{
     decision::Evidence,
     detectability, estimates, experiment, fault, model_error,
     reference_clock::{self, Clock},
+    room_field,
     shares::{self, Closed},
 };
 use crate::{
@@ -89,7 +90,14 @@ struct Asserted {
 impl Asserted {
     fn of(explained: &Solution<'_>, tested: &Tested) -> Result<Self, DiagnosisError> {
         let mut causes = causes(explained, tested)?;
-        let remarks = refuted(&mut causes, explained)?;
+        let mut remarks = refuted(&mut causes, explained)?;
+        if explained.linear.scene.settings.verdict.outweighs_remainder {
+            remarks.extend(outweighed(&mut causes, explained, tested));
+        }
+        let room = explained.linear.scene.settings.verdict.room;
+        if room > 0.0 {
+            remarks.extend(room_field::leave_out(&mut causes, explained, room));
+        }
         causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         let mut credible_set = credible_set(explained, tested)?;
         let refuted = !remarks.is_empty();
@@ -223,6 +231,33 @@ fn refuted(
     let mut remarks = cross_validation::leave_out(causes, linear, &best.set, &best.noise)?;
     remarks.extend(confounded_episode::leave_out(causes, &linear.scene.blocks, by.carried));
     Ok(remarks)
+}
+
+/// Takes out the causes that explain less of a sensor than what its residual still follows, or next to nothing of the gap;
+/// remarks on them.
+fn outweighed(causes: &mut Vec<Cause>, explained: &Solution<'_>, tested: &Tested) -> Vec<String> {
+    let settings = explained.linear.scene.settings;
+    let remark = |cause: &Cause| {
+        let at = explained.best.set.iter().position(|effect| effect.id == cause.effect)?;
+        let share = tested.closed.each.get(at)?.value;
+        if share < settings.verdict.least_of_all {
+            return Some(format!("not asserted: {} closes {:.1} % of the gap", cause.effect, 100.0 * share));
+        }
+        let own = share * tested.closed.explainable;
+        let reach = explained.linear.scene.reach(explained.best.set[at]);
+        let is_more = |f: &&Following| {
+            reach.contains(&f.kind) && f.size > own && is_followed(f, tested.after.len(), &settings.location)
+        };
+        let most = tested.after.iter().filter(is_more).max_by(|a, b| a.size.total_cmp(&b.size))?;
+        Some(format!(
+            "not asserted: {} explains less of the {} than its residual still follows ({}), which no effect explains",
+            cause.effect, most.kind, most.driver
+        ))
+    };
+    let remarks: Vec<Option<String>> = causes.iter().map(remark).collect();
+    let mut out = remarks.iter().map(Option::is_some);
+    causes.retain(|_| !out.next().unwrap_or(false));
+    remarks.into_iter().flatten().collect()
 }
 
 /// The table of the gap.

@@ -5,11 +5,19 @@
 
 use crate::diagnosis::{finding::Cause, residual::block::Block};
 
+/// Share of the moving blocks at either end that may be a tracker's jerks.
+const JERKS: f64 = 0.005;
+
 /// Takes out of `causes` what begins and ends within `near` of the movement, s, and says so.
 pub fn leave_out(causes: &mut Vec<Cause>, blocks: &[Block], near: f64) -> Vec<String> {
-    let mut moving = blocks.iter().filter(|block| block.rest.is_none()).map(|block| block.time);
-    let Some(first) = moving.next() else { return Vec::new() };
-    let last = moving.next_back().unwrap_or(first);
+    let moving: Vec<f64> =
+        blocks.iter().filter(|block| block.rest.is_none()).map(|block| block.time).collect();
+    // A tracker's jerk or two at rest is no movement.
+    let jerks = (JERKS * moving.len() as f64) as usize;
+    let (Some(first), Some(last)) = (moving.get(jerks), moving.iter().rev().nth(jerks)) else {
+        return Vec::new();
+    };
+    let (first, last) = (*first, *last);
     let time = |cause: &Cause, name: &str| {
         cause.parameters.iter().find(|amount| amount.name == name).and_then(|amount| amount.value)
     };

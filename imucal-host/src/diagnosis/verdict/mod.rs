@@ -16,6 +16,7 @@
 //! | [`fault`] | shares of faults of the recording itself |
 //! | [`detectability`] | what is absent, and from what size on it would have been detected |
 //! | [`experiment`] | what to record next to distinguish what is ambiguous |
+//! | [`room_field`] | causes that the field of a room could stand for are taken out, where no rig guides the sensor |
 //! | [`decision`] | the verdict, decided once from all of these |
 //! | [`answer`] | the diagnosis, put together once |
 //!
@@ -32,4 +33,5 @@ pub mod experiment;
 pub mod fault;
 pub mod model_error;
 pub mod reference_clock;
+pub mod room_field;
 pub mod shares;

@@ -1,0 +1,105 @@
+//! Real recordings along an optical reference with positions: the accelerometer follows the position's second derivative, and
+//! what a hand or a room does is not taken for an effect of a sensor.
+
+use std::sync::OnceLock;
+
+use imucal_host::{
+    diagnosis::{Diagnosis, Options, Verdict, diagnose},
+    effect::class::class,
+    observe::motion,
+    recording::Recording,
+};
+use imucal_tests::data;
+use nalgebra::{Quaternion, UnitQuaternion};
+
+/// Recordings with positions.
+const PLACED: [&str; 3] = ["broad-02-rotation", "broad-10-translation", "broad-24-tapping"];
+
+/// Each is made once.
+static DIAGNOSES: [OnceLock<Diagnosis>; 3] = [const { OnceLock::new() }; 3];
+
+fn read(name: &str) -> Option<Recording> {
+    Some(Recording::read(&data::real(&format!("{name}.csv.gz"))?).expect("a good recording"))
+}
+
+fn diagnosed(at: usize) -> Option<&'static Diagnosis> {
+    let recording = read(PLACED[at])?;
+    Some(DIAGNOSES[at].get_or_init(|| diagnose(&recording, &Options::default(), &|_| ())))
+}
+
+fn names(diagnosis: &Diagnosis) -> Vec<&str> {
+    diagnosis.causes.iter().map(|cause| cause.effect.as_str()).collect()
+}
+
+#[test]
+fn the_accelerometer_follows_the_position_to_a_quarter_of_a_metre_per_second_squared() {
+    for at in 0..2 {
+        let Some(diagnosis) = diagnosed(at) else { return };
+        let gaps: Vec<f64> =
+            diagnosis.gap.iter().filter(|gap| gap.sensor == "acc").map(|gap| gap.rms_after).collect();
+        println!("{} acc {gaps:.3?} m/s^2 {:?}", PLACED[at], names(diagnosis));
+        assert!(gaps.len() == 3 && gaps.iter().all(|gap| *gap < 0.25), "{}: {gaps:?}", PLACED[at]);
+        assert_ne!(diagnosis.verdict, Verdict::NotTestable);
+    }
+}
+
+#[test]
+fn an_arm_is_found_where_the_position_confirms_it_and_nothing_of_the_magnetometer() {
+    for (at, name) in PLACED.iter().enumerate() {
+        let Some(diagnosis) = diagnosed(at) else { return };
+        let found = names(diagnosis);
+        assert!(found.iter().any(|id| class(id) == "acc.lever_arm"), "{name}: {found:?}");
+        assert!(found.iter().all(|id| !id.starts_with("mag.")), "{name}: {found:?}");
+        // The chips were read 4 ms apart from the cameras.
+        assert!(found.contains(&"clk.time_offset"), "{name}: {found:?}");
+    }
+}
+
+#[test]
+fn taps_are_passages_and_no_effects() {
+    let Some(diagnosis) = diagnosed(2) else { return };
+    let allowed = ["acc.stuck_samples", "gyr.stuck_samples", "clk.time_offset"];
+    for id in names(diagnosis) {
+        assert!(allowed.contains(&id) || class(id) == "acc.lever_arm", "{id}");
+    }
+}
+
+#[test]
+fn without_the_position_no_arm_is_asserted() {
+    for name in ["broad-01-undisturbed", "broad-02-rotation"] {
+        let Some(mut recording) = read(name) else { return };
+        recording.position = None;
+        let diagnosis = diagnose(&recording, &Options::default(), &|_| ());
+        assert!(names(&diagnosis).iter().all(|id| class(id) != "acc.lever_arm"), "{:?}", names(&diagnosis));
+        let because = diagnosis.not_testable.iter().find(|effect| effect.effect == "acc.lever_arm");
+        assert!(because.is_some_and(|why| why.because.contains("linear acceleration")), "{because:?}");
+    }
+}
+
+#[test]
+fn a_delay_of_the_reference_is_reported_with_its_sign_and_size() {
+    let Some(recording) = read("broad-02-rotation") else { return };
+    let delays = [-0.05, 0.0, 0.05];
+    let offsets: Vec<f64> = delays
+        .iter()
+        .map(|delay| {
+            let mut late = recording.clone();
+            // The cameras' row of t shows what was at t - delay.
+            let attitudes = motion::of_reference(recording.reference.as_ref().expect("attitudes"));
+            let later = motion::later(&recording.time, &attitudes, *delay);
+            let quaternion = |attitude: &Option<nalgebra::Matrix3<f64>>| {
+                let none = Quaternion::new(f64::NAN, f64::NAN, f64::NAN, f64::NAN);
+                let q = attitude.map_or(none, |c| *UnitQuaternion::from_matrix(&c).quaternion());
+                [q.w, q.i, q.j, q.k]
+            };
+            late.reference = Some(later.iter().map(quaternion).collect());
+            late.position = None;
+            let diagnosis = diagnose(&late, &Options::default(), &|_| ());
+            let cause = diagnosis.causes.iter().find(|cause| cause.effect == "clk.time_offset");
+            cause.expect("it is named").parameters[0].value.expect("known")
+        })
+        .collect();
+    for (offset, delay) in offsets.iter().zip(delays) {
+        assert!((offset - offsets[1] - delay).abs() < 3e-4, "{offsets:?}");
+    }
+}
