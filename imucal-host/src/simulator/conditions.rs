@@ -27,7 +27,7 @@ impl Default for NoiseLevel {
 pub struct Conditions {
     /// Where the rig stands.
     pub place: Place,
-    /// Noise, by [`SensorKind::ALL`].
+    /// Noise, by [`SensorKind::ALL`](crate::recording::SensorKind::ALL).
     pub noise: [NoiseLevel; 3],
     /// Standard deviation of where gimbals come to rest against their encoders, rad.
     pub scatter: f64,
