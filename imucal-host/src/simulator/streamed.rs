@@ -116,6 +116,13 @@ impl Streamed {
         Some(streamed)
     }
 
+    /// Known at no row but these, and such as it was known at.
+    #[must_use]
+    pub fn known_where(mut self, rows: &[bool]) -> Self {
+        self.known.iter_mut().zip(rows).for_each(|(known, row)| *known &= row);
+        self
+    }
+
     /// The clock that rows are read by.
     pub fn clock(&self) -> StreamClock {
         self.clock

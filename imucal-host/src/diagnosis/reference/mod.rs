@@ -10,6 +10,7 @@
 //! | [`movement`] | which of the movements a recording has, and its place on Earth |
 //! | [`rest_to_rest`] | a movement reconstructed from the sensor's own rests and turns (this runs a whole calibration) |
 //! | [`stream`] | the movement of a simulator's stream, and what is wrong with one that gives none |
+//! | [`impact`] | rows near an impact that the samples of a stream do not resolve |
 //! | [`stream_clock`] | its clock against that of the sensor, roughly |
 //! | [`revisits`] | whether attitudes are held more than once, without which repeatability cannot be estimated |
 //!
@@ -17,6 +18,7 @@
 //!
 //! Not done here: a reference attitude holds no linear acceleration; its clock is put right in `screening`.
 
+pub mod impact;
 pub mod model;
 pub mod movement;
 pub mod rest_to_rest;

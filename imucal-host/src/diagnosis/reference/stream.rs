@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::stream_clock;
+use super::{impact, stream_clock};
 use crate::{
     recording::{Recording, SensorKind, Stream, check::integrity::Integrity},
     simulator::{Motion, Place, Recorded, StreamClock, Streamed, replay::reading_noise},
@@ -44,8 +44,9 @@ pub fn movement(
     place: Place,
 ) -> Result<Given, String> {
     let streamed = Streamed::new(stream, clock, &recording.time, temperature, place);
-    let movement =
-        streamed.ok_or_else(|| format!("{}: the stream has fewer than two samples", stream.name))?;
+    let movement = streamed
+        .ok_or_else(|| format!("{}: the stream has fewer than two samples", stream.name))?
+        .known_where(&impact::resolved(recording, stream, clock));
     if let Some(found) = weightless(&movement, recording, place.gravity) {
         return Err(format!(
             "{}: the simulated accelerometer reads {found:.2} m/s² on average where one at rest reads {:.2} m/s²: it holds \
