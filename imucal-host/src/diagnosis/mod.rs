@@ -85,7 +85,7 @@ pub fn try_diagnose(
     };
     let mut candidates = Candidates::new(&setting, &options.without, &options.effects);
     let (scene, stretches) = motion_mismatch::left_out(scene, &candidates)?;
-    preparation.findings.extend(motion_mismatch::finding(&stretches));
+    preparation.findings.extend(motion_mismatch::finding(stretches, &preparation.unmatched));
     formulas::sift(&scene, &mut candidates)?;
     let explain = |candidates: &Candidates| {
         let explained = stepwise::search(&scene, candidates, progress)?;

@@ -6,12 +6,16 @@
 //!
 //! e is what a cubic through a sample's neighbours does not foretell, of the recording's samples and of the stream's. A foot
 //! that strikes or a wheel on an edge stands far out of the samples about it; vibration, a movement along which all samples
-//! are as hard to foretell, does not. Not recognised: impacts so dense that there is nothing between them.
+//! are as hard to foretell, does not. Impacts that one side has and the other lacks, several in a row, are a movement that
+//! the simulator does not have: a contact. Not recognised: impacts so dense that there is nothing between them, and a single
+//! one that one side lacks.
+
+use std::ops::Range;
 
 use nalgebra::Vector3;
 
 use crate::{
-    recording::{Recording, SensorKind, Stream, median},
+    recording::{Recording, SensorKind, Stream, median, order_statistics::std_of_median},
     simulator::StreamClock,
 };
 
@@ -29,48 +33,195 @@ const APART: f64 = 1.6;
 /// Where more than this share of the rows would be left out, the movement itself is that rough.
 const MOST: f64 = 0.4;
 
-/// Whether no impact is near, row by row of a recording that is compared with a stream on this clock.
-pub fn resolved(recording: &Recording, stream: &Stream, clock: StreamClock) -> Vec<bool> {
-    let mut impacts: Vec<f64> = Vec::new();
+/// Impacts no further apart than this, s, are one.
+const ONE: f64 = 0.06;
+/// Of fewer impacts in all it is not known what is usual; so many in a row are looked at together at most, without a pause
+/// longer than this, s.
+const FEWEST: usize = 20;
+const MOST_IN_ROW: usize = 30;
+const PAUSE: f64 = 3.0;
+/// ln of a ratio of sizes scatters by this at least.
+const LEAST_SCATTER: f64 = 0.3;
+/// One impact counts no more than so many standard deviations, and several in a row are unusual from so many on.
+const LARGEST: f64 = 4.0;
+const UNUSUAL: f64 = 7.5;
+
+/// The impacts of a recording and of the stream that it is compared with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Impacts {
+    /// Whether no impact is near, row by row.
+    pub resolved: Vec<bool>,
+    /// Stretches with impacts that one side has and the other lacks.
+    pub unmatched: Vec<Unmatched>,
+}
+
+/// Impacts in a row that are weaker or stronger in the recording than in the stream.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unmatched {
+    /// When, s of the recording's clock.
+    pub time: Range<f64>,
+    /// Root mean square of how far the largest |e| of the two sides are apart, m/s².
+    pub force: f64,
+    /// How far their sizes are from the usual: the square in standard deviations.
+    pub energy: f64,
+}
+
+/// The impacts of a recording and of a stream on this clock.
+pub fn impacts(recording: &Recording, stream: &Stream, clock: StreamClock) -> Impacts {
+    // Where a row shows the stream of s: the clock's inverse.
+    let row = |time: f64| time * (1.0 + clock.error) - clock.offset;
+    let rows: Vec<f64> = stream.time.iter().map(|time| row(*time)).collect();
+    let (mut times, mut unmatched) = (Vec::new(), Vec::new());
     for kind in SensorKind::ALL {
         let Some(real) = recording.sensor(kind) else { continue };
         let own = Unforeseen::of(&recording.time, &real.values);
-        let usual = own.usual();
-        impacts.extend(own.impacts(0.0));
+        let mut of_sensor = own.impacts(0.0);
         if let Some(values) = stream.values.sensor(kind) {
-            let given = Unforeseen::of(&stream.time, values);
-            // Where a row shows the stream of s: the clock's inverse.
-            let row = |time: f64| time * (1.0 + clock.error) - clock.offset;
-            impacts.extend(given.impacts(SEEN * usual).into_iter().map(row));
+            let given = Unforeseen::of(&rows, values);
+            of_sensor.extend(given.impacts(SEEN * own.usual()));
+            if kind == SensorKind::Acc {
+                unmatched = Strikes::of(&own, &given, &of_sensor).unmatched();
+            }
+        }
+        times.extend(of_sensor);
+    }
+    times.sort_by(f64::total_cmp);
+    let margin = MARGIN * interval(&recording.time).max(interval(&rows));
+    let is_clear = |time: &f64| {
+        let next = times.partition_point(|impact| *impact < time - margin);
+        times.get(next).is_none_or(|impact| *impact > time + margin)
+    };
+    let mut resolved: Vec<bool> = recording.time.iter().map(is_clear).collect();
+    let left_out = resolved.iter().filter(|resolved| !**resolved).count();
+    if left_out as f64 > MOST * resolved.len() as f64 {
+        resolved.fill(true);
+    }
+    Impacts { resolved, unmatched }
+}
+
+/// Median interval, s.
+fn interval(time: &[f64]) -> f64 {
+    median(time.windows(2).map(|pair| pair[1] - pair[0]).collect()).unwrap_or(0.0)
+}
+
+/// Impacts one after the other, on both sides.
+struct Strikes {
+    strikes: Vec<Strike>,
+}
+
+/// One impact.
+struct Strike {
+    time: f64,
+    /// ln of its power in the recording over that in the stream.
+    ratio: f64,
+    /// Largest |e| in the recording less that in the stream.
+    excess: f64,
+}
+
+impl Strikes {
+    /// From what is unforeseen in the recording and in the stream, both on the recording's clock, and the times of impacts.
+    fn of(own: &Unforeseen, given: &Unforeseen, impacts: &[f64]) -> Self {
+        let mut times = impacts.to_vec();
+        times.sort_by(f64::total_cmp);
+        let floor = (STANDS_OUT * own.usual()).powi(2).max(f64::MIN_POSITIVE);
+        let margin = MARGIN * own.interval.max(given.interval);
+        let strike = |times: &[f64]| {
+            let span = times[0] - margin..times[times.len() - 1] + margin;
+            let [own, given] = [own, given].map(|side| side.within(&span));
+            Strike {
+                time: 0.5 * (span.start + span.end),
+                ratio: ((own.power + floor * margin) / (given.power + floor * margin)).ln(),
+                excess: own.largest - given.largest,
+            }
+        };
+        Self { strikes: times.chunk_by(|a, b| b - a < ONE).map(strike).collect() }
+    }
+
+    /// Stretches in which the ratios are all on one side of the usual, the clearest first.
+    fn unmatched(&self) -> Vec<Unmatched> {
+        let usual = median(self.strikes.iter().map(|strike| strike.ratio).collect()).unwrap_or(0.0);
+        let sizes = self.strikes.iter().map(|strike| (strike.ratio - usual).abs()).collect();
+        let scatter = std_of_median(sizes).unwrap_or(0.0).max(LEAST_SCATTER);
+        let off: Vec<f64> = self
+            .strikes
+            .iter()
+            .map(|strike| ((strike.ratio - usual) / scatter).clamp(-LARGEST, LARGEST))
+            .collect();
+        let mut found: Vec<(Range<usize>, f64)> = Vec::new();
+        if self.strikes.len() < FEWEST {
+            return Vec::new();
+        }
+        for from in 0..off.len() {
+            let mut sum = 0.0;
+            for to in from..off.len().min(from + MOST_IN_ROW) {
+                if to > from && self.strikes[to].time - self.strikes[to - 1].time > PAUSE {
+                    break;
+                }
+                sum += off[to];
+                let z = f64::abs(sum) / ((to + 1 - from) as f64).sqrt();
+                if z > UNUSUAL {
+                    found.push((from..to + 1, z));
+                }
+            }
+        }
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let mut kept: Vec<(Range<usize>, f64)> = Vec::new();
+        for (strikes, z) in found {
+            let meets =
+                |(other, _): &(Range<usize>, f64)| strikes.start < other.end && other.start < strikes.end;
+            if !kept.iter().any(meets) {
+                kept.push((strikes, z));
+            }
+        }
+        kept.into_iter().map(|(strikes, z)| self.stretch(strikes, z)).collect()
+    }
+
+    fn stretch(&self, strikes: Range<usize>, z: f64) -> Unmatched {
+        let own = &self.strikes[strikes];
+        let squares: f64 = own.iter().map(|strike| strike.excess * strike.excess).sum();
+        Unmatched {
+            time: own[0].time - ONE..own[own.len() - 1].time + ONE,
+            force: (squares / own.len() as f64).sqrt(),
+            energy: z * z,
         }
     }
-    impacts.sort_by(f64::total_cmp);
-    let interval = |time: &[f64]| median(time.windows(2).map(|pair| pair[1] - pair[0]).collect());
-    let slower = interval(&recording.time).into_iter().chain(interval(&stream.time)).fold(0.0, f64::max);
-    let is_clear = |time: &f64| {
-        let next = impacts.partition_point(|impact| *impact < time - MARGIN * slower);
-        impacts.get(next).is_none_or(|impact| *impact > time + MARGIN * slower)
-    };
-    let resolved: Vec<bool> = recording.time.iter().map(is_clear).collect();
-    let left_out = resolved.iter().filter(|resolved| !**resolved).count();
-    if left_out as f64 > MOST * resolved.len() as f64 { vec![true; resolved.len()] } else { resolved }
+}
+
+/// What is unforeseen within a span.
+struct Within {
+    /// Integral of e², by time.
+    power: f64,
+    /// Largest |e|.
+    largest: f64,
 }
 
 /// |e| of samples that have four neighbours, by time, s.
 struct Unforeseen {
     samples: Vec<(f64, f64)>,
+    /// Median interval, s.
+    interval: f64,
 }
 
 impl Unforeseen {
     fn of(time: &[f64], values: &[Vector3<f64>]) -> Self {
-        let interval = median(time.windows(2).map(|pair| pair[1] - pair[0]).collect()).unwrap_or(0.0);
+        let interval = interval(time);
         let of = |(t, x): (&[f64], &[Vector3<f64>])| {
             let even = t.windows(2).all(|pair| pair[1] - pair[0] < APART * interval);
             let foretold = ((x[1] + x[3]) * 4.0 - (x[0] + x[4])) / 6.0;
             let size = (x[2] - foretold).norm();
             (even && size.is_finite()).then_some((t[2], size))
         };
-        Self { samples: time.windows(5).zip(values.windows(5)).filter_map(of).collect() }
+        Self { samples: time.windows(5).zip(values.windows(5)).filter_map(of).collect(), interval }
+    }
+
+    fn within(&self, span: &Range<f64>) -> Within {
+        let from = self.samples.partition_point(|(time, _)| *time < span.start);
+        let to = self.samples.partition_point(|(time, _)| *time <= span.end);
+        let sizes = || self.samples[from..to.max(from)].iter().map(|(_, size)| *size);
+        Within {
+            power: sizes().map(|size| size * size).sum::<f64>() * self.interval,
+            largest: sizes().fold(0.0, f64::max),
+        }
     }
 
     /// The median of all.
@@ -115,7 +266,7 @@ mod tests {
     fn left_out(scene: &RobotScene) -> f64 {
         let pair = scene.record("pair").unwrap();
         let stream = Stream::of(&pair.simulated).unwrap();
-        let rows = resolved(&pair.real, &stream, StreamClock::default());
+        let rows = impacts(&pair.real, &stream, StreamClock::default()).resolved;
         rows.iter().filter(|resolved| !**resolved).count() as f64 / rows.len() as f64
     }
 

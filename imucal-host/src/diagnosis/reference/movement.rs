@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::{model::Model, rest_to_rest::RestToRest, stream};
+use super::{impact::Unmatched, model::Model, rest_to_rest::RestToRest, stream};
 use crate::{
     observe::{motion, motion::Attitudes},
     recording::{
@@ -34,6 +34,8 @@ pub struct Reference {
     pub movement: Box<dyn Recorded>,
     /// The rests that it is reconstructed from, where neither encoders nor a reference attitude were recorded.
     pub held: Option<RestToRest>,
+    /// Stretches with impacts that a stream lacks, or has and the recording lacks.
+    pub unmatched: Vec<Unmatched>,
     /// What a reader ought to know of it.
     pub remarks: Vec<String>,
 }
@@ -60,12 +62,12 @@ pub fn reference(
         field_n: site.field_ned_ut.unwrap_or_default().into(),
     };
     let temperature = recording.temperature.clone().unwrap_or_else(|| vec![25.0; recording.rows()]);
-    let (mut held, mut remarks) = (None, Vec::new());
+    let (mut held, mut unmatched, mut remarks) = (None, Vec::new(), Vec::new());
     let sources = (stream, recording.gimbal.as_deref(), recording.reference.as_deref());
     let movement: Box<dyn Recorded> = match sources {
         (Some(stream), ..) => {
             let given = stream::movement(recording, stream, clock, temperature, place)?;
-            remarks = given.remarks;
+            (unmatched, remarks) = (given.unmatched, given.remarks);
             Box::new(given.movement)
         }
         (None, Some(gimbal), _) => {
@@ -120,7 +122,7 @@ pub fn reference(
     if !movement.moving().iter().any(|moves| *moves) {
         return Err("the rig does not move: no effect can be distinguished from a bias".to_owned());
     }
-    Ok(Reference { movement, held, remarks })
+    Ok(Reference { movement, held, unmatched, remarks })
 }
 
 /// Positions of `offset` later, s, on the straight line between two rows; NaN where either of them is missing.

@@ -2,7 +2,10 @@
 
 use nalgebra::Vector3;
 
-use super::{impact, stream_clock};
+use super::{
+    impact::{self, Impacts, Unmatched},
+    stream_clock,
+};
 use crate::{
     recording::{Recording, SensorKind, Stream, check::integrity::Integrity},
     simulator::{Motion, Place, Recorded, StreamClock, Streamed, replay::reading_noise},
@@ -18,6 +21,8 @@ const WEIGHTLESS: f64 = 0.3;
 pub struct Given {
     /// The movement.
     pub movement: Streamed,
+    /// Stretches with impacts that the stream or the recording lacks.
+    pub unmatched: Vec<Unmatched>,
     /// Remarks.
     pub remarks: Vec<String>,
 }
@@ -44,9 +49,10 @@ pub fn movement(
     place: Place,
 ) -> Result<Given, String> {
     let streamed = Streamed::new(stream, clock, &recording.time, temperature, place);
+    let Impacts { resolved, unmatched } = impact::impacts(recording, stream, clock);
     let movement = streamed
         .ok_or_else(|| format!("{}: the stream has fewer than two samples", stream.name))?
-        .known_where(&impact::resolved(recording, stream, clock));
+        .known_where(&resolved);
     if let Some(found) = weightless(&movement, recording, place.gravity) {
         return Err(format!(
             "{}: the simulated accelerometer reads {found:.2} m/s² on average where one at rest reads {:.2} m/s²: it holds \
@@ -62,7 +68,7 @@ pub fn movement(
             remarks.push(format!("the {kind} is left out: the simulator gives no stream of it"));
         }
     }
-    Ok(Given { movement, remarks })
+    Ok(Given { movement, unmatched, remarks })
 }
 
 /// Mean specific force of a stream that does not hold gravity, m/s².

@@ -14,7 +14,8 @@ use crate::{
     diagnosis::{
         error::DiagnosisError,
         reference::{
-            model::Model, movement, movement::Reference, rest_to_rest::RestToRest, revisits, stream,
+            impact::Unmatched, model::Model, movement, movement::Reference, rest_to_rest::RestToRest,
+            revisits, stream,
         },
         settings::Settings,
     },
@@ -48,6 +49,8 @@ pub struct Preparation {
     pub triads: [Triad<f64>; 3],
     /// The model that it stands on.
     pub model: Model,
+    /// Stretches with impacts that a stream lacks, or has and the recording lacks.
+    pub unmatched: Vec<Unmatched>,
     /// Faults of the recording that are effects of the catalogue.
     pub findings: Vec<Finding>,
     /// What else a reader ought to know.
@@ -88,7 +91,7 @@ impl Preparation {
         if stream.is_none() && recording.position.is_some() {
             as_read = bandwidth::best(recording, &integrity, as_read, &|width| of_bandwidth(clock, width))?;
         }
-        let Reference { movement, held, remarks: of_reference } = as_read;
+        let Reference { movement, held, unmatched, remarks: of_reference } = as_read;
         let conventions = conventions::check(recording, &integrity, &*movement, settings.source);
         if let Some(contradiction) = conventions.contradiction {
             return Err(DiagnosisError::Recording(contradiction));
@@ -127,7 +130,7 @@ impl Preparation {
         remarks.extend(revisits::remark(&*movement).filter(|_| settings.noise.scatters));
         remarks.extend(shortcomings(recording));
         let findings = conventions.findings;
-        Ok(Self { movement, held, clock, usable, triads, model, findings, remarks })
+        Ok(Self { movement, held, clock, usable, triads, model, unmatched, findings, remarks })
     }
 }
 

@@ -13,6 +13,7 @@
 //! | [`score`] | evidence of a set, axis by axis and jointly |
 //! | [`memo`] | results that are asked for again |
 //! | [`neighbours`] | sets one addition, removal or exchange away |
+//! | [`motion_evidence`] | where the sensors agree on a movement that the simulator lacks |
 //! | [`motion_mismatch`] | stretches in which the machine moved otherwise than its simulator |
 //! | [`stepwise`] | the search: neighbours are screened and scored until none is better |
 //!
@@ -21,6 +22,7 @@
 pub mod hypothesis;
 pub mod linearisation;
 pub mod memo;
+pub mod motion_evidence;
 pub mod motion_mismatch;
 pub mod neighbours;
 pub mod refit;

@@ -1,0 +1,260 @@
+//! Where the sensors agree on a movement that the simulator lacks.
+//!
+//! What the baseline leaves of the gyroscope is far beyond what it leaves wherever the movement is as brisk, and the
+//! magnetometer confirms it: the turn that the gyroscope's residual integrates to foretells the magnetometer's residual,
+//!
+//! ```text
+//! dθ/dt = r_w − w × θ      r_b = b × θ + c₀ + c₁ t
+//! ```
+//!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | r_w, r_b | residuals of rate, rad/s, and field, µT |
+//! | θ | turn that the simulator lacks, rad |
+//! | w, b | rate and field of the simulator |
+//! | c₀, c₁ | what the field's residual is anyhow |
+//!
+//! A fault of one sensor is seen by no other, and what depends on the movement is there whenever it is as brisk. Where there
+//! is no gyroscope or no magnetometer, two sensors must be beyond the usual at once. A stretch goes on as long as any
+//! sensor shows it. Not recognised: another movement that only the accelerometer shows, and one that goes on for more than
+//! half of the recording.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
+
+use super::{motion_mismatch::Stretch, refit::Fit};
+use crate::{
+    diagnosis::{
+        error::DiagnosisError,
+        mixed_model::noise::{Noise, Weighing},
+        residual::{base_run::Reference, forward_model::ForwardModel},
+    },
+    effect::Truth,
+    recording::SensorKind,
+};
+
+/// Residuals are averaged over so many blocks to each side.
+const SIDE: usize = 2;
+/// So many of the blocks that move most alike say what is usual, of so many that are looked at, none nearer than this, s.
+const ALIKE: usize = 60;
+const COMPARED: usize = 1500;
+const APART: f64 = 5.0;
+/// A residual is beyond the usual from so many times the third quartile of those blocks on, in whitened squares; a stretch
+/// goes on from so many times.
+const BEYOND: f64 = 5.0;
+const GOES_ON: f64 = 2.0;
+/// Stretches that are no further apart than this, s, are one; it is longer by this on both sides, s.
+const BETWEEN: f64 = 1.0;
+const MARGIN: f64 = 0.5;
+/// Blocks beyond the usual in a stretch, at least.
+const FEWEST: usize = 3;
+/// A movement that is another one for more than this share of the recording has no usual.
+const MOST: f64 = 0.5;
+/// Whitened square of the magnetometer's residual that the gyroscope's turn takes away, at least, where the machine moved.
+const CONFIRMS: f64 = 40.0;
+/// The turn is integrated over no more than so many blocks at a time: its noise adds up.
+const INTEGRATED: usize = 80;
+
+/// Stretches that a fit of the baseline shows.
+///
+/// # Errors
+///
+/// [`DiagnosisError`], when the simulator fails.
+pub fn stretches(scene: &ForwardModel<'_>, fit: &Fit) -> Result<Vec<Stretch>, DiagnosisError> {
+    let reference = Reference::new(scene, fit.doses.clone(), &scene.coarse)?;
+    let weighing = Weighing::new(scene, SensorKind::ALL.map(|kind| reference.output(kind)));
+    let noise = weighing.white(&fit.residual);
+    let truth = scene.plain();
+    let energies = SensorKind::ALL.map(|kind| energies(scene, fit, &noise, kind));
+    let usual = usual_of(scene, &truth, &energies);
+    let residuals =
+        Residuals { scene, fit, truth: &truth, noise: &noise, energies: &energies, usual: &usual };
+    let runs = residuals.runs();
+    let confirmed = runs.into_par_iter().filter(|run| residuals.confirm(run));
+    let found: Vec<Stretch> = confirmed.map(|run| residuals.stretch(residuals.whole(run))).collect();
+    let lasting: f64 = found.iter().map(|stretch| stretch.time.end - stretch.time.start).sum();
+    Ok(if lasting > MOST * scene.duration() { Vec::new() } else { found })
+}
+
+/// What a fit of the baseline leaves, block by block, and what is usual where the movement is as brisk.
+struct Residuals<'a, 's> {
+    scene: &'a ForwardModel<'s>,
+    fit: &'a Fit,
+    truth: &'a [Truth],
+    noise: &'a Noise,
+    energies: &'a [Vec<Option<f64>>; 3],
+    usual: &'a [[Option<f64>; 3]],
+}
+
+impl Residuals<'_, '_> {
+    fn time(&self, block: usize) -> f64 {
+        self.scene.blocks[block].time
+    }
+
+    /// Whether a sensor is beyond so many times the usual about a block.
+    fn is_beyond(&self, kind: SensorKind, block: usize, times: f64) -> bool {
+        let (own, usual) = (smoothed(&self.energies[kind as usize], block), self.usual[block][kind as usize]);
+        own.zip(usual).is_some_and(|(own, usual)| own > times * usual.max(1.0))
+    }
+
+    /// The gyroscope shows a turn, and the magnetometer can confirm it.
+    fn sees_turns(&self) -> bool {
+        [SensorKind::Gyr, SensorKind::Mag].iter().all(|kind| self.scene.kinds.contains(kind))
+    }
+
+    /// Blocks in a row in which the gyroscope is beyond the usual; two sensors, where no magnetometer confirms it.
+    fn runs(&self) -> Vec<Range<usize>> {
+        let kinds = || self.scene.kinds.iter();
+        let beyond = |block: &usize| match self.sees_turns() {
+            true => self.is_beyond(SensorKind::Gyr, *block, BEYOND),
+            false => kinds().filter(|kind| self.is_beyond(**kind, *block, BEYOND)).count() > 1,
+        };
+        let blocks: Vec<usize> = (0..self.scene.blocks.len()).into_par_iter().filter(beyond).collect();
+        let near = |a: &usize, b: &usize| self.time(*b) - self.time(*a) < BETWEEN;
+        let runs = blocks.chunk_by(near).filter(|run| run.len() >= FEWEST);
+        runs.map(|run| run[0]..run[run.len() - 1] + 1).collect()
+    }
+
+    /// The run with the blocks before and behind it in which any sensor still shows it.
+    fn whole(&self, run: Range<usize>) -> Range<usize> {
+        let shows = |block: usize| self.scene.kinds.iter().any(|kind| self.is_beyond(*kind, block, GOES_ON));
+        let near = |a: usize, b: usize| (self.time(a) - self.time(b)).abs() < BETWEEN;
+        let (mut first, mut last) = (run.start, run.end - 1);
+        for block in (0..run.start).rev() {
+            match shows(block) {
+                true => first = block,
+                false if !near(block, first) => break,
+                false => {}
+            }
+        }
+        for block in run.end..self.scene.blocks.len() {
+            match shows(block) {
+                true => last = block,
+                false if !near(block, last) => break,
+                false => {}
+            }
+        }
+        first..last + 1
+    }
+
+    /// Whether the turn of the gyroscope's residual takes away a part of the magnetometer's; true where one of them is missing.
+    fn confirm(&self, run: &Range<usize>) -> bool {
+        let [_, Some(gyr), Some(mag)] = &self.fit.residual else { return true };
+        let about = run.start.saturating_sub(SIDE)..(run.end + SIDE).min(self.scene.blocks.len());
+        let blocks: Vec<usize> = about.collect();
+        let pieces = blocks.len().div_ceil(INTEGRATED).max(1);
+        let taken = |piece: &[usize]| self.taken_away(gyr, mag, piece).unwrap_or(0.0);
+        blocks.chunks(blocks.len().div_ceil(pieces)).map(taken).sum::<f64>() > CONFIRMS
+    }
+
+    /// Whitened square of the magnetometer's residual over some blocks that the gyroscope's turn takes away, an offset and
+    /// a slope being fitted with it and without.
+    fn taken_away(&self, gyr: &[Vector3<f64>], mag: &[Vector3<f64>], blocks: &[usize]) -> Option<f64> {
+        let mut turn = Vector3::<f64>::zeros();
+        let mut last = self.time(*blocks.first()?);
+        let middle = 0.5 * (last + self.time(*blocks.last()?));
+        let sigma = &self.noise.sensors[SensorKind::Mag as usize];
+        let mut design = DMatrix::zeros(3 * blocks.len(), 6);
+        let (mut without, mut with) =
+            (DMatrix::zeros(3 * blocks.len(), 1), DMatrix::zeros(3 * blocks.len(), 1));
+        for (row, at) in blocks.iter().enumerate() {
+            let (time, truth) = (self.time(*at), &self.truth[*at]);
+            turn += (gyr[*at] - truth.w_it_t.cross(&turn)) * (time - last);
+            last = time;
+            let usual = self.usual[*at][SensorKind::Mag as usize].unwrap_or(1.0).max(1.0);
+            let weight = (self.scene.worth(SensorKind::Mag, *at) / usual).sqrt();
+            let shown = truth.b_t.cross(&turn);
+            let white = if self.scene.blocks[*at].rest.is_some() { sigma.white } else { sigma.moving };
+            for axis in 0..3 {
+                let weight = weight / white[axis];
+                design[(3 * row + axis, axis)] = weight;
+                design[(3 * row + axis, 3 + axis)] = weight * (time - middle);
+                without[3 * row + axis] = weight * mag[*at][axis];
+                with[3 * row + axis] = weight * (mag[*at][axis] - shown[axis]);
+            }
+        }
+        let factor = (design.tr_mul(&design) + DMatrix::identity(6, 6) * 1e-9).cholesky()?;
+        let left =
+            |values: &DMatrix<f64>| (values - &design * factor.solve(&design.tr_mul(values))).norm_squared();
+        Some(left(&without) - left(&with))
+    }
+
+    fn stretch(&self, blocks: Range<usize>) -> Stretch {
+        let rms = |kind: SensorKind| {
+            let values = self.fit.residual[kind as usize].as_ref()?.get(blocks.clone())?;
+            Some((values.iter().map(Vector3::norm_squared).sum::<f64>() / values.len() as f64).sqrt())
+        };
+        let energy = |kind: SensorKind| {
+            self.energies[kind as usize][blocks.clone()].iter().flatten().sum::<f64>() * 3.0
+        };
+        Stretch {
+            time: self.time(blocks.start) - MARGIN..self.time(blocks.end - 1) + MARGIN,
+            force: rms(SensorKind::Acc),
+            rate: rms(SensorKind::Gyr),
+            energy: SensorKind::ALL.map(energy),
+        }
+    }
+}
+
+/// Whitened mean square of each block's residual, one where noise alone is there; `None` where nothing was measured.
+fn energies(scene: &ForwardModel<'_>, fit: &Fit, noise: &Noise, kind: SensorKind) -> Vec<Option<f64>> {
+    let Some(residual) = fit.residual[kind as usize].as_ref() else { return vec![None; scene.blocks.len()] };
+    let sensor = &noise.sensors[kind as usize];
+    let energy = |(at, left): (usize, &Vector3<f64>)| {
+        let sigma = if scene.blocks[at].rest.is_some() { &sensor.white } else { &sensor.moving };
+        let square: f64 = left.iter().zip(sigma).map(|(left, sigma)| (left / sigma).powi(2)).sum();
+        let worth = scene.worth(kind, at);
+        (worth > 0.0).then(|| worth * square / 3.0)
+    };
+    residual.iter().enumerate().map(energy).collect()
+}
+
+/// Mean over the blocks about one.
+fn smoothed(energies: &[Option<f64>], block: usize) -> Option<f64> {
+    let about = energies.get(block.saturating_sub(SIDE)..(block + SIDE + 1).min(energies.len()))?;
+    let known: Vec<f64> = about.iter().flatten().copied().collect();
+    (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+}
+
+/// How brisk the movement is in a block: turning, its change, and force besides gravity, in logarithms.
+fn briskness(truth: &Truth, gravity: f64) -> Vector3<f64> {
+    let floor = |value: f64, least: f64| (value + least).ln();
+    Vector3::new(
+        floor(truth.w_it_t.norm(), 0.02),
+        floor(truth.dw_it_t.norm(), 0.2),
+        floor((truth.f_t.norm() - gravity).abs(), 0.1),
+    )
+}
+
+/// What the blocks leave, by sensor, that move most like each.
+fn usual_of(
+    scene: &ForwardModel<'_>,
+    truth: &[Truth],
+    energies: &[Vec<Option<f64>>; 3],
+) -> Vec<[Option<f64>; 3]> {
+    let gravity = truth.iter().map(|row| row.f_t.norm()).sum::<f64>() / truth.len().max(1) as f64;
+    let brisk: Vec<Vector3<f64>> = truth.iter().map(|row| briskness(row, gravity)).collect();
+    let stride = brisk.len().div_ceil(COMPARED).max(1);
+    let compared: Vec<usize> = (0..brisk.len()).step_by(stride).collect();
+    let of = |block: usize| {
+        let time = scene.blocks[block].time;
+        let apart = compared.iter().filter(|other| (scene.blocks[**other].time - time).abs() > APART);
+        let mut near: Vec<(f64, usize)> =
+            apart.map(|other| ((brisk[*other] - brisk[block]).norm_squared(), *other)).collect();
+        let count = ALIKE.min(near.len());
+        if count == 0 {
+            return [None; 3];
+        }
+        near.select_nth_unstable_by(count - 1, |a, b| a.0.total_cmp(&b.0));
+        SensorKind::ALL.map(|kind| {
+            let alike = near[..count].iter();
+            let mut known: Vec<f64> =
+                alike.filter_map(|(_, at)| smoothed(&energies[kind as usize], *at)).collect();
+            known.sort_by(f64::total_cmp);
+            known.get(3 * known.len() / 4).copied()
+        })
+    };
+    (0..brisk.len()).into_par_iter().map(of).collect()
+}
