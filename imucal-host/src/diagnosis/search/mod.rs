@@ -15,6 +15,7 @@
 //! | [`neighbours`] | sets one addition, removal or exchange away |
 //! | [`motion_evidence`] | where the sensors agree on a movement that the simulator lacks |
 //! | [`motion_mismatch`] | stretches in which the machine moved otherwise than its simulator |
+//! | [`turn_likelihood`] | whether two sensors' residuals are one turn of the sensor, or a fault of either |
 //! | [`stepwise`] | the search: neighbours are screened and scored until none is better |
 //!
 //! Not done here: sets of more than a few effects are not enumerated; the search climbs.
@@ -29,3 +30,4 @@ pub mod refit;
 pub mod score;
 pub mod staged_start;
 pub mod stepwise;
+pub mod turn_likelihood;

@@ -1,30 +1,23 @@
 //! Where the sensors agree on a movement that the simulator lacks.
 //!
-//! What the baseline leaves of the gyroscope is far beyond what it leaves wherever the movement is as brisk, and the
-//! magnetometer confirms it: the turn that the gyroscope's residual integrates to foretells the magnetometer's residual,
+//! What the baseline leaves of the gyroscope or of the magnetometer is far beyond what it leaves wherever the movement is as
+//! brisk, and the two are likelier to be one turn of the sensor than a fault of either ([`turn_likelihood`]). Where one of
+//! them is missing, two sensors must be beyond the usual at once. A stretch goes on as long as any sensor shows it. A fault
+//! of one sensor is seen by no other, and what depends on the movement is there whenever it is as brisk.
 //!
-//! ```text
-//! dθ/dt = r_w − w × θ      r_b = b × θ + c₀ + c₁ t
-//! ```
-//!
-//! | symbol | meaning |
-//! | --- | --- |
-//! | r_w, r_b | residuals of rate, rad/s, and field, µT |
-//! | θ | turn that the simulator lacks, rad |
-//! | w, b | rate and field of the simulator |
-//! | c₀, c₁ | what the field's residual is anyhow |
-//!
-//! A fault of one sensor is seen by no other, and what depends on the movement is there whenever it is as brisk. Where there
-//! is no gyroscope or no magnetometer, two sensors must be beyond the usual at once. A stretch goes on as long as any
-//! sensor shows it. Not recognised: another movement that only the accelerometer shows, and one that goes on for more than
-//! half of the recording.
+//! Not recognised: another movement that only the accelerometer shows, and one that goes on for more than half of the
+//! recording.
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::{motion_mismatch::Stretch, refit::Fit};
+use super::{
+    motion_mismatch::Stretch,
+    refit::Fit,
+    turn_likelihood::{self, Seen},
+};
 use crate::{
     diagnosis::{
         error::DiagnosisError,
@@ -52,10 +45,11 @@ const MARGIN: f64 = 0.5;
 const FEWEST: usize = 3;
 /// A movement that is another one for more than this share of the recording has no usual.
 const MOST: f64 = 0.5;
-/// Whitened square of the magnetometer's residual that the gyroscope's turn takes away, at least, where the machine moved.
-const CONFIRMS: f64 = 40.0;
-/// The turn is integrated over no more than so many blocks at a time: its noise adds up.
-const INTEGRATED: usize = 80;
+/// ln of the odds of a turn of the sensor against a fault of one sensor, at least.
+const CONFIRMS: f64 = 8.0;
+/// So many blocks before and behind a stretch are looked at with it, and no more than so many in all.
+const ABOUT: usize = 10;
+const LONGEST: usize = 400;
 
 /// Stretches that a fit of the baseline shows.
 ///
@@ -99,17 +93,15 @@ impl Residuals<'_, '_> {
         own.zip(usual).is_some_and(|(own, usual)| own > times * usual.max(1.0))
     }
 
-    /// The gyroscope shows a turn, and the magnetometer can confirm it.
-    fn sees_turns(&self) -> bool {
-        [SensorKind::Gyr, SensorKind::Mag].iter().all(|kind| self.scene.kinds.contains(kind))
-    }
-
-    /// Blocks in a row in which the gyroscope is beyond the usual; two sensors, where no magnetometer confirms it.
+    /// Blocks in a row in which the gyroscope or the magnetometer is beyond the usual; two sensors, where one of them is
+    /// missing.
     fn runs(&self) -> Vec<Range<usize>> {
-        let kinds = || self.scene.kinds.iter();
-        let beyond = |block: &usize| match self.sees_turns() {
-            true => self.is_beyond(SensorKind::Gyr, *block, BEYOND),
-            false => kinds().filter(|kind| self.is_beyond(**kind, *block, BEYOND)).count() > 1,
+        let turns = [SensorKind::Gyr, SensorKind::Mag];
+        let sees_turns = turns.iter().all(|kind| self.scene.kinds.contains(kind));
+        let asked = if sees_turns { &turns[..] } else { &self.scene.kinds };
+        let least = if sees_turns { 1 } else { 2 };
+        let beyond = |block: &usize| {
+            asked.iter().filter(|kind| self.is_beyond(**kind, *block, BEYOND)).count() >= least
         };
         let blocks: Vec<usize> = (0..self.scene.blocks.len()).into_par_iter().filter(beyond).collect();
         let near = |a: &usize, b: &usize| self.time(*b) - self.time(*a) < BETWEEN;
@@ -139,46 +131,31 @@ impl Residuals<'_, '_> {
         first..last + 1
     }
 
-    /// Whether the turn of the gyroscope's residual takes away a part of the magnetometer's; true where one of them is missing.
+    /// Whether a turn of the sensor is likelier than a fault of one sensor; true where gyroscope or magnetometer is missing.
     fn confirm(&self, run: &Range<usize>) -> bool {
         let [_, Some(gyr), Some(mag)] = &self.fit.residual else { return true };
-        let about = run.start.saturating_sub(SIDE)..(run.end + SIDE).min(self.scene.blocks.len());
-        let blocks: Vec<usize> = about.collect();
-        let pieces = blocks.len().div_ceil(INTEGRATED).max(1);
-        let taken = |piece: &[usize]| self.taken_away(gyr, mag, piece).unwrap_or(0.0);
-        blocks.chunks(blocks.len().div_ceil(pieces)).map(taken).sum::<f64>() > CONFIRMS
+        let about = run.start.saturating_sub(ABOUT)..(run.end + ABOUT).min(self.scene.blocks.len());
+        let seen: Vec<Seen> = about.take(LONGEST).map(|at| self.seen(at, &gyr[at], &mag[at])).collect();
+        turn_likelihood::log_odds(&seen) > CONFIRMS
     }
 
-    /// Whitened square of the magnetometer's residual over some blocks that the gyroscope's turn takes away, an offset and
-    /// a slope being fitted with it and without.
-    fn taken_away(&self, gyr: &[Vector3<f64>], mag: &[Vector3<f64>], blocks: &[usize]) -> Option<f64> {
-        let mut turn = Vector3::<f64>::zeros();
-        let mut last = self.time(*blocks.first()?);
-        let middle = 0.5 * (last + self.time(*blocks.last()?));
-        let sigma = &self.noise.sensors[SensorKind::Mag as usize];
-        let mut design = DMatrix::zeros(3 * blocks.len(), 6);
-        let (mut without, mut with) =
-            (DMatrix::zeros(3 * blocks.len(), 1), DMatrix::zeros(3 * blocks.len(), 1));
-        for (row, at) in blocks.iter().enumerate() {
-            let (time, truth) = (self.time(*at), &self.truth[*at]);
-            turn += (gyr[*at] - truth.w_it_t.cross(&turn)) * (time - last);
-            last = time;
-            let usual = self.usual[*at][SensorKind::Mag as usize].unwrap_or(1.0).max(1.0);
-            let weight = (self.scene.worth(SensorKind::Mag, *at) / usual).sqrt();
-            let shown = truth.b_t.cross(&turn);
-            let white = if self.scene.blocks[*at].rest.is_some() { sigma.white } else { sigma.moving };
-            for axis in 0..3 {
-                let weight = weight / white[axis];
-                design[(3 * row + axis, axis)] = weight;
-                design[(3 * row + axis, 3 + axis)] = weight * (time - middle);
-                without[3 * row + axis] = weight * mag[*at][axis];
-                with[3 * row + axis] = weight * (mag[*at][axis] - shown[axis]);
-            }
+    fn seen(&self, at: usize, gyr: &Vector3<f64>, mag: &Vector3<f64>) -> Seen {
+        let variance = |kind: SensorKind| {
+            let sensor = &self.noise.sensors[kind as usize];
+            let white = if self.scene.blocks[at].rest.is_some() { sensor.white } else { sensor.moving };
+            let usual = self.usual[at][kind as usize].unwrap_or(1.0).max(1.0);
+            let worth = self.scene.worth(kind, at);
+            let square = white.iter().map(|sigma| sigma * sigma).sum::<f64>() / 3.0;
+            if worth > 0.0 { usual * square / worth } else { f64::INFINITY }
+        };
+        Seen {
+            time: self.time(at),
+            rate: *gyr,
+            field: *mag,
+            variances: [variance(SensorKind::Gyr), variance(SensorKind::Mag)],
+            w: self.truth[at].w_it_t,
+            b: self.truth[at].b_t,
         }
-        let factor = (design.tr_mul(&design) + DMatrix::identity(6, 6) * 1e-9).cholesky()?;
-        let left =
-            |values: &DMatrix<f64>| (values - &design * factor.solve(&design.tr_mul(values))).norm_squared();
-        Some(left(&without) - left(&with))
     }
 
     fn stretch(&self, blocks: Range<usize>) -> Stretch {
