@@ -158,6 +158,8 @@ pub struct LocationSettings {
 pub struct VerdictSettings {
     /// Held-out blocks must confirm a cause, and its amplitude: evidence alone is overconfident where the source trembles.
     pub confirms_held_out: bool,
+    /// A confirmed cause is large enough to matter: where the source trembles, a small one may be a part of that.
+    pub only_material: bool,
     /// A cause explains more than what the residual of its sensors still follows: where the source has errors that the
     /// catalogue does not hold, a smaller effect may stand for a part of them.
     pub outweighs_remainder: bool,
@@ -279,6 +281,7 @@ impl Default for VerdictSettings {
     fn default() -> Self {
         Self {
             confirms_held_out: false,
+            only_material: false,
             outweighs_remainder: false,
             least_of_all: 0.0,
             room: 0.0,

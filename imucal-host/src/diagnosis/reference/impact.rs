@@ -80,6 +80,10 @@ pub fn impacts(recording: &Recording, stream: &Stream, clock: StreamClock) -> Im
             let given = Unforeseen::of(&rows, values);
             of_sensor.extend(given.impacts(SEEN * own.usual()));
             if kind == SensorKind::Acc {
+                // A short pulse looks smaller to the finer clock: both are seen by the slower one.
+                let slower = own.interval.max(given.interval);
+                let [own, given] = [(&recording.time, &real.values), (&rows, values)]
+                    .map(|(time, values)| Unforeseen::at_interval(time, values, slower));
                 unmatched = Strikes::of(&own, &given, &of_sensor).unmatched();
             }
         }
@@ -212,6 +216,14 @@ impl Unforeseen {
             (even && size.is_finite()).then_some((t[2], size))
         };
         Self { samples: time.windows(5).zip(values.windows(5)).filter_map(of).collect(), interval }
+    }
+
+    /// Of one in so many samples that these are about so far apart, s.
+    fn at_interval(time: &[f64], values: &[Vector3<f64>], apart: f64) -> Self {
+        let stride = (apart / interval(time).max(f64::MIN_POSITIVE)).round().max(1.0) as usize;
+        let times: Vec<f64> = time.iter().step_by(stride).copied().collect();
+        let values: Vec<Vector3<f64>> = values.iter().step_by(stride).copied().collect();
+        Self::of(&times, &values)
     }
 
     fn within(&self, span: &Range<f64>) -> Within {

@@ -78,6 +78,7 @@ impl Settings {
             search: SearchSettings { most: 5, staged_start: true, settling: 2, ..rig.search },
             verdict: VerdictSettings {
                 confirms_held_out: true,
+                only_material: true,
                 outweighs_remainder: true,
                 carried: 10.0,
                 least_of_all: 0.01,

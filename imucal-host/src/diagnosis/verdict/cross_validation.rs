@@ -30,8 +30,8 @@ pub fn leave_out(
         let shares = shares::closed_of_own(linear, &kept, noise)?;
         let fails = |at: &usize| {
             let (share, cause) = (&shares[*at], &causes[*at]);
-            let matters =
-                cause.material && estimates::is_sized(kept[*at], &cause.parameters, by.amplitude_errors);
+            let matters = (cause.material || !by.only_material)
+                && estimates::is_sized(kept[*at], &cause.parameters, by.amplitude_errors);
             !matters || !is_borne(share, by)
         };
         let failing = (0..kept.len()).filter(fails);

@@ -10,7 +10,7 @@ use crate::{
         residual::base_run::Reference,
         search::stepwise::Solution,
     },
-    effect::{Effect, Role},
+    effect::{Effect, Parameter, Role},
     simulator::Dose,
 };
 
@@ -89,8 +89,14 @@ pub fn is_material(effect: &Effect, amounts: &[Amount]) -> bool {
     })
 }
 
-/// At least one amplitude is further from zero than so many of its standard errors.
+/// At least one amplitude is further from zero than so many of its standard errors; true where the effect is a product of
+/// amplitudes and a shape of either sign, such as a gradient and an arm, since the data know neither factor alone.
 pub fn is_sized(effect: &Effect, amounts: &[Amount], errors: f64) -> bool {
+    let is_factor =
+        |parameter: &Parameter| matches!(parameter.role, Role::Shape { .. }) && parameter.range.0 < 0.0;
+    if effect.parameters.iter().any(is_factor) {
+        return true;
+    }
     effect.parameters.iter().zip(amounts).any(|(parameter, amount)| {
         let far = |value: f64| amount.std_error.is_none_or(|error| value.abs() >= errors * error);
         parameter.role == Role::Amplitude && amount.value.is_some_and(far)
