@@ -82,7 +82,7 @@ pub fn impacts(recording: &Recording, stream: &Stream, clock: StreamClock) -> Im
             if kind == SensorKind::Acc {
                 // A short pulse looks smaller to the finer clock: both are seen by the slower one.
                 let slower = own.interval.max(given.interval);
-                let [own, given] = [(&recording.time, &real.values), (&rows, values)]
+                let [own, given] = [(&recording.time[..], &real.values[..]), (&rows[..], values)]
                     .map(|(time, values)| Unforeseen::at_interval(time, values, slower));
                 unmatched = Strikes::of(&own, &given, &of_sensor).unmatched();
             }
