@@ -134,7 +134,7 @@ impl Settings {
                 fits_details: true,
                 ..rig.search
             },
-            verdict: VerdictSettings { confirms_held_out: true, ..rig.verdict },
+            verdict: VerdictSettings { confirms_held_out: true, amplitude_errors: 0.0, ..rig.verdict },
             location: rig.location,
         }
     }

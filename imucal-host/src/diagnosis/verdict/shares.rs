@@ -80,42 +80,58 @@ pub fn closed(
     noise: &Noise,
     remainder: f64,
 ) -> Result<Closed, DiagnosisError> {
-    closed_in(linear, &linear.design, set, noise, remainder)
+    let folds = folds(linear, &linear.design, set, noise);
+    closed_in(linear, Folds { fitted: &folds, judged: &folds }, set, noise, remainder)
 }
 
 /// Share that each effect closes of what its own sensors show: compared with a quiet sensor's gap that of another looks small.
+/// All sensors are fitted, since a clock that they share is not known from one of them.
 pub fn closed_of_own(
     linear: &Linearisation<'_>,
     set: &[&'static Effect],
     noise: &Noise,
 ) -> Result<Vec<Share>, DiagnosisError> {
+    let all = folds(linear, &linear.design, set, noise);
     let of = |(k, effect): (usize, &&'static Effect)| {
         let mut design = linear.design.clone();
         design.channels.retain(|channel| linear.scene.reach(effect).contains(&channel.kind));
-        Ok(closed_in(linear, &design, set, noise, 0.0)?.each[k])
+        let own = folds(linear, &design, set, noise);
+        Ok(closed_in(linear, Folds { fitted: &all, judged: &own }, set, noise, 0.0)?.each[k])
     };
     set.iter().enumerate().map(of).collect()
 }
 
+/// Normal equations of each fold: those that are fitted, and those of the channels on which the fit is judged.
+#[derive(Clone, Copy)]
+struct Folds<'f> {
+    fitted: &'f [Normal],
+    judged: &'f [Normal],
+}
+
+/// Normal equations of the baseline and a set on the channels of a design, fold by fold.
+fn folds(linear: &Linearisation<'_>, design: &Design, set: &[&'static Effect], noise: &Noise) -> Vec<Normal> {
+    let fitted = linear.fitted(set);
+    let of = |fold: usize| {
+        let time =
+            |block: usize| linear.scene.blocks[block].time / linear.scene.settings.verdict.fold_stretch;
+        // A row that holds no samples is a convention, and belongs to every fold.
+        let empty = |block: usize| linear.scene.blocks[block].rows.is_empty();
+        let inside = |block: usize| empty(block) || time(block) as usize % FOLDS == fold;
+        let precisions = linear.weighing.precisions_within(design, noise, &inside);
+        design.normal(&precisions, &fitted)
+    };
+    (0..FOLDS).map(of).collect()
+}
+
 fn closed_in(
     linear: &Linearisation<'_>,
-    design: &Design,
+    folds: Folds<'_>,
     set: &[&'static Effect],
     noise: &Noise,
     remainder: f64,
 ) -> Result<Closed, DiagnosisError> {
     let by = &linear.scene.settings.verdict;
     let fitted = linear.fitted(set);
-    let folds: Vec<Normal> = (0..FOLDS)
-        .map(|fold| {
-            let time = |block: usize| linear.scene.blocks[block].time / by.fold_stretch;
-            // A row that holds no samples is a convention, and belongs to every fold.
-            let empty = |block: usize| linear.scene.blocks[block].rows.is_empty();
-            let inside = |block: usize| empty(block) || time(block) as usize % FOLDS == fold;
-            let precisions = linear.weighing.precisions_within(design, noise, &inside);
-            design.normal(&precisions, &fitted)
-        })
-        .collect();
     let baseline = linear.baseline.len();
     let without = |left_out: Option<usize>| -> Vec<usize> {
         (0..fitted.len())
@@ -125,8 +141,8 @@ fn closed_in(
             })
             .collect()
     };
-    let before = held_out(&folds, &(0..baseline).collect::<Vec<_>>(), baseline)?;
-    let after = held_out(&folds, &without(None), baseline)?;
+    let before = held_out(folds, &(0..baseline).collect::<Vec<_>>(), baseline)?;
+    let after = held_out(folds, &without(None), baseline)?;
     let gain = |after: &[Fold]| -> Vec<f64> {
         before.iter().zip(after).map(|(before, after)| before.energy - after.energy).collect()
     };
@@ -150,7 +166,7 @@ fn closed_in(
     let total = share(&closed);
     let mut each = Vec::new();
     for k in 0..set.len() {
-        let rest = held_out(&folds, &without(Some(k)), baseline)?;
+        let rest = held_out(folds, &without(Some(k)), baseline)?;
         let gains: Vec<f64> =
             rest.iter().zip(&after).map(|(rest, after)| rest.energy - after.energy).collect();
         each.push(share(&gains));
@@ -182,20 +198,21 @@ struct Fold {
 }
 
 /// Each fold's residual after a fit of columns to the others; the first `baseline` columns are the baseline's.
-fn held_out(folds: &[Normal], places: &[usize], baseline: usize) -> Result<Vec<Fold>, DiagnosisError> {
+fn held_out(folds: Folds<'_>, places: &[usize], baseline: usize) -> Result<Vec<Fold>, DiagnosisError> {
     let part = |normal: &Normal| {
         let n = places.len();
         let g = DMatrix::from_fn(n, n, |i, j| normal.information[(places[i], places[j])]);
         (g, DVector::from_fn(n, |i, _| normal.score[places[i]]))
     };
-    let parts: Vec<(DMatrix<f64>, DVector<f64>)> = folds.iter().map(part).collect();
+    let parts: Vec<(DMatrix<f64>, DVector<f64>)> = folds.fitted.iter().map(part).collect();
     let n = places.len();
     let precision = |place: &usize| if *place < baseline { LOOSE.powi(-2) } else { LARGE.powi(-2) };
     let loose = DMatrix::from_diagonal(&DVector::from_iterator(n, places.iter().map(precision)));
     folds
+        .judged
         .iter()
         .enumerate()
-        .map(|(fold, normal)| {
+        .map(|(fold, judged)| {
             let mut information = loose.clone();
             let mut score = DVector::zeros(n);
             for (_, (g, z)) in parts.iter().enumerate().filter(|(other, _)| *other != fold) {
@@ -205,10 +222,10 @@ fn held_out(folds: &[Normal], places: &[usize], baseline: usize) -> Result<Vec<F
             let factor =
                 information.cholesky().ok_or(DiagnosisError::CrossValidation { fold, columns: n })?;
             let fitted = factor.solve(&score);
-            let (g, z) = &parts[fold];
+            let (g, z) = part(judged);
             Ok(Fold {
-                energy: normal.energy - 2.0 * fitted.dot(z) + fitted.dot(&(g * &fitted)),
-                cost: factor.solve(g).trace(),
+                energy: judged.energy - 2.0 * fitted.dot(&z) + fitted.dot(&(&g * &fitted)),
+                cost: factor.solve(&g).trace(),
             })
         })
         .collect()
