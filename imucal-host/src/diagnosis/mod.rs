@@ -23,7 +23,10 @@ use self::{
     },
     residual::forward_model::ForwardModel,
     screening::preparation::Preparation,
-    search::{motion_mismatch, stepwise},
+    search::{
+        motion_mismatch::{self, LeftOut},
+        stepwise,
+    },
     settings::{Settings, Source},
     verdict::answer::{answer, untestable},
 };
@@ -84,7 +87,8 @@ pub fn try_diagnose(
         field_known: recording.manifest.site.field_ned_ut.is_some() || stream.is_some(),
     };
     let mut candidates = Candidates::new(&setting, &options.without, &options.effects);
-    let (scene, stretches) = motion_mismatch::left_out(scene, &candidates)?;
+    let LeftOut { scene, stretches, jolts } = motion_mismatch::left_out(scene, &candidates)?;
+    preparation.remarks.extend(motion_mismatch::remark(jolts));
     preparation.findings.extend(motion_mismatch::finding(stretches, &preparation.unmatched));
     formulas::sift(&scene, &mut candidates)?;
     let explain = |candidates: &Candidates| {

@@ -10,7 +10,7 @@
 //! | --- | --- |
 //! | s | means over some 20 ms of what the effect changes in a recording without noise, all sensors |
 //! | A | outputs of the triad and a constant for each axis; the clock's offset and rate for all sensors at once |
-//! | D | white noise, rounding and vibration of a mean, which grows with the robot's effort |
+//! | D | white noise, rounding and vibration of a mean, which grows with the robot's effort, and the square of what a mean of the simulator's stream is off between its samples |
 //! | C, Z | covariance of the drift at knots some seconds apart, and straight lines between them |
 //!
 //! Written apart from the diagnosis. Left out: lost rows, and that a ring of the vibration is not white.
@@ -19,9 +19,9 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
 use crate::{
     blind::lambda::{Signal, difference},
-    recording::SensorKind,
+    recording::{SensorKind, Stream},
     simulator::{
-        Dose, OutputError, SimulationError,
+        Dose, Motion, OutputError, SimulationError, StreamClock, Streamed,
         robot::{RobotScene, mismatch::MismatchKind},
         unit::Drift,
     },
@@ -269,19 +269,43 @@ fn metrics(scene: &RobotScene, blocks: usize) -> Result<[Metric; 3], SimulationE
     let length = rows / scene.real_rate;
     let effort = |block: usize| motion.trajectory.effort(scene.shown((block as f64 + 0.5) * length));
     let efforts: Vec<f64> = (0..blocks).map(effort).collect();
+    let unresolved = unresolved(scene, blocks)?;
     let of = |kind: SensorKind| {
         let triad = unit.triad(kind);
         let step = 1.0 / triad.counts.per_unit;
         let still = triad.noise * triad.noise + step * step / 12.0;
-        let variance = |effort: &f64| {
+        let variance = |(effort, unresolved): (&f64, &f64)| {
             let shaken = shaking.size[kind as usize] * effort;
-            (still + shaken * shaken) / rows
+            (still + shaken * shaken) / rows + unresolved
         };
-        let variances: Vec<f64> = efforts.iter().map(variance).collect();
+        let variances: Vec<f64> = efforts.iter().zip(&unresolved[kind as usize]).map(variance).collect();
         Metric::new(&variances, &triad.drift, blocks as f64 * length)
             .ok_or(SimulationError::Output(OutputError::Singular { sensor: kind }))
     };
     Ok([of(SensorKind::Acc)?, of(SensorKind::Gyr)?, of(SensorKind::Mag)?])
+}
+
+/// Mean square over the axes of what a block's mean of the stream, read between its samples, is off, by sensor: what no one
+/// can know who has the stream alone.
+fn unresolved(scene: &RobotScene, blocks: usize) -> Result<[Vec<f64>; 3], SimulationError> {
+    let (motion, rows) = (scene.planned()?, rows(scene));
+    let time: Vec<f64> = (0..blocks * rows).map(|row| row as f64 / scene.real_rate).collect();
+    let clock = StreamClock { offset: scene.clock_offset, error: scene.clock_rate_error };
+    let stream = Stream::of(&scene.simulated("")?);
+    let streamed =
+        stream.and_then(|stream| Streamed::new(&stream, clock, &time, vec![0.0; time.len()], scene.place));
+    let Some(streamed) = streamed else { return Ok(std::array::from_fn(|_| vec![0.0; blocks])) };
+    let off = |time: &f64| {
+        let [read, true_] = [streamed.truth(*time, &|_| ()), motion.truth(scene.shown(*time), &|_| ())];
+        [read.f_t - true_.f_t, read.w_it_t - true_.w_it_t, read.b_t - true_.b_t]
+    };
+    let of_block = |times: &[f64]| {
+        let sum =
+            times.iter().map(off).fold([Vector3::zeros(); 3], |sum, off| [0, 1, 2].map(|k| sum[k] + off[k]));
+        sum.map(|sum| sum.norm_squared() / (3 * rows * rows) as f64)
+    };
+    let squares: Vec<[f64; 3]> = time.chunks_exact(rows).map(of_block).collect();
+    Ok([0, 1, 2].map(|kind| squares.iter().map(|square| square[kind]).collect()))
 }
 
 #[cfg(test)]

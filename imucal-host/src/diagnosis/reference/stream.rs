@@ -63,6 +63,7 @@ pub fn movement(
     }
     let mut remarks = Vec::new();
     remarks.extend(noise(recording, stream));
+    remarks.extend(unresolved(&resolved));
     for kind in SensorKind::ALL {
         if recording.sensor(kind).is_some() && !movement.gives(kind) {
             remarks.push(format!("the {kind} is left out: the simulator gives no stream of it"));
@@ -90,6 +91,18 @@ fn weightless(movement: &Streamed, recording: &Recording, gravity: f64) -> Optio
 /// Noise of a sample along a smooth movement, the largest of the axes'.
 fn noise_of(values: &[Vector3<f64>]) -> f64 {
     (0..3).map(|axis| reading_noise(values.iter().map(|value| value[axis]))).fold(0.0, f64::max)
+}
+
+/// Rows near impacts are not compared.
+fn unresolved(resolved: &[bool]) -> Option<String> {
+    let left_out = resolved.iter().filter(|resolved| !**resolved).count();
+    (left_out > 0).then(|| {
+        format!(
+            "{:.1} % of the rows are left out, near impacts that the samples of the stream do not resolve: a stream at a higher \
+             rate would show them",
+            100.0 * left_out as f64 / resolved.len() as f64
+        )
+    })
 }
 
 /// A stream with noise of its own hides the gap.

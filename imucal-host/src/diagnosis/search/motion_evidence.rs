@@ -5,6 +5,8 @@
 //! them is missing, two sensors must be beyond the usual at once. A stretch goes on as long as any sensor shows it. A fault
 //! of one sensor is seen by no other, and what depends on the movement is there whenever it is as brisk.
 //!
+//! A single block that stands alone is a jolt between two samples of the stream, which nothing is said of.
+//!
 //! Not recognised: another movement that only the accelerometer shows, and one that goes on for more than half of the
 //! recording.
 
@@ -45,18 +47,23 @@ const MARGIN: f64 = 0.5;
 const FEWEST: usize = 3;
 /// A movement that is another one for more than this share of the recording has no usual.
 const MOST: f64 = 0.5;
+/// What remains of a stretch is no further from it than this, s.
+const REMAINS: f64 = 3.0;
+/// A block is a jolt from so many times the usual on, where so many blocks before and behind it are not beyond it.
+const JOLTS: f64 = 12.0;
+const APART_JOLTS: usize = 5;
 /// ln of the odds of a turn of the sensor against a fault of one sensor, at least.
 const CONFIRMS: f64 = 8.0;
 /// So many blocks before and behind a stretch are looked at with it, and no more than so many in all.
 const ABOUT: usize = 10;
 const LONGEST: usize = 400;
 
-/// Stretches that a fit of the baseline shows.
+/// What a fit of the baseline shows, besides stretches that were found `before`, s.
 ///
 /// # Errors
 ///
 /// [`DiagnosisError`], when the simulator fails.
-pub fn stretches(scene: &ForwardModel<'_>, fit: &Fit) -> Result<Vec<Stretch>, DiagnosisError> {
+pub fn found(scene: &ForwardModel<'_>, fit: &Fit, before: &[Range<f64>]) -> Result<Found, DiagnosisError> {
     let reference = Reference::new(scene, fit.doses.clone(), &scene.coarse)?;
     let weighing = Weighing::new(scene, SensorKind::ALL.map(|kind| reference.output(kind)));
     let noise = weighing.white(&fit.residual);
@@ -66,10 +73,23 @@ pub fn stretches(scene: &ForwardModel<'_>, fit: &Fit) -> Result<Vec<Stretch>, Di
     let residuals =
         Residuals { scene, fit, truth: &truth, noise: &noise, energies: &energies, usual: &usual };
     let runs = residuals.runs();
-    let confirmed = runs.into_par_iter().filter(|run| residuals.confirm(run));
-    let found: Vec<Stretch> = confirmed.map(|run| residuals.stretch(residuals.whole(run))).collect();
-    let lasting: f64 = found.iter().map(|stretch| stretch.time.end - stretch.time.start).sum();
-    Ok(if lasting > MOST * scene.duration() { Vec::new() } else { found })
+    let asserted = |run: &Range<usize>| residuals.goes_on(run, before) || residuals.confirm(run);
+    let asserted = runs.into_par_iter().filter(asserted);
+    let mut stretches: Vec<Stretch> = asserted.map(|run| residuals.stretch(residuals.whole(run))).collect();
+    let lasting: f64 = stretches.iter().map(|stretch| stretch.time.end - stretch.time.start).sum();
+    if lasting > MOST * scene.duration() {
+        stretches.clear();
+    }
+    Ok(Found { stretches, jolts: residuals.jolts() })
+}
+
+/// What a fit of the baseline shows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Found {
+    /// Stretches in which the machine moved otherwise.
+    pub stretches: Vec<Stretch>,
+    /// Moments in which one sensor's residual stands alone, s.
+    pub jolts: Vec<Range<f64>>,
 }
 
 /// What a fit of the baseline leaves, block by block, and what is usual where the movement is as brisk.
@@ -91,6 +111,34 @@ impl Residuals<'_, '_> {
     fn is_beyond(&self, kind: SensorKind, block: usize, times: f64) -> bool {
         let (own, usual) = (smoothed(&self.energies[kind as usize], block), self.usual[block][kind as usize]);
         own.zip(usual).is_some_and(|(own, usual)| own > times * usual.max(1.0))
+    }
+
+    /// It is what is left of a stretch that was found before.
+    fn goes_on(&self, run: &Range<usize>, before: &[Range<f64>]) -> bool {
+        let (from, to) = (self.time(run.start), self.time(run.end - 1));
+        before.iter().any(|found| from < found.end + REMAINS && to > found.start - REMAINS)
+    }
+
+    /// Blocks whose residual is far beyond the usual, none about them being so: what lies between two samples of the stream.
+    fn jolts(&self) -> Vec<Range<f64>> {
+        let is_jolt = |block: &usize| {
+            let stands_alone = |kind: &SensorKind| {
+                let own = self.energies[*kind as usize][*block];
+                let usual = self.usual[*block][*kind as usize].unwrap_or(1.0).max(1.0);
+                let neighbours = [block.checked_sub(APART_JOLTS), block.checked_add(APART_JOLTS)];
+                let quiet =
+                    |at: &usize| *at >= self.scene.blocks.len() || !self.is_beyond(*kind, *at, BEYOND);
+                own.is_some_and(|own| own > JOLTS * usual) && neighbours.iter().flatten().all(quiet)
+            };
+            self.scene.kinds.iter().any(stands_alone)
+        };
+        let jolts = (0..self.scene.blocks.len()).filter(is_jolt);
+        let rows = |block: usize| {
+            let rows = self.scene.blocks[block].rows.clone();
+            let time = &self.scene.recording.time;
+            Some(*time.get(rows.start)?..*time.get(rows.end.checked_sub(1)?)?)
+        };
+        jolts.filter_map(rows).collect()
     }
 
     /// Blocks in a row in which the gyroscope or the magnetometer is beyond the usual; two sensors, where one of them is

@@ -6,7 +6,10 @@
 
 use std::ops::Range;
 
-use super::{motion_evidence, refit::refit};
+use super::{
+    motion_evidence::{self, Found},
+    refit::refit,
+};
 use crate::{
     diagnosis::{
         error::DiagnosisError,
@@ -38,7 +41,17 @@ pub struct Stretch {
     pub energy: [f64; 3],
 }
 
-/// The scene without such stretches and with the noise that vibration makes, and the stretches.
+/// A scene without what its source does not know of the movement.
+pub struct LeftOut<'a> {
+    /// The scene, with the noise that vibration makes.
+    pub scene: ForwardModel<'a>,
+    /// Stretches in which the machine moved otherwise.
+    pub stretches: Vec<Stretch>,
+    /// Moments in which one sensor's residual stood alone.
+    pub jolts: usize,
+}
+
+/// The scene without such stretches and moments.
 ///
 /// # Errors
 ///
@@ -46,29 +59,47 @@ pub struct Stretch {
 pub fn left_out<'a>(
     mut scene: ForwardModel<'a>,
     candidates: &Candidates,
-) -> Result<(ForwardModel<'a>, Vec<Stretch>), DiagnosisError> {
+) -> Result<LeftOut<'a>, DiagnosisError> {
     let by = &scene.settings.residual;
     if !by.weighs_vibration && !by.leaves_out_mismatch {
-        return Ok((scene, Vec::new()));
+        return Ok(LeftOut { scene, stretches: Vec::new(), jolts: 0 });
     }
     let baseline = candidates.baseline.iter();
     let mut doses: Vec<Dose> =
         baseline.map(|effect| Dose { effect, values: vec![0.0; effect.parameters.len()] }).collect();
-    let mut found: Vec<Stretch> = Vec::new();
+    let (mut stretches, mut jolts): (Vec<Stretch>, usize) = (Vec::new(), 0);
     for _ in 0..ROUNDS {
         let fit = refit(&scene, doses, None)?;
         if by.weighs_vibration {
             scene.vibration = vibration::ratios(&scene, &fit.doses)?;
         }
-        let new = if by.leaves_out_mismatch { motion_evidence::stretches(&scene, &fit)? } else { Vec::new() };
+        let before: Vec<Range<f64>> = stretches.iter().map(|stretch| stretch.time.clone()).collect();
+        let new = match by.leaves_out_mismatch {
+            true => motion_evidence::found(&scene, &fit, &before)?,
+            false => Found::default(),
+        };
         doses = fit.doses;
-        if new.is_empty() {
+        if new == Found::default() {
             break;
         }
-        scene.leave_out(&new.iter().map(|stretch| stretch.time.clone()).collect::<Vec<_>>());
-        found.extend(new);
+        let times = new.stretches.iter().map(|stretch| stretch.time.clone());
+        scene.leave_out(&times.chain(new.jolts.iter().cloned()).collect::<Vec<_>>());
+        jolts += new.jolts.len();
+        stretches.extend(new.stretches);
     }
-    Ok((scene, merged(found)))
+    Ok(LeftOut { scene, stretches: merged(stretches), jolts })
+}
+
+/// What is said of moments that were left out; `None` without one.
+pub fn remark(jolts: usize) -> Option<String> {
+    (jolts > 0).then(|| {
+        format!(
+            "{jolts} {} in which a sensor is far from the simulator for less than half a second {} left out: a jolt that the \
+             simulator lacks, or one between two samples of its stream",
+            if jolts == 1 { "moment" } else { "moments" },
+            if jolts == 1 { "is" } else { "are" },
+        )
+    })
 }
 
 /// Stretches in their order, those that touch as one.

@@ -56,6 +56,8 @@ impl Share {
         let mean = left.iter().sum::<f64>() / n;
         let variance = (n - 1.0) / n * left.iter().map(|l| (l - mean).powi(2)).sum::<f64>();
         let wide = 1.96 * (variance + further).sqrt();
+        // Where all that is explainable lies in one fold, the others say nothing.
+        let wide = if wide.is_finite() { wide } else { 1.0 };
         let bound = |x: f64| x.clamp(0.0, 1.0);
         let least = bound(value - wide) * whole / (whole + unseen);
         Self { value: bound(value), interval: [least, bound(value + wide)] }
