@@ -165,13 +165,16 @@ pub struct VerdictSettings {
     pub outweighs_remainder: bool,
     /// A cause closes at least this share of the whole gap.
     pub least_of_all: f64,
-    /// The field of a room changes by so much from place to place, µT: a smaller cause of the magnetometer alone is not asserted. Zero
-    /// where a rig keeps it in its place, or the source gives the field.
-    pub room: f64,
+    /// What the source is off by, by sensor, m/s², rad/s and µT: a smaller cause of one sensor alone is not asserted. Zero where
+    /// a rig or a simulator is exact. The field of a room changes by as much from place to place.
+    pub reference_errors: [f64; 3],
     /// Share of its own sensors' gap that a confirmed cause closes at least.
     pub least_share: f64,
     /// Standard errors from zero of a confirmed cause's largest amplitude.
     pub amplitude_errors: f64,
+    /// Standard errors are those of a jackknife over parts of the recording where these are larger: the source has errors that
+    /// the model of the noise does not hold.
+    pub errors_from_parts: bool,
     /// Standard errors from zero of a reference's clock offset that is named.
     pub clock_errors: f64,
     /// An episode that begins and ends with the movement within this time is not asserted, s.
@@ -284,9 +287,10 @@ impl Default for VerdictSettings {
             only_material: false,
             outweighs_remainder: false,
             least_of_all: 0.0,
-            room: 0.0,
+            reference_errors: [0.0; 3],
             least_share: 0.05,
             amplitude_errors: 2.0,
+            errors_from_parts: false,
             clock_errors: 5.0,
             carried: 3.0,
             detectable: 25.0,

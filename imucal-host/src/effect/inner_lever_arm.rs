@@ -18,7 +18,7 @@ pub(super) fn effect() -> Effect {
     };
     let act = Act::Sensor(SensorKind::Acc, alter);
     Effect::new("acc.inner_lever_arm", act, Parameter::amplitudes(&NAMES, "m", 0.01), words)
-        .needing(Needs::POSITION)
+        .needing(Needs { exact_attitude: true, ..Needs::POSITION })
         .like("acc.lever_arm", "none for its common part; constant rates about all three axes for the rest")
 }
 

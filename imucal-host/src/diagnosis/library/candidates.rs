@@ -92,14 +92,18 @@ impl Setting<'_> {
             Some("no temperature was recorded")
         } else if other_calibration && !self.calibrated.contains(&SensorKind::Mag) {
             Some("a calibration of the same recording absorbs it; needs one of another recording (--model)")
+        } else if position && !provided.position {
+            Some(
+                "an attitude alone holds no linear acceleration, which an arm looks like; record the position (ref_p*)",
+            )
+        } else if exact_attitude && position && !provided.exact_attitude {
+            Some(
+                "a reference position is known to some millimetres: nothing distinguishes arms of single axes from its errors",
+            )
         } else if exact_attitude && !provided.exact_attitude {
             Some(
                 "a reference attitude has noise and a filter of its own: nothing distinguishes a sensor's low-pass from \
                  them",
-            )
-        } else if position && !provided.position {
-            Some(
-                "an attitude alone holds no linear acceleration, which an arm looks like; record the position (ref_p*)",
             )
         } else if gimbals && !provided.gimbals {
             Some("no gimbals turn the sensor")

@@ -43,8 +43,8 @@ const PAUSE: f64 = 3.0;
 /// ln of a ratio of sizes scatters by this at least.
 const LEAST_SCATTER: f64 = 0.3;
 /// One impact counts no more than so many standard deviations, and several in a row are unusual from so many on.
-const LARGEST: f64 = 4.0;
-const UNUSUAL: f64 = 7.5;
+const LARGEST: f64 = 3.0;
+const UNUSUAL: f64 = 5.5;
 
 /// The impacts of a recording and of the stream that it is compared with.
 #[derive(Clone, Debug, PartialEq)]

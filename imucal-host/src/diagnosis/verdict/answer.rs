@@ -7,7 +7,7 @@ use super::{
     decision::Evidence,
     detectability, estimates, experiment, fault, model_error,
     reference_clock::{self, Clock},
-    room_field,
+    reference_error,
     shares::{self, Closed},
 };
 use crate::{
@@ -94,10 +94,8 @@ impl Asserted {
         if explained.linear.scene.settings.verdict.outweighs_remainder {
             remarks.extend(outweighed(&mut causes, explained, tested));
         }
-        let room = explained.linear.scene.settings.verdict.room;
-        if room > 0.0 {
-            remarks.extend(room_field::leave_out(&mut causes, explained, room));
-        }
+        let errors = explained.linear.scene.settings.verdict.reference_errors;
+        remarks.extend(reference_error::leave_out(&mut causes, explained, errors));
         causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         let mut credible_set = credible_set(explained, tested)?;
         let refuted = !remarks.is_empty();
@@ -118,6 +116,17 @@ impl Asserted {
             format!("not asserted: {} is within the model's own standard errors", cause.effect)
         };
         self.remarks.extend(self.causes.extract_if(.., is_within).map(remark));
+    }
+
+    /// Takes out the causes that close less than a share of the gap once the clock's terms are a part of it.
+    fn take_out_smallest(&mut self, least: f64) {
+        let is_small = |cause: &mut Cause| cause.gap_closed.is_some_and(|share| share < least);
+        let credible_set = &mut self.credible_set;
+        let remark = |cause: Cause| {
+            credible_set.retain(|id| *id != cause.effect && !cause.equivalents.contains(id));
+            small(&cause.effect, cause.gap_closed.unwrap_or(0.0))
+        };
+        self.remarks.extend(self.causes.extract_if(.., is_small).map(remark));
     }
 
     /// Puts a cause before all others.
@@ -175,6 +184,7 @@ pub fn answer(
     let mut total = is_closed.then_some(closed.total);
     if let Some(clock) = &clock {
         share_with(clock, &mut asserted.causes);
+        asserted.take_out_smallest(settings.verdict.least_of_all);
         clock.causes.iter().rev().for_each(|cause| asserted.put_first(cause.clone()));
     }
     preparation.findings.iter().rev().for_each(|finding| asserted.put_first(fault::cause(finding)));
@@ -233,6 +243,10 @@ fn refuted(
     Ok(remarks)
 }
 
+fn small(effect: &str, share: f64) -> String {
+    format!("not asserted: {effect} closes {:.1} % of the gap", 100.0 * share)
+}
+
 /// Takes out the causes that explain less of a sensor than what its residual still follows, or next to nothing of the gap;
 /// remarks on them.
 fn outweighed(causes: &mut Vec<Cause>, explained: &Solution<'_>, tested: &Tested) -> Vec<String> {
@@ -241,7 +255,7 @@ fn outweighed(causes: &mut Vec<Cause>, explained: &Solution<'_>, tested: &Tested
         let at = explained.best.set.iter().position(|effect| effect.id == cause.effect)?;
         let share = tested.closed.each.get(at)?.value;
         if share < settings.verdict.least_of_all {
-            return Some(format!("not asserted: {} closes {:.1} % of the gap", cause.effect, 100.0 * share));
+            return Some(small(&cause.effect, share));
         }
         let own = share * tested.closed.explainable;
         let reach = explained.linear.scene.reach(explained.best.set[at]);

@@ -6,9 +6,12 @@ use crate::{
     diagnosis::{
         error::DiagnosisError,
         finding::Amount,
-        mixed_model::design::{Column, Signature},
+        mixed_model::{
+            design::{Column, Design, Normal, Signature},
+            noise::Noise,
+        },
         residual::base_run::Reference,
-        search::stepwise::Solution,
+        search::{linearisation::Linearisation, stepwise::Solution},
     },
     effect::{Effect, Parameter, Role},
     simulator::Dose,
@@ -16,6 +19,8 @@ use crate::{
 
 /// Prior standard deviation in usual sizes: so loose that it only keeps what the data do not show finite.
 const LOOSE: f64 = 1e3;
+/// Parts of a jackknife.
+const PARTS: usize = 8;
 /// An instant was looked for at least as closely as this, s, where no block determines it.
 const SCANNED: f64 = 5.0;
 
@@ -58,9 +63,14 @@ pub fn amounts_of(
     let information = normal.information + DMatrix::from_diagonal(&prior);
     let covariance =
         information.cholesky().ok_or(DiagnosisError::Estimates { columns: columns.len() })?.inverse();
+    let mut variances = covariance.diagonal();
+    if linear.scene.settings.verdict.errors_from_parts {
+        let of_parts = jackknife(linear, &design, &explained.best.noise, &prior);
+        variances = variances.zip_map(&of_parts, f64::max);
+    }
     let error = |effect: &Effect, parameter: usize| {
         let at = columns.iter().position(|c| c.is_of(effect) && c.parameter == parameter)?;
-        Some(covariance[(at, at)].sqrt() * effect.parameters[parameter].prior_scale)
+        Some(variances[at].sqrt() * effect.parameters[parameter].prior_scale)
     };
     Ok(asked
         .iter()
@@ -79,6 +89,38 @@ pub fn amounts_of(
             values.iter().enumerate().filter(|(at, _)| is_known(at)).map(amount).collect()
         })
         .collect())
+}
+
+/// Variances of all columns' amounts by a jackknife over parts of the recording, each left out in turn: they hold what the
+/// model of the noise does not, as the errors of a reference. Source: Efron and Stein, Ann. Stat. 9 (1981).
+fn jackknife(
+    linear: &Linearisation<'_>,
+    design: &Design,
+    noise: &Noise,
+    prior: &DVector<f64>,
+) -> DVector<f64> {
+    let every: Vec<usize> = (0..design.size).collect();
+    let duration = linear.scene.duration().max(f64::MIN_POSITIVE);
+    let part = |part: usize| {
+        let within = |block: usize| linear.scene.blocks[block].time / duration * PARTS as f64;
+        let inside = |block: usize| (within(block) as usize).min(PARTS - 1) == part;
+        design.normal(&linear.weighing.precisions_within(design, noise, &inside), &every)
+    };
+    let parts: Vec<Normal> = (0..PARTS).map(part).collect();
+    let without = |left_out: usize| {
+        let mut information = DMatrix::from_diagonal(prior);
+        let mut score = DVector::zeros(design.size);
+        for (_, part) in parts.iter().enumerate().filter(|(part, _)| *part != left_out) {
+            information += &part.information;
+            score += &part.score;
+        }
+        Some(information.cholesky()?.solve(&score))
+    };
+    let amounts: Vec<DVector<f64>> = (0..PARTS).filter_map(without).collect();
+    let n = amounts.len() as f64;
+    let mean = amounts.iter().fold(DVector::zeros(design.size), |sum, own| sum + own) / n.max(1.0);
+    let squares = amounts.iter().map(|own| (own - &mean).map(|off| off * off));
+    squares.fold(DVector::zeros(design.size), |sum, own| sum + own) * ((n - 1.0).max(0.0) / n.max(1.0))
 }
 
 /// An effect is large enough to matter: one of its amplitudes is.

@@ -13,10 +13,10 @@
 //! | [`confounded_episode`] | episodes that cover the whole movement are taken out |
 //! | [`model_error`] | causes within the standard errors of the given model are taken out |
 //! | [`reference_clock`] | the offset of a reference's clock, a term of the baseline, as a cause |
+//! | [`reference_error`] | causes that an error of the source could stand for are taken out |
 //! | [`fault`] | shares of faults of the recording itself |
 //! | [`detectability`] | what is absent, and from what size on it would have been detected |
 //! | [`experiment`] | what to record next to distinguish what is ambiguous |
-//! | [`room_field`] | causes that the field of a room could stand for are taken out, where no rig guides the sensor |
 //! | [`decision`] | the verdict, decided once from all of these |
 //! | [`answer`] | the diagnosis, put together once |
 //!
@@ -33,5 +33,5 @@ pub mod experiment;
 pub mod fault;
 pub mod model_error;
 pub mod reference_clock;
-pub mod room_field;
+pub mod reference_error;
 pub mod shares;
