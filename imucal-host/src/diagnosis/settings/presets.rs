@@ -1,8 +1,8 @@
 //! What differs between the sources of a movement.
 
 use super::{
-    LibrarySettings, LocationSettings, NoiseSettings, Provided, ResidualSettings, SearchSettings, Settings,
-    Source, VerdictSettings,
+    LibrarySettings, LocationSettings, NoiseSettings, ProposalSettings, Provided, ResidualSettings,
+    SearchSettings, Settings, Source, VerdictSettings,
 };
 use crate::recording::SensorKind;
 
@@ -40,6 +40,7 @@ impl Settings {
             search: SearchSettings::default(),
             location: LocationSettings::default(),
             verdict: VerdictSettings::default(),
+            proposal: ProposalSettings::default(),
         }
     }
 
@@ -85,6 +86,7 @@ impl Settings {
                 ..rig.verdict
             },
             location: rig.location,
+            proposal: rig.proposal,
         }
     }
 
@@ -135,6 +137,7 @@ impl Settings {
             },
             verdict: VerdictSettings { confirms_held_out: true, ..rig.verdict },
             location: rig.location,
+            proposal: rig.proposal,
         }
     }
 
