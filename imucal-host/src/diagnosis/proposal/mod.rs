@@ -36,3 +36,6 @@ pub mod proposer;
 pub mod screening;
 pub mod term;
 pub mod trial;
+
+#[cfg(test)]
+mod tests;
