@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     case::{Drawn, Label},
+    proposal::Proposed,
     seal::digest,
 };
 use crate::{
@@ -51,6 +52,9 @@ pub struct Answer {
     pub gap_closed_ci95: Option<[f64; 2]>,
     /// Where the gap was said to lie: sensor and driver.
     pub places: Vec<String>,
+    /// Formulas that were proposed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub proposals: Vec<Proposed>,
 }
 
 impl Answer {
@@ -64,6 +68,7 @@ impl Answer {
                 gap_closed: None,
                 gap_closed_ci95: None,
                 places: Vec::new(),
+                proposals: Vec::new(),
             };
         };
         let finite = |value: f64| value.is_finite().then_some(value);
@@ -88,6 +93,7 @@ impl Answer {
                 .gap_closed_total_ci95
                 .filter(|interval| interval.iter().all(|bound| bound.is_finite())),
             places: diagnosis.places.iter().take(3).map(place).collect(),
+            proposals: Vec::new(),
         }
     }
 

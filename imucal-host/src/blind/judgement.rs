@@ -7,6 +7,8 @@ use super::{
     answer::{Answer, Asserted, Finished},
     case::{Label, Present},
     lambda::largest,
+    outside::is_spoken,
+    proposal::Proposed,
 };
 use crate::{diagnosis::Verdict, effect::class::class};
 
@@ -51,6 +53,12 @@ pub struct Judgement {
     pub flagged: bool,
     /// The verdict is another than that there is no gap.
     pub alarmed: bool,
+    /// What is there is from outside, and a formula says it.
+    pub spoken: bool,
+    /// A formula is proposed that is what is there, and none besides.
+    pub formula_right: bool,
+    /// A formula is proposed that is not there.
+    pub formula_wrong: bool,
     /// Share of the gap that is closed: said, its interval, true.
     pub closed: Option<Closed>,
     /// Time of the diagnosis, s.
@@ -104,6 +112,9 @@ impl Judgement {
                 .any(|cause| !there.iter().any(|id| stands_for_class(cause, id))),
             flagged: matches!(answer.verdict, Some(Verdict::Unknown | Verdict::Partly)),
             alarmed: answer.verdict != Some(Verdict::None),
+            spoken: truth == Truth::Outside && there.iter().all(|id| is_spoken(id)),
+            formula_right: !answer.proposals.is_empty() && answer.proposals.iter().all(Proposed::is_right),
+            formula_wrong: answer.proposals.iter().any(|proposed| !proposed.is_right()),
             closed,
             seconds: trial.seconds,
             label,
@@ -121,7 +132,7 @@ impl Judgement {
         match self.truth {
             Truth::Healthy => self.alarmed,
             Truth::Catalogue(_) => !self.classes_right || self.flagged,
-            Truth::Outside => !self.flagged,
+            Truth::Outside => !self.flagged || self.formula_wrong || (self.spoken && !self.formula_right),
         }
     }
 
@@ -147,11 +158,12 @@ impl Judgement {
         let verdict = self.answer.verdict.and_then(|verdict| serde_json::to_value(verdict).ok());
         let verdict = verdict.as_ref().and_then(|verdict| verdict.as_str()).unwrap_or("no answer").to_owned();
         format!(
-            "{}: {} | {}: {} | credible {} | where {} | {} {} {} {:.0} Hz {:.0} s",
+            "{}: {} | {}: {} | {}credible {} | where {} | {} {} {} {:.0} Hz {:.0} s",
             self.label.case,
             if there.is_empty() { "nothing".to_owned() } else { there.join(" + ") },
             verdict,
             if causes.is_empty() { "nothing".to_owned() } else { causes.join(" + ") },
+            formulas(&self.answer),
             self.answer.credible_set.join(", "),
             self.answer.places.join(", "),
             setting.unit,
@@ -161,6 +173,20 @@ impl Judgement {
             setting.duration,
         )
     }
+}
+
+/// The proposed formulas in words, as a part of a line; empty without one.
+pub(super) fn formulas(answer: &Answer) -> String {
+    let one = |proposed: &Proposed| {
+        let correlation = proposed.correlation.unwrap_or(f64::NAN);
+        let status = match proposed.confirmed {
+            Some(true) => "confirmed",
+            Some(false) => "refuted",
+            None => "not tested again",
+        };
+        format!("{} += {} ρ {correlation:.3} {status} | ", proposed.sensor, proposed.formula)
+    };
+    answer.proposals.iter().map(one).collect()
 }
 
 fn stands_for(cause: &Asserted, id: &str) -> bool {

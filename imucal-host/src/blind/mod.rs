@@ -11,6 +11,7 @@ pub mod interval;
 pub mod judgement;
 pub mod lambda;
 pub mod outside;
+pub mod proposal;
 pub mod robot;
 pub mod score;
 pub mod seal;

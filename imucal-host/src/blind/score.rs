@@ -132,7 +132,7 @@ fn share_of(j: &Judgement) -> Option<Closed> {
 }
 
 /// The contract's figures.
-const CONTRACT: [Figure; 12] = [
+const CONTRACT: [Figure; 15] = [
     Figure {
         name: "false alarm on healthy recordings",
         of: is_healthy,
@@ -217,10 +217,31 @@ const CONTRACT: [Figure; 12] = [
         must: None,
         aim: Some(AtMost(0.03)),
     },
+    Figure {
+        name: "outside, a formula says it, λ ≥ 200: it or its equal",
+        of: |j| j.spoken && j.lambda >= 200.0,
+        hit: |j| j.formula_right,
+        must: Some(AtLeast(0.80)),
+        aim: Some(AtLeast(0.95)),
+    },
+    Figure {
+        name: "outside, no formula says it: no wrong formula",
+        of: |j| j.truth == Truth::Outside && !j.spoken,
+        hit: |j| !j.formula_wrong,
+        must: Some(AtLeast(0.90)),
+        aim: None,
+    },
+    Figure {
+        name: "proposals on healthy recordings",
+        of: is_healthy,
+        hit: |j| !j.answer.proposals.is_empty(),
+        must: Some(AtMost(0.01)),
+        aim: Some(AtMost(0.0)),
+    },
 ];
 
 /// Figures next to the contract's.
-const FURTHER: [Figure; 13] = [
+const FURTHER: [Figure; 16] = [
     Figure {
         name: "one effect, class-correct, λ < 60",
         of: |j| is_of_one(j) && (0.0..60.0).contains(&j.lambda),
@@ -309,6 +330,27 @@ const FURTHER: [Figure; 13] = [
         name: "without an answer",
         of: |_| true,
         hit: |j| j.answer.verdict.is_none(),
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "outside, a formula says it, flagged, λ ≥ 200: right",
+        of: |j| j.spoken && j.flagged && j.lambda >= 200.0,
+        hit: |j| j.formula_right,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "outside, a formula says it: a wrong formula",
+        of: |j| j.spoken,
+        hit: |j| j.formula_wrong,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "a right formula, confirmed on a second recording",
+        of: |j| j.formula_right,
+        hit: |j| j.answer.proposals.iter().all(|proposed| proposed.confirmed == Some(true)),
         must: None,
         aim: None,
     },

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     answer::{Answer, truly_closed},
     case::{Case, draw_among},
+    proposal,
     seal::Nonce,
     trial::OwnEffects,
 };
@@ -104,7 +105,10 @@ impl World for RigWorld<'_> {
         let finish = move || {
             let recording = drawn.simulation.record(&format!("{}.csv", case.name()))?;
             let (diagnosis, seconds) = timed(|| (self.diagnose)(&recording));
-            let answer = Answer::of(diagnosis.as_ref());
+            let mut answer = Answer::of(diagnosis.as_ref());
+            if let Some(diagnosis) = &diagnosis {
+                answer.proposals = proposal::of_rig(&drawn, diagnosis)?;
+            }
             let truly_closed = truly_closed(&drawn, &answer, &self.own.effects).unwrap_or(None);
             Ok(Outcome { answer, truly_closed, seconds })
         };

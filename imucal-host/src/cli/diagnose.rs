@@ -17,7 +17,7 @@ use super::{
     warn,
 };
 use crate::{
-    diagnosis::{Diagnosis, Options, Verdict, diagnose},
+    diagnosis::{Diagnosis, Options, Verdict, diagnose, proposal::confirmation},
     effect::{CATALOGUE, Effect, user},
     file::OutputSet,
     recording::{Recording, Stream, Warning},
@@ -42,6 +42,13 @@ pub(super) struct Arguments {
     /// Your own effects, in TOML: candidates like those of the catalogue (see docs/user_effects.md)
     #[arg(long, value_name = "FILE")]
     effects: Option<PathBuf>,
+    /// Confirm the effects of --effects with their amplitudes as the file has found them, on another recording; a file that a
+    /// diagnosis has proposed has them
+    #[arg(long, requires = "effects")]
+    frozen: bool,
+    /// Write the formulas that are proposed where no effect explains the gap, as a file for --effects
+    #[arg(long, value_name = "FILE", conflicts_with = "frozen")]
+    proposals: Option<PathBuf>,
     /// Write everything as JSON; `-` prints it instead of the report
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -70,12 +77,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         output::text(&report::catalogue::catalogue(&own))?;
         return Ok(Ending::Done);
     };
-    let json = arguments.json.iter().filter(|path| path.as_os_str() != "-");
+    let frozen = frozen(arguments, &own)?;
+    let written = arguments.json.iter().filter(|path| path.as_os_str() != "-").chain(&arguments.proposals);
     let mut inputs = files_of(path);
     inputs.extend(arguments.model.clone());
     inputs.extend(arguments.sim.iter().flat_map(|path| files_of(path)));
     inputs.extend(arguments.effects.clone());
-    let files = arguments.overwrite.plan(&inputs, &json.map(Planned::new).collect::<Vec<_>>())?;
+    let files = arguments.overwrite.plan(&inputs, &written.map(Planned::new).collect::<Vec<_>>())?;
     let recording = read(path, arguments.reading)?;
     let model = arguments.model.as_deref().map(|path| load(path, arguments.reading)).transpose()?;
     let model = match model {
@@ -84,12 +92,28 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     };
     let stream =
         arguments.sim.as_deref().map(|path| stream(path, &recording, arguments.reading)).transpose()?;
-    let options = Options { without, model, stream, effects: own, settings: None };
+    let options = Options { without, model, stream, effects: own, frozen, settings: None };
     let progress = Progress::start();
     let diagnosis = diagnose(&recording, &options, &|stage| progress.stage(stage));
     drop(progress);
     print(arguments, &diagnosis, files)?;
     Ok(if diagnosis.verdict == Verdict::NotTestable { Ending::Refused } else { Ending::Done })
+}
+
+/// The text of the user's file, where its effects are to be confirmed.
+fn frozen(arguments: &Arguments, own: &[&'static Effect]) -> anyhow::Result<Option<String>> {
+    let Some(path) = arguments.effects.as_deref().filter(|_| arguments.frozen) else { return Ok(None) };
+    if let Some(effect) = confirmation::without_values(own).first() {
+        anyhow::bail!(
+            "{}: found no fitted values of {}, expected `fitted` with a value and a std_error for each amplitude; leave \
+             --frozen out to fit them",
+            path.display(),
+            effect.id
+        );
+    }
+    let bytes = arguments.reading.limits().read_small(path);
+    let bytes = bytes.map_err(|fault| anyhow::anyhow!("{}: {fault}", path.display()))?;
+    Ok(Some(String::from_utf8_lossy(&bytes).into_owned()))
 }
 
 /// A simulator's stream for a recording.
@@ -108,16 +132,21 @@ fn stream(path: &Path, recording: &Recording, reading: Reading) -> anyhow::Resul
 }
 
 fn print(arguments: &Arguments, diagnosis: &Diagnosis, mut files: OutputSet) -> anyhow::Result<()> {
+    let proposed: String = diagnosis.proposals.iter().map(|proposal| proposal.toml.as_str()).collect();
+    if let Some(path) = arguments.proposals.as_ref().filter(|_| !proposed.is_empty()) {
+        files.add(path, proposed.as_bytes())?;
+    }
+    let mut page = report::diagnosis::page(diagnosis);
     if let Some(path) = &arguments.json {
         let text =
             serde_json::to_string_pretty(diagnosis).context("the diagnosis cannot be spelt as JSON")? + "\n";
-        if path.as_os_str() == "-" {
-            return output::text(&text);
+        match path.as_os_str() == "-" {
+            true => page = text,
+            false => files.add(path, text.as_bytes())?,
         }
-        files.add(path, text.as_bytes())?;
-        files.commit()?;
     }
-    output::text(&report::diagnosis::page(diagnosis))
+    files.commit()?;
+    output::text(&page)
 }
 
 #[cfg(test)]

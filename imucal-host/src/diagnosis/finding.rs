@@ -63,6 +63,9 @@ pub struct Diagnosis {
     /// The user's own effects among causes and equivalents, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub user_effects: Vec<UserEffect>,
+    /// Formulas for what no effect of the catalogue explains.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub proposals: Vec<Proposal>,
 }
 
 impl Diagnosis {
@@ -92,6 +95,44 @@ pub struct UserEffect {
     pub cause: String,
     /// What to do about it.
     pub remedy: String,
+}
+
+/// Whether a second recording bears a formula out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ProposalStatus {
+    /// Found in this recording.
+    Proposed,
+    /// As it was found in another recording, it closes at least half of what is left in this one.
+    Confirmed,
+    /// It does not.
+    Refuted,
+}
+
+/// A formula for what no effect of the catalogue explains.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Proposal {
+    /// `acc`, `gyr` or `mag`.
+    pub sensor: String,
+    /// Axes on which it acts.
+    pub axes: Vec<String>,
+    /// What is added to the sensor's output.
+    pub formula: String,
+    /// Amplitudes and shapes.
+    pub parameters: Vec<Amount>,
+    /// Formulas that this recording cannot distinguish from it.
+    pub equivalents: Vec<String>,
+    /// Share of what is left of the sensor's gap that it closes, on stretches that no fit has seen.
+    pub gap_closed: f64,
+    /// Its 95 % interval.
+    pub gap_closed_ci95: [f64; 2],
+    /// ln of the odds against noise alone, less what the number of formulas that were tried costs; of a confirmation,
+    /// what the frozen formula adds.
+    pub log_odds: f64,
+    /// Whether a second recording bears it out.
+    pub status: ProposalStatus,
+    /// The formula as effects of a user's file.
+    pub toml: String,
 }
 
 /// The gap of one channel: root mean squares of block means.

@@ -5,6 +5,7 @@ pub mod finding;
 pub mod library;
 pub mod location;
 pub mod mixed_model;
+pub mod proposal;
 pub mod reference;
 pub mod residual;
 pub mod screening;
@@ -21,6 +22,7 @@ use self::{
         candidates::{Candidates, Setting},
         formulas,
     },
+    proposal::{confirmation, proposer},
     residual::forward_model::ForwardModel,
     screening::preparation::Preparation,
     search::{
@@ -47,6 +49,9 @@ pub struct Options {
     pub stream: Option<Stream>,
     /// The user's own effects, candidates besides the catalogue's.
     pub effects: Vec<&'static Effect>,
+    /// Text of the user's file where its effects are no candidates: their amplitudes are as the file has found them, and the
+    /// diagnosis says whether the recording confirms them.
+    pub frozen: Option<String>,
     /// Settings; without them, the preset of the source of the movement.
     pub settings: Option<Settings>,
 }
@@ -86,14 +91,22 @@ pub fn try_diagnose(
         // A stream holds the field itself.
         field_known: recording.manifest.site.field_ned_ut.is_some() || stream.is_some(),
     };
-    let mut candidates = Candidates::new(&setting, &options.without, &options.effects);
+    let own = if options.frozen.is_some() { &[][..] } else { &options.effects };
+    let mut candidates = Candidates::new(&setting, &options.without, own);
     let LeftOut { scene, stretches, jolts } = motion_mismatch::left_out(scene, &candidates)?;
     preparation.remarks.extend(motion_mismatch::remark(jolts));
     preparation.findings.extend(motion_mismatch::finding(stretches, &preparation.unmatched));
     formulas::sift(&scene, &mut candidates)?;
     let explain = |candidates: &Candidates| {
         let explained = stepwise::search(&scene, candidates, progress)?;
-        answer(recording, &preparation, &explained, progress)
+        let mut diagnosis = answer(recording, &preparation, &explained, progress)?;
+        let (proposals, remarks) = match &options.frozen {
+            Some(toml) => confirmation::confirmed(&explained, &diagnosis, &options.effects, toml)?,
+            None => proposer::proposed(&explained, &diagnosis, progress)?,
+        };
+        diagnosis.proposals = proposals;
+        diagnosis.remarks.extend(remarks);
+        Ok(diagnosis)
     };
     loop {
         match explain(&candidates) {

@@ -29,6 +29,8 @@ pub struct Settings {
     pub location: LocationSettings,
     /// What is asserted.
     pub verdict: VerdictSettings,
+    /// Formulas for what no effect explains.
+    pub proposal: ProposalSettings,
 }
 
 /// How residuals are averaged and simulated.
@@ -197,6 +199,19 @@ pub struct VerdictSettings {
     pub counts_faults: bool,
 }
 
+/// Formulas for what no effect explains.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProposalSettings {
+    /// ln of the evidence that a formula must add beyond the number of those that were tried. Larger: fewer proposals.
+    pub least_gain: f64,
+    /// Share of what is left of its sensor's gap that it closes at least, on stretches that no fit has seen.
+    pub least_share: f64,
+    /// Standard errors from zero of the amplitudes that it keeps.
+    pub amplitude_errors: f64,
+    /// What the sensor still follows beside it is at most this share of what it explains. Larger: more wrong formulas.
+    pub remainder: f64,
+}
+
 impl Default for ResidualSettings {
     /// That of a rig.
     fn default() -> Self {
@@ -276,6 +291,13 @@ impl Default for LocationSettings {
             shortest_period: 4.0,
             peak: 12.0,
         }
+    }
+}
+
+impl Default for ProposalSettings {
+    /// That of any source.
+    fn default() -> Self {
+        Self { least_gain: 8.0, least_share: 0.5, amplitude_errors: 3.0, remainder: 0.1 }
     }
 }
 

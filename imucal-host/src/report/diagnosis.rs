@@ -9,7 +9,7 @@ use super::{
 use crate::{
     diagnosis::{
         Diagnosis, Verdict,
-        finding::{Amount, Cause, Gap, Place},
+        finding::{Amount, Cause, Gap, Place, Proposal, ProposalStatus},
     },
     effect::{self, Effect},
 };
@@ -36,6 +36,7 @@ fn write_page(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
     write_gap(text, &diagnosis.gap)?;
     write_places(text, &diagnosis.places)?;
     write_causes(text, diagnosis)?;
+    write_proposals(text, &diagnosis.proposals)?;
     write_experiments(text, diagnosis)?;
     write_absent(text, diagnosis)?;
     write_not_testable(text, diagnosis)
@@ -191,6 +192,38 @@ fn amount(amount: &Amount) -> String {
         (Some(value), _) => plain(value),
     };
     format!("{} {value}{unit}", amount.name)
+}
+
+fn write_proposals(text: &mut String, proposals: &[Proposal]) -> fmt::Result {
+    for proposal in proposals {
+        let heading = match proposal.status {
+            ProposalStatus::Proposed => "proposed formula, not in the catalogue",
+            ProposalStatus::Confirmed => "formula of another recording, confirmed",
+            ProposalStatus::Refuted => "formula of another recording, refuted",
+        };
+        writeln!(text, "\n{heading}: {} {}", proposal.sensor, proposal.axes.join(", "))?;
+        text.push_str(&hanging("  adds:      ", &proposal.formula));
+        let share = share_words(proposal.gap_closed, proposal.gap_closed_ci95);
+        let closes =
+            format!("closes {share} of what is left of the sensor's gap; log odds {:.0}", proposal.log_odds);
+        text.push_str(&hanging("  ", &closes));
+        let amounts: Vec<String> = proposal.parameters.iter().map(amount).collect();
+        text.push_str(&hanging("  how much:  ", &amounts.join("; ")));
+        for other in &proposal.equivalents {
+            text.push_str(&hanging("  or else:   ", other));
+        }
+        let next = match proposal.status {
+            ProposalStatus::Proposed => {
+                "write it with --proposals FILE, and confirm it on a second recording with --effects FILE --frozen"
+            }
+            ProposalStatus::Confirmed => {
+                "keep it among your own effects: diagnose and simulate take the file"
+            }
+            ProposalStatus::Refuted => "it does not hold here as it was found: look for another cause",
+        };
+        text.push_str(&hanging("  to do:     ", next));
+    }
+    Ok(())
 }
 
 fn write_experiments(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {

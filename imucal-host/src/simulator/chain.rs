@@ -68,16 +68,7 @@ impl<'a> Chain<'a> {
         triad: &Triad<f64>,
         input: &[Input],
     ) -> Result<Vec<Vector3<f64>>, OutputError> {
-        let mut triad = *triad;
-        for dose in &self.doses {
-            if let Act::Triad(of, alter) = dose.effect.act
-                && of == kind
-            {
-                alter(&dose.values, &mut triad);
-            }
-        }
-        let k = triad.sensitivity().ok_or(OutputError::Singular { sensor: kind })?;
-        let sensed: Vec<_> = input.iter().map(|row| k * row.given(kind)).collect();
+        let (triad, sensed) = self.sensed(kind, triad, input)?;
         let mut output: Vec<_> = sensed.iter().map(|sensed| sensed + triad.bias).collect();
         let mut run = SensorRun { input, sensed: &sensed, output: &mut output };
         for dose in &self.doses {
@@ -88,6 +79,29 @@ impl<'a> Chain<'a> {
             }
         }
         Ok(output)
+    }
+
+    /// A triad as the chain alters it, and what its axes sense: its output less its bias, before the other effects; SI units.
+    ///
+    /// # Errors
+    ///
+    /// [`OutputError`], where K is singular.
+    pub fn sensed(
+        &self,
+        kind: SensorKind,
+        triad: &Triad<f64>,
+        input: &[Input],
+    ) -> Result<(Triad<f64>, Vec<Vector3<f64>>), OutputError> {
+        let mut triad = *triad;
+        for dose in &self.doses {
+            if let Act::Triad(of, alter) = dose.effect.act
+                && of == kind
+            {
+                alter(&dose.values, &mut triad);
+            }
+        }
+        let k = triad.sensitivity().ok_or(OutputError::Singular { sensor: kind })?;
+        Ok((triad, input.iter().map(|row| k * row.given(kind)).collect()))
     }
 
     /// Noise and limit of a triad on the way to its converter.

@@ -40,6 +40,14 @@ pub static OUTSIDE: LazyLock<Vec<Effect>> = LazyLock::new(|| {
     list
 });
 
+/// Families that no formula of a proposal says.
+pub const BEYOND_FORMULAS: [&str; 2] = ["ladder", "ripple"];
+
+/// A formula of a proposal says what a mechanism does.
+pub fn is_spoken(id: &str) -> bool {
+    id.rsplit_once('.').is_some_and(|(_, name)| !BEYOND_FORMULAS.contains(&name))
+}
+
 /// The mechanism of an id.
 pub fn find(id: &str) -> Option<&'static Effect> {
     OUTSIDE.iter().find(|effect| effect.id == id)

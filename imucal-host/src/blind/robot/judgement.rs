@@ -6,7 +6,11 @@ use super::{
     setting::DELAY,
 };
 use crate::{
-    blind::answer::{Answer, Asserted, Finished},
+    blind::{
+        answer::{Answer, Asserted, Finished},
+        judgement::formulas,
+        proposal::Proposed,
+    },
     diagnosis::Verdict,
     effect::class::class,
 };
@@ -41,6 +45,10 @@ pub struct RobotJudgement {
     pub delay: Option<bool>,
     /// Likewise the clock's rate, by its standard errors alone; none where none is reported.
     pub rate: Option<bool>,
+    /// A formula is proposed that is what is there, and none besides.
+    pub formula_right: bool,
+    /// A formula is proposed that is not there.
+    pub formula_wrong: bool,
     /// Time of the diagnosis, s.
     pub seconds: f64,
 }
@@ -65,6 +73,8 @@ impl RobotJudgement {
             flagged,
             delay: delay(&label, &answer),
             rate: rate(&label, &answer),
+            formula_right: !answer.proposals.is_empty() && answer.proposals.iter().all(Proposed::is_right),
+            formula_wrong: answer.proposals.iter().any(|proposed| !proposed.is_right()),
             seconds: trial.seconds,
             label,
             answer,
@@ -77,7 +87,8 @@ impl RobotJudgement {
             Content::Healthy => self.alarmed,
             Content::Effect => !self.class_right,
             Content::Motion => !self.motion_said,
-            Content::Spoken | Content::Unspoken => !self.flagged,
+            Content::Spoken => !self.flagged || !self.formula_right,
+            Content::Unspoken => !self.flagged || self.formula_wrong,
         };
         wrong || self.delay == Some(false)
     }
@@ -104,11 +115,12 @@ impl RobotJudgement {
         let verdict = verdict.as_ref().and_then(|verdict| verdict.as_str()).unwrap_or("no answer").to_owned();
         let setting = &label.setting;
         format!(
-            "{}: {there} [λ {:.0}], delay {:.3} ms | {verdict}: {} | credible {} | {} {} {:.0}/{:.0} Hz {:.0} s",
+            "{}: {there} [λ {:.0}], delay {:.3} ms | {verdict}: {} | {}credible {} | {} {} {:.0}/{:.0} Hz {:.0} s",
             label.case,
             self.lambda,
             1e3 * setting.clock_offset,
             if causes.is_empty() { "nothing".to_owned() } else { causes.join(" + ") },
+            formulas(&self.answer),
             self.answer.credible_set.join(", "),
             setting.machine,
             setting.unit,

@@ -53,7 +53,7 @@ fn has_delay(j: &RobotJudgement) -> bool {
 }
 
 /// The contract's figures.
-const CONTRACT: [Figure; 4] = [
+const CONTRACT: [Figure; 7] = [
     Figure {
         name: "healthy pairs, false alarm",
         of: |j| holds(j, Content::Healthy),
@@ -82,10 +82,31 @@ const CONTRACT: [Figure; 4] = [
         must: Some(AtLeast(0.90)),
         aim: Some(AtLeast(0.98)),
     },
+    Figure {
+        name: "outside, a formula says it, λ ≥ 200: it or its equal",
+        of: |j| holds(j, Content::Spoken) && j.lambda >= 200.0,
+        hit: |j| j.formula_right,
+        must: Some(AtLeast(0.80)),
+        aim: Some(AtLeast(0.95)),
+    },
+    Figure {
+        name: "outside, no formula says it: no wrong formula",
+        of: |j| holds(j, Content::Unspoken),
+        hit: |j| !j.formula_wrong,
+        must: Some(AtLeast(0.90)),
+        aim: None,
+    },
+    Figure {
+        name: "proposals on healthy recordings",
+        of: |j| holds(j, Content::Healthy),
+        hit: |j| !j.answer.proposals.is_empty(),
+        must: Some(AtMost(0.01)),
+        aim: Some(AtMost(0.0)),
+    },
 ];
 
 /// Figures next to the contract's.
-const FURTHER: [Figure; 10] = [
+const FURTHER: [Figure; 13] = [
     Figure::besides(
         "one effect, class-correct, λ < 100",
         |j| holds(j, Content::Effect) && j.lambda < 100.0,
@@ -128,6 +149,27 @@ const FURTHER: [Figure; 10] = [
     ),
     Figure::besides("within the catalogue, flagged", |j| holds(j, Content::Effect), |j| j.flagged),
     Figure::besides("without an answer", |_| true, |j| j.answer.verdict.is_none()),
+    Figure {
+        name: "outside, a formula says it, flagged, λ ≥ 200: right",
+        of: |j| holds(j, Content::Spoken) && j.flagged && j.lambda >= 200.0,
+        hit: |j| j.formula_right,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "outside, a formula says it: a wrong formula",
+        of: |j| holds(j, Content::Spoken),
+        hit: |j| j.formula_wrong,
+        must: None,
+        aim: None,
+    },
+    Figure {
+        name: "a right formula, confirmed on a second recording",
+        of: |j| j.formula_right,
+        hit: |j| j.answer.proposals.iter().all(|proposed| proposed.confirmed == Some(true)),
+        must: None,
+        aim: None,
+    },
 ];
 
 /// Scores judged trials.

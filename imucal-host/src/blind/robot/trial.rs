@@ -5,6 +5,7 @@ use crate::{
     blind::{
         answer::Answer,
         case::Case,
+        proposal,
         seal::Nonce,
         world::{Outcome, Pending, World, WorldKind, timed},
     },
@@ -27,7 +28,11 @@ impl World for RobotWorld<'_> {
         let finish = move || {
             let pair = drawn.scene.record(&case.name())?;
             let (diagnosis, seconds) = timed(|| (self.0)(&pair));
-            Ok(Outcome { answer: Answer::of(diagnosis.as_ref()), truly_closed: None, seconds })
+            let mut answer = Answer::of(diagnosis.as_ref());
+            if let Some(diagnosis) = &diagnosis {
+                answer.proposals = proposal::of_robot(&drawn, diagnosis)?;
+            }
+            Ok(Outcome { answer, truly_closed: None, seconds })
         };
         Ok(Pending { label, finish: Box::new(finish) })
     }

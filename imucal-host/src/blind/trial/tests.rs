@@ -20,6 +20,7 @@ fn nothing(recording: &Recording) -> Diagnosis {
         absent: Vec::new(),
         not_testable: Vec::new(),
         user_effects: Vec::new(),
+        proposals: Vec::new(),
         next_experiment: Vec::new(),
     }
 }

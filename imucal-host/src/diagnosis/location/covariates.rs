@@ -36,6 +36,7 @@ pub fn drivers(scene: &ForwardModel<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<
             let swings: Vec<[Swing; 3]> = scene.blocks.iter().map(middle).collect();
             let mut drivers = of_gimbals(&swings);
             drivers.push(recent_motion(&swings, &scene.blocks));
+            drivers.push(other_sensors(given));
             drivers
         }
         None => attitude_covariates::drivers(&scene.plain(), &scene.kinds),
@@ -184,6 +185,20 @@ fn other_input(given: &[Vec<Vector3<f64>>; 3]) -> Covariate {
         functions.push(Function { detail: "product of two".into(), values, of: Some((kind, axis)) });
     }
     Covariate { name: "other_input".into(), functions }
+}
+
+/// What the axes of the other triads sense.
+fn other_sensors(given: &[Vec<Vector3<f64>>; 3]) -> Covariate {
+    let mut functions = Vec::new();
+    for (kind, axis) in SensorKind::ALL.into_iter().flat_map(|kind| (0..3).map(move |axis| (kind, axis))) {
+        for other in SensorKind::ALL.into_iter().filter(|other| *other != kind) {
+            for (input, name) in ["x", "y", "z"].iter().enumerate() {
+                let (values, detail) = (sensed(given, other, input), format!("{other} {name}"));
+                functions.push(Function { detail, values, of: Some((kind, axis)) });
+            }
+        }
+    }
+    Covariate { name: "other_sensors".into(), functions }
 }
 
 /// What the axes of a triad sense, by the temperature.

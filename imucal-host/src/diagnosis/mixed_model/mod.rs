@@ -15,6 +15,7 @@
 //! | [`crate::noise`] | drifts, and Σ⁻¹ with the random effects eliminated in the order of time; calibration uses them too |
 //! | [`design`] | columns X by channel, and their normal equations |
 //! | [`augmented_normal`] | normal equations of trial columns added to fitted ones |
+//! | [`drawn_noise`] | noise drawn from its model |
 //! | [`likelihood`] | the restricted likelihood (REML) |
 //! | [`white_noise`] | white noise from neighbouring blocks |
 //! | [`repeatability`] | pointing errors of the table, axis by axis |
@@ -31,6 +32,7 @@
 
 pub mod augmented_normal;
 pub mod design;
+pub mod drawn_noise;
 pub mod likelihood;
 pub mod noise;
 pub mod repeatability;

@@ -219,8 +219,11 @@ impl<'s> Weighing<'s> {
     }
 
     fn scattered(&self, channel: &Channel) -> PointingErrors<'_> {
-        let given = &self.given[channel.kind as usize];
-        PointingErrors { scene: self.scene, kind: channel.kind, axis: channel.axis, given }
+        self.pointing_errors(channel.kind, channel.axis)
+    }
+
+    pub(super) fn pointing_errors(&self, kind: SensorKind, axis: usize) -> PointingErrors<'_> {
+        PointingErrors { scene: self.scene, kind, axis, given: &self.given[kind as usize] }
     }
 
     /// Random effects of a channel by itself; of some of its blocks, as if the others had not been measured.
@@ -335,7 +338,7 @@ impl<'s> Weighing<'s> {
 
 impl SensorNoise {
     /// The fast and the slow drift.
-    fn drifts(&self) -> [Process; DRIFTS] {
+    pub(super) fn drifts(&self) -> [Process; DRIFTS] {
         [(FAST, self.drift[0]), (self.slow, self.drift[1])].map(|(time, sigma)| Process { time, sigma })
     }
 

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::{block::Means, forward_model::ForwardModel, sample_points::SamplePoints};
 use crate::{
     diagnosis::error::DiagnosisError,
-    effect::{Act, Effect, Input, Parameter, Role, Truth},
+    effect::{Act, Effect, Input, Parameter, Role, Truth, user::Formula},
     recording::SensorKind,
     simulator::Dose,
 };
@@ -59,6 +59,33 @@ impl<'s> Reference<'s> {
     /// The truth at each block's last node, in the order of the nodes.
     pub fn truth(&self) -> &[Truth] {
         &self.truth
+    }
+
+    /// What each axis of a sensor senses at the nodes: its output before bias and effects, SI units.
+    ///
+    /// # Errors
+    ///
+    /// [`DiagnosisError::Simulation`], where the triad is singular.
+    pub fn sensed(&self, kind: SensorKind) -> Result<Vec<Vector3<f64>>, DiagnosisError> {
+        self.scene.sensed(&self.doses, kind, &self.input)
+    }
+
+    /// What a formula's amplitudes multiply on each axis, block by block; `sensed` is that of its sensor.
+    ///
+    /// # Errors
+    ///
+    /// [`DiagnosisError::Formula`], where it has no value.
+    pub fn factors(
+        &self,
+        formula: &Formula,
+        sensed: &[Vector3<f64>],
+        shapes: &[f64],
+    ) -> Result<Vec<Vector3<f64>>, DiagnosisError> {
+        let each = formula.factors(&self.input, sensed, shapes);
+        let each = each.map_err(|cause| DiagnosisError::Formula(Box::new(cause)))?;
+        let node = |row: usize| Vector3::from_fn(|axis, _| each.get(axis).map_or(0.0, |column| column[row]));
+        let nodes: Vec<Vector3<f64>> = (0..self.input.len()).map(node).collect();
+        Ok(self.nodes.averaged(&nodes, self.scene.cuts.len()))
     }
 
     /// What a usual size of one parameter changes, block by block, by the simulator's difference quotient. Where the

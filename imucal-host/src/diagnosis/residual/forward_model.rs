@@ -286,6 +286,17 @@ impl<'a> ForwardModel<'a> {
         Ok(outputs)
     }
 
+    /// What each axis of a sensor senses of an input.
+    pub(super) fn sensed(
+        &self,
+        doses: &[Dose],
+        kind: SensorKind,
+        input: &[Input],
+    ) -> Result<Vec<Vector3<f64>>, DiagnosisError> {
+        let (_, sensed) = Chain::new(doses).sensed(kind, &self.triads[kind as usize], input)?;
+        Ok(sensed)
+    }
+
     fn output(
         &self,
         chain: &Chain<'_>,

@@ -19,7 +19,7 @@ use crate::{
             grid_posterior::GridPosterior,
         },
         mixed_model::{
-            design::{Design, DesignProducts, Normal},
+            design::{Design, DesignProducts, Normal, Signature},
             noise::{Noise, Weighing},
             shared_offsets::SharedOffsets,
         },
@@ -227,6 +227,29 @@ impl<'s> Linearisation<'s> {
         let shapes = self.shapes.iter().cloned().chain(doses.iter().map(neutral)).collect();
         let weighing = Weighing::new(self.scene, self.weighing.given.clone());
         Linearisation::of(self.scene, candidates, self.scan.clone(), fit, design, weighing, shapes)
+    }
+
+    /// The same problem with further effects, the last of `candidates`, whose signatures are given; what is `fitted` so far
+    /// counts as the baseline.
+    pub fn joined<'c>(
+        &'c self,
+        candidates: &'c Candidates,
+        fit: &Fit,
+        fitted: &[usize],
+        effects: &[Dose],
+        signatures: &[Signature],
+    ) -> Linearisation<'c> {
+        let kept: Vec<usize> = (0..self.design.columns.len()).collect();
+        let doses: Vec<&'static Effect> = effects.iter().map(|dose| dose.effect).collect();
+        let further = columns(self.scene, &doses);
+        let all = self.design.columns.iter().copied().chain(further).collect();
+        let design = self.design.extended(&kept, all, signatures);
+        let shape = |dose: &Dose| GridPosterior::alone(dose.values.clone());
+        let shapes = self.shapes.iter().cloned().chain(effects.iter().map(shape)).collect();
+        let weighing = Weighing::new(self.scene, self.weighing.given.clone());
+        let joined =
+            Linearisation::of(self.scene, candidates, self.scan.clone(), fit, design, weighing, shapes);
+        Linearisation { baseline: fitted.to_vec(), ..joined }
     }
 
     /// Parameters at which a candidate's signature was taken.

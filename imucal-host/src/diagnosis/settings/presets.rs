@@ -1,8 +1,8 @@
 //! What differs between the sources of a movement.
 
 use super::{
-    LibrarySettings, LocationSettings, NoiseSettings, Provided, ResidualSettings, SearchSettings, Settings,
-    Source, VerdictSettings,
+    LibrarySettings, LocationSettings, NoiseSettings, ProposalSettings, Provided, ResidualSettings,
+    SearchSettings, Settings, Source, VerdictSettings,
 };
 use crate::recording::SensorKind;
 
@@ -40,6 +40,7 @@ impl Settings {
             search: SearchSettings::default(),
             location: LocationSettings::default(),
             verdict: VerdictSettings::default(),
+            proposal: ProposalSettings::default(),
         }
     }
 
@@ -88,6 +89,7 @@ impl Settings {
                 ..rig.verdict
             },
             location: rig.location,
+            proposal: rig.proposal,
         }
     }
 
@@ -138,6 +140,7 @@ impl Settings {
             },
             verdict: VerdictSettings { confirms_held_out: true, amplitude_errors: 0.0, ..rig.verdict },
             location: rig.location,
+            proposal: rig.proposal,
         }
     }
 

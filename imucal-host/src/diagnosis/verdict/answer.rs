@@ -43,6 +43,7 @@ pub fn untestable(recording: &Recording, why: String) -> Diagnosis {
         not_testable: Vec::new(),
         next_experiment: Vec::new(),
         user_effects: Vec::new(),
+        proposals: Vec::new(),
     }
 }
 

@@ -28,6 +28,7 @@ use crate::{
         search::linearisation::Linearisation,
     },
     effect::Effect,
+    recording::SensorKind,
 };
 
 /// Folds.
@@ -82,7 +83,7 @@ pub fn closed(
     noise: &Noise,
     remainder: f64,
 ) -> Result<Closed, DiagnosisError> {
-    let folds = folds(linear, &linear.design, set, noise);
+    let folds = folds(linear, &linear.design, noise, &linear.fitted(set));
     closed_in(linear, Folds { fitted: &folds, judged: &folds }, set, noise, remainder)
 }
 
@@ -93,14 +94,36 @@ pub fn closed_of_own(
     set: &[&'static Effect],
     noise: &Noise,
 ) -> Result<Vec<Share>, DiagnosisError> {
-    let all = folds(linear, &linear.design, set, noise);
+    let fitted = linear.fitted(set);
+    let all = folds(linear, &linear.design, noise, &fitted);
     let of = |(k, effect): (usize, &&'static Effect)| {
         let mut design = linear.design.clone();
         design.channels.retain(|channel| linear.scene.reach(effect).contains(&channel.kind));
-        let own = folds(linear, &design, set, noise);
+        let own = folds(linear, &design, noise, &fitted);
         Ok(closed_in(linear, Folds { fitted: &all, judged: &own }, set, noise, 0.0)?.each[k])
     };
     set.iter().enumerate().map(of).collect()
+}
+
+/// Shares of what one sensor shows that a set closes; `remainder` is the whitened size of what its residual still follows.
+pub fn closed_of_sensor(
+    linear: &Linearisation<'_>,
+    kind: SensorKind,
+    set: &[&'static Effect],
+    noise: &Noise,
+    remainder: f64,
+) -> Result<Closed, DiagnosisError> {
+    let fitted = linear.fitted(set);
+    let all = folds(linear, &linear.design, noise, &fitted);
+    let own = folds(linear, &of_sensor(linear, kind), noise, &fitted);
+    closed_in(linear, Folds { fitted: &all, judged: &own }, set, noise, remainder)
+}
+
+/// The channels of one sensor.
+fn of_sensor(linear: &Linearisation<'_>, kind: SensorKind) -> Design {
+    let mut design = linear.design.clone();
+    design.channels.retain(|channel| channel.kind == kind);
+    design
 }
 
 /// Normal equations of each fold: those that are fitted, and those of the channels on which the fit is judged.
@@ -108,21 +131,6 @@ pub fn closed_of_own(
 struct Folds<'f> {
     fitted: &'f [Normal],
     judged: &'f [Normal],
-}
-
-/// Normal equations of the baseline and a set on the channels of a design, fold by fold.
-fn folds(linear: &Linearisation<'_>, design: &Design, set: &[&'static Effect], noise: &Noise) -> Vec<Normal> {
-    let fitted = linear.fitted(set);
-    let of = |fold: usize| {
-        let time =
-            |block: usize| linear.scene.blocks[block].time / linear.scene.settings.verdict.fold_stretch;
-        // A row that holds no samples is a convention, and belongs to every fold.
-        let empty = |block: usize| linear.scene.blocks[block].rows.is_empty();
-        let inside = |block: usize| empty(block) || time(block) as usize % FOLDS == fold;
-        let precisions = linear.weighing.precisions_within(design, noise, &inside);
-        design.normal(&precisions, &fitted)
-    };
-    (0..FOLDS).map(of).collect()
 }
 
 fn closed_in(
@@ -174,6 +182,49 @@ fn closed_in(
         each.push(share(&gains));
     }
     Ok(Closed { total, each, explainable })
+}
+
+/// Share of what a sensor shows beyond the baseline that a prediction closes which was made without this recording;
+/// `predicted` is the problem less the prediction, `remainder` the whitened size of what is left beside it.
+///
+/// # Errors
+///
+/// [`DiagnosisError::CrossValidation`].
+pub fn closed_by_prediction(
+    linear: &Linearisation<'_>,
+    predicted: &Linearisation<'_>,
+    kind: SensorKind,
+    noise: &Noise,
+    remainder: f64,
+) -> Result<Share, DiagnosisError> {
+    let places: Vec<usize> = (0..linear.baseline.len()).collect();
+    let left = |linear: &Linearisation<'_>| {
+        let fitted = folds(linear, &linear.design, noise, &linear.baseline);
+        let judged = folds(linear, &of_sensor(linear, kind), noise, &linear.baseline);
+        held_out(Folds { fitted: &fitted, judged: &judged }, &places, places.len())
+    };
+    let (before, after) = (left(linear)?, left(predicted)?);
+    let closed: Vec<f64> = before.iter().zip(&after).map(|(b, a)| b.energy - a.energy).collect();
+    let whole = closed.iter().sum::<f64>();
+    let share = |closed: f64, part: f64| closed / (closed + part * remainder).max(f64::MIN_POSITIVE);
+    let without = (FOLDS as f64 - 1.0) / FOLDS as f64;
+    let each: Vec<f64> = closed.iter().map(|fold| share(whole - fold, without)).collect();
+    let explainable = (whole + remainder).max(1.0);
+    let further = (SCATTER / explainable).powi(2) + (VAGUE * remainder / explainable).powi(2);
+    Ok(Share::new(share(whole, 1.0), &each, further, explainable, linear.scene.settings.verdict.unseen))
+}
+
+/// Normal equations of some columns, of each fold's blocks alone.
+fn folds(linear: &Linearisation<'_>, design: &Design, noise: &Noise, fitted: &[usize]) -> Vec<Normal> {
+    let stretch = linear.scene.settings.verdict.fold_stretch;
+    let normal = |fold: usize| {
+        let time = |block: usize| linear.scene.blocks[block].time / stretch;
+        // A row that holds no samples is a convention, and belongs to every fold.
+        let empty = |block: usize| linear.scene.blocks[block].rows.is_empty();
+        let inside = |block: usize| empty(block) || time(block) as usize % FOLDS == fold;
+        design.normal(&linear.weighing.precisions_within(design, noise, &inside), fitted)
+    };
+    (0..FOLDS).map(normal).collect()
 }
 
 /// Whitened squared size of what a set explains beyond the baseline, less what noise alone would give.

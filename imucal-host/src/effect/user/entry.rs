@@ -41,6 +41,9 @@ pub(super) struct Entry {
     amplitude: Amplitude,
     #[serde(default)]
     shape: BTreeMap<String, Shape>,
+    /// What a diagnosis has found, by parameter.
+    #[serde(default)]
+    fitted: BTreeMap<String, Fitted>,
     cause: String,
     remedy: String,
     #[serde(default)]
@@ -83,6 +86,16 @@ struct Shape {
     unit: String,
 }
 
+/// A parameter as it was estimated from a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fitted {
+    /// Its value, in the unit of the parameter.
+    pub value: f64,
+    /// Standard error of the value.
+    pub std_error: f64,
+}
+
 /// A value that is not what was expected.
 pub(super) fn wrong(key: &str, found: impl std::fmt::Display, expected: &'static str) -> EntryFault {
     let found = found.to_string().chars().take(SHORT).flat_map(char::escape_default).collect();
@@ -116,7 +129,9 @@ impl Entry {
             })
         };
         let parts = texts.iter().map(parse).collect::<Result<Vec<_>, _>>()?;
-        let formula = Formula { effect: self.id.clone(), texts, parts, axes, amplitudes: names.len() };
+        let fitted = self.fitted(names.iter().chain(&shapes))?;
+        let formula =
+            Formula { effect: self.id.clone(), texts, parts, axes, amplitudes: names.len(), fitted };
         let mut parameters = self.amplitude_parameters(&names)?;
         for (at, (name, shape)) in self.shape.iter().enumerate() {
             if !formula.has_shape(at) {
@@ -135,6 +150,23 @@ impl Entry {
         let mut effect = Effect::new(&self.id, act, parameters, words).needing(needs);
         effect.confusables = self.like.iter().map(like).collect();
         Ok(effect)
+    }
+
+    /// What was found of each parameter, in their order.
+    fn fitted<'n>(&self, names: impl Iterator<Item = &'n String>) -> Result<Vec<Option<Fitted>>, EntryFault> {
+        let names: Vec<&String> = names.collect();
+        for (name, fitted) in &self.fitted {
+            if !names.contains(&name) {
+                return Err(wrong("fitted", name, "amplitudes and shapes of this entry, such as x"));
+            }
+            let is_sound = fitted.value.abs() <= SIZES.1 && (0.0..=SIZES.1).contains(&fitted.std_error);
+            if !is_sound {
+                let key = format!("fitted.{name}");
+                let found = format!("{} with std_error {}", fitted.value, fitted.std_error);
+                return Err(wrong(&key, found, "numbers up to 1e30, and no negative std_error"));
+            }
+        }
+        Ok(names.into_iter().map(|name| self.fitted.get(name).copied()).collect())
     }
 
     fn sensor(&self) -> Result<SensorKind, EntryFault> {

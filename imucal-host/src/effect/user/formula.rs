@@ -5,7 +5,10 @@ use std::fmt;
 use nalgebra::Vector3;
 
 use super::{
+    entry::Fitted,
     expression::{Column, Expression},
+    fault::FormulaFault,
+    parser,
     quantity::{Quantity, Rows},
 };
 use crate::effect::{Input, Needs, SensorRun};
@@ -28,6 +31,8 @@ pub struct Formula {
     pub(super) axes: Layout,
     /// Number of amplitudes; shapes follow them in the parameter vector.
     pub(super) amplitudes: usize,
+    /// What a diagnosis has found of each parameter, in their order.
+    pub(super) fitted: Vec<Option<Fitted>>,
 }
 
 /// A formula that has no value that can be used.
@@ -65,6 +70,27 @@ impl NotFinite {
 }
 
 impl Formula {
+    /// A formula of its own for each axis of a sensor, with an amplitude an axis; `shapes` names the parameters that it may
+    /// have besides.
+    ///
+    /// # Errors
+    ///
+    /// [`FormulaFault`], of the first text that cannot be understood.
+    pub fn of_axes(texts: &[String; 3], shapes: &[String]) -> Result<Self, FormulaFault> {
+        // A text that is the same on all axes is one part.
+        let one = texts.iter().all(|text| *text == texts[0]);
+        let texts = if one { texts[..1].to_vec() } else { texts.to_vec() };
+        let parts = texts.iter().map(|text| parser::parse(text, shapes)).collect::<Result<Vec<_>, _>>()?;
+        let axes = [0, 1, 2].map(|axis| Some((axis, if one { 0 } else { axis })));
+        let fitted = vec![None; 3 + shapes.len()];
+        Ok(Self { effect: String::new(), texts, parts, axes, amplitudes: 3, fitted })
+    }
+
+    /// What a diagnosis has found of each parameter, in the order of the effect's; `None` where the file does not say.
+    pub fn fitted(&self) -> &[Option<Fitted>] {
+        &self.fitted
+    }
+
     /// Adds to each row's output.
     ///
     /// # Errors

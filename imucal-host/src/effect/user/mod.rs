@@ -23,6 +23,7 @@ use toml::Spanned;
 use self::entry::Entry;
 pub(in crate::effect) use self::history::History;
 pub use self::{
+    entry::Fitted,
     fault::{EntryFault, FormulaFault, UserEffectError},
     formula::{Formula, NotFinite},
 };

@@ -3,7 +3,11 @@
 
 use std::sync::LazyLock;
 
-use crate::{blind::outside::OUTSIDE, effect::Effect, recording::SensorKind};
+use crate::{
+    blind::outside::{BEYOND_FORMULAS, OUTSIDE},
+    effect::Effect,
+    recording::SensorKind,
+};
 
 mod aliasing;
 mod battery;
@@ -16,8 +20,6 @@ mod telegraph;
 
 /// Mechanisms of the rig's trials that a formula says.
 const OF_RIG: [&str; 6] = ["cross_cubic", "crosstalk", "dead_zone", "motion_heat", "temp_cross", "temp_rate"];
-/// Mechanisms of the rig's trials that none says.
-const OF_RIG_BEYOND: [&str; 2] = ["ladder", "ripple"];
 
 /// A formula over drivers says what they do: of inputs, temperature, its rate and recent motion, and their products, a
 /// power, a dead zone, a knee, a hyperbolic tangent or a lag.
@@ -31,7 +33,7 @@ pub static SPOKEN: LazyLock<Vec<Effect>> = LazyLock::new(|| {
 
 /// No such formula says what they do: they remember, jump by chance, or hide between the samples.
 pub static UNSPOKEN: LazyLock<Vec<Effect>> = LazyLock::new(|| {
-    let mut list = of_rig(&OF_RIG_BEYOND);
+    let mut list = of_rig(&BEYOND_FORMULAS);
     for family in [aliasing::effect, battery::effect, dead_time::effect, preisach::effect, telegraph::effect]
     {
         list.extend(SensorKind::ALL.map(family));

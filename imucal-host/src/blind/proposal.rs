@@ -1,0 +1,138 @@
+//! Proposed formulas of a trial: whether each is what is there, and whether another recording of the same unit confirms it.
+//!
+//! ```text
+//! ρ = (λ(â + b̂) − λ(â − b̂)) / 4      â, b̂: what the formula and the truth change, each of λ = 1
+//! ```
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    case::Drawn,
+    lambda::{Signal, difference},
+    robot::{case::RobotDrawn, lambda::RobotLambda},
+};
+use crate::{
+    diagnosis::{
+        Diagnosis, Options, diagnose,
+        finding::{Proposal, ProposalStatus},
+        proposal::entry,
+    },
+    effect::{Act, Effect},
+    recording::{Recording, Stream},
+    simulator::{Dose, Simulation, SimulationError, robot::RobotScene},
+};
+
+/// Correlation of what a formula and the truth change from which on they are the same.
+pub const SAME: f64 = 0.95;
+
+/// What is kept of a proposal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Proposed {
+    /// `acc`, `gyr` or `mag`.
+    pub sensor: String,
+    /// The formula.
+    pub formula: String,
+    /// ρ, over all sensors; none where nothing is there.
+    pub correlation: Option<f64>,
+    /// Another recording of the same unit confirms it; none where that could not show it.
+    pub confirmed: Option<bool>,
+}
+
+impl Proposed {
+    /// It, or what this recording cannot distinguish from it, is there.
+    pub fn is_right(&self) -> bool {
+        self.correlation.is_some_and(|correlation| correlation > SAME)
+    }
+}
+
+/// The proposals of a diagnosis of the rig.
+///
+/// # Errors
+///
+/// [`SimulationError`], where a formula cannot be simulated.
+pub fn of_rig(drawn: &Drawn, diagnosis: &Diagnosis) -> Result<Vec<Proposed>, SimulationError> {
+    let (lambda, doses) = (&drawn.lambda, &drawn.simulation.doses);
+    let second = |options: &Options| {
+        let seed = drawn.simulation.seed.wrapping_add(1);
+        let recording = Simulation { seed, ..drawn.simulation.clone() }.record("second.csv")?;
+        Ok(diagnose(&recording, options, &|_| ()))
+    };
+    let of = |proposal: &Proposal| {
+        let signal = |doses: &[Dose]| Ok(difference(&lambda.run(doses)?, &lambda.healthy));
+        let square = |signal: &Signal| lambda.of(signal, &[]).iter().sum();
+        let correlation = correlation(doses, &entry::effects(&proposal.toml), &signal, &square)?;
+        proposed(proposal, correlation, &second)
+    };
+    diagnosis.proposals.iter().map(of).collect()
+}
+
+/// The proposals of a diagnosis of a robot.
+///
+/// # Errors
+///
+/// As [`of_rig`].
+pub fn of_robot(drawn: &RobotDrawn, diagnosis: &Diagnosis) -> Result<Vec<Proposed>, SimulationError> {
+    if diagnosis.proposals.is_empty() {
+        return Ok(Vec::new());
+    }
+    let lambda = RobotLambda::new(&drawn.scene)?;
+    let second = |options: &Options| {
+        let seed = drawn.scene.seed.wrapping_add(1);
+        let pair = RobotScene { seed, ..drawn.scene.clone() }.record("second")?;
+        let options = Options { stream: Stream::of(&pair.simulated), ..options.clone() };
+        Ok(diagnose(&pair.real as &Recording, &options, &|_| ()))
+    };
+    let of = |proposal: &Proposal| {
+        let signal = |doses: &[Dose]| Ok(difference(&lambda.run(doses)?, &lambda.healthy));
+        let square = |signal: &Signal| lambda.of(signal, &[]);
+        let effects = entry::effects(&proposal.toml);
+        let correlation = correlation(&drawn.scene.doses, &effects, &signal, &square)?;
+        proposed(proposal, correlation, &second)
+    };
+    diagnosis.proposals.iter().map(of).collect()
+}
+
+fn proposed(
+    proposal: &Proposal,
+    correlation: Option<f64>,
+    second: &dyn Fn(&Options) -> Result<Diagnosis, SimulationError>,
+) -> Result<Proposed, SimulationError> {
+    let effects = entry::effects(&proposal.toml);
+    let options = Options { effects, frozen: Some(proposal.toml.clone()), ..Options::default() };
+    // Without anything there, there is nothing to be confirmed.
+    let confirmed = match correlation {
+        Some(_) => second(&options)?.proposals.first().map(|found| found.status == ProposalStatus::Confirmed),
+        None => None,
+    };
+    Ok(Proposed {
+        sensor: proposal.sensor.clone(),
+        formula: proposal.formula.clone(),
+        correlation,
+        confirmed,
+    })
+}
+
+/// ρ of the true doses and of a proposal's effects as they were fitted; `None` where either changes nothing.
+fn correlation(
+    truth: &[Dose],
+    effects: &[&'static Effect],
+    signal: &dyn Fn(&[Dose]) -> Result<Signal, SimulationError>,
+    square: &dyn Fn(&Signal) -> f64,
+) -> Result<Option<f64>, SimulationError> {
+    let fitted: Vec<Dose> = effects.iter().filter_map(|effect| fitted(effect)).collect();
+    let unit = |doses: &[Dose]| -> Result<Option<Signal>, SimulationError> {
+        let signal = signal(doses)?;
+        let size = libm::sqrt(square(&signal));
+        Ok((size > 1e-6).then(|| signal.map(|values| values.iter().map(|v| v / size).collect())))
+    };
+    let (Some(truth), Some(formula)) = (unit(truth)?, unit(&fitted)?) else { return Ok(None) };
+    let opposite = formula.each_ref().map(|values| values.iter().map(|v| -v).collect());
+    Ok(Some(0.25 * (square(&difference(&truth, &opposite)) - square(&difference(&truth, &formula)))))
+}
+
+/// An effect with the values that its file gives.
+fn fitted(effect: &'static Effect) -> Option<Dose> {
+    let Act::Formula(_, formula) = effect.act else { return None };
+    let values = formula.fitted().iter().map(|fitted| fitted.map(|fitted| fitted.value));
+    Some(Dose { effect, values: values.collect::<Option<Vec<f64>>>()? })
+}
