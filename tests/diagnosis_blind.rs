@@ -6,11 +6,15 @@ use imucal_host::{
     blind::{
         case::{Case, Drawn, draw},
         judgement::Judgement,
+        robot::{judgement::RobotJudgement, score::score as robot_score, trial::RobotWorld},
         score::{Goal, Share, score},
         seal::Nonce,
-        trial::{Folder, mingled},
+        trial::{Folder, OwnEffects, mingled},
+        world::WorldKind,
     },
     diagnosis::{Diagnosis, Options, diagnose},
+    recording::Stream,
+    simulator::robot::RobotPair,
 };
 
 const HEALTHY: usize = 40;
@@ -69,6 +73,34 @@ fn a_small_set_of_sealed_trials_is_answered_as_the_contract_asks() {
         assert!(!is_refused(share), "{}: {} of {}", share.name, share.hits, share.trials);
     }
     assert!(judged.iter().all(|judged| judged.answer.verdict.is_some()), "a diagnosis came to no end");
+}
+
+const ROBOTS: (usize, usize) = (30, 24);
+const ROBOTS_NONCE: &str = "20261125";
+
+#[test]
+fn a_small_set_of_sealed_trials_with_robots_is_answered_as_the_contract_asks() {
+    let path = tempfile::tempdir().expect("a folder");
+    let nonce = Nonce::parse(ROBOTS_NONCE);
+    let folder = Folder::open_of(WorldKind::Robot, path.path(), nonce, OwnEffects::default());
+    let folder = folder.expect("a new set");
+    let jobs = std::thread::available_parallelism().map_or(1, usize::from);
+    let against_stream = |pair: &RobotPair| {
+        let stream = Stream::of(&pair.simulated);
+        diagnose(&pair.real, &Options { stream, ..Options::default() }, &|_| ())
+    };
+    let (healthy, afflicted) = ROBOTS;
+    let cases = mingled(healthy, afflicted);
+    folder.run_in(&RobotWorld(&against_stream), &cases, jobs, &|_| ()).expect("all cases run");
+    let judged: Vec<RobotJudgement> =
+        folder.finished().expect("sealed").iter().filter_map(RobotJudgement::of).collect();
+    assert_eq!(judged.len(), healthy + afflicted);
+    let score = robot_score(&judged);
+    println!("{}", score.table());
+    judged.iter().filter(|judged| judged.is_missed()).for_each(|judged| println!("{}", judged.line()));
+    for share in &score.shares {
+        assert!(!is_refused(share), "{}: {} of {}", share.name, share.hits, share.trials);
+    }
 }
 
 /// An afflicted case and its diagnosis.
