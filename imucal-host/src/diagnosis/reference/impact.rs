@@ -35,16 +35,16 @@ const MOST: f64 = 0.4;
 
 /// Impacts no further apart than this, s, are one.
 const ONE: f64 = 0.06;
-/// Of fewer impacts in all it is not known what is usual; so many in a row are looked at together at most, without a pause
-/// longer than this, s.
+/// Of fewer impacts in all it is not known what is usual; so many in a row are looked at together, without a pause longer than
+/// this, s.
 const FEWEST: usize = 20;
-const MOST_IN_ROW: usize = 30;
+const IN_ROW: [usize; 6] = [4, 6, 8, 12, 16, 24];
 const PAUSE: f64 = 3.0;
 /// ln of a ratio of sizes scatters by this at least.
 const LEAST_SCATTER: f64 = 0.3;
-/// One impact counts no more than so many standard deviations, and several in a row are unusual from so many on.
-const LARGEST: f64 = 3.0;
-const UNUSUAL: f64 = 5.5;
+/// One impact counts no more than so many standard deviations, and the mean of several in a row is unusual from so many on.
+const LARGEST: f64 = 4.0;
+const UNUSUAL: f64 = 6.5;
 
 /// The impacts of a recording and of the stream that it is compared with.
 #[derive(Clone, Debug, PartialEq)]
@@ -155,18 +155,18 @@ impl Strikes {
         if self.strikes.len() < FEWEST {
             return Vec::new();
         }
-        for from in 0..off.len() {
-            let mut sum = 0.0;
-            for to in from..off.len().min(from + MOST_IN_ROW) {
-                if to > from && self.strikes[to].time - self.strikes[to - 1].time > PAUSE {
-                    break;
-                }
-                sum += off[to];
-                let z = f64::abs(sum) / ((to + 1 - from) as f64).sqrt();
-                if z > UNUSUAL {
-                    found.push((from..to + 1, z));
-                }
-            }
+        for count in IN_ROW.into_iter().filter(|count| *count <= off.len()) {
+            let is_row = |from: &usize| {
+                self.strikes[*from..from + count].windows(2).all(|pair| pair[1].time - pair[0].time < PAUSE)
+            };
+            let mean = |from: usize| off[from..from + count].iter().sum::<f64>() / count as f64;
+            let rows: Vec<(usize, f64)> =
+                (0..=off.len() - count).filter(is_row).map(|from| (from, mean(from))).collect();
+            // Impacts in step with the samples are alike in a row: their mean scatters more than that of so many others.
+            let sizes = rows.iter().map(|(_, mean)| mean.abs()).collect();
+            let scatter = std_of_median(sizes).unwrap_or(0.0).max(1.0 / (count as f64).sqrt());
+            let unusual = rows.into_iter().map(|(from, mean)| (from..from + count, mean.abs() / scatter));
+            found.extend(unusual.filter(|(_, size)| *size > UNUSUAL));
         }
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
         let mut kept: Vec<(Range<usize>, f64)> = Vec::new();
