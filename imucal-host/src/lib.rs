@@ -11,7 +11,8 @@
 //!  samples,    │                                     ▼
 //!  manifest    │                                 diagnosis ──────────► blind
 //!              │                                 reference → screening → residual → mixed_model →
-//!              │                                 library → search → location → verdict
+//!              │                                 library → search → location → verdict →
+//!              │                                 proposal
 //!              ├─► observe ─► calibrate ─► store ─┬─► apply ─► device
 //!              │   rests,      acc, gyr, mag      │   corrects   the same on a
 //!              │   motions     fit, examination   │              microcontroller

@@ -130,7 +130,7 @@ impl Judgement {
     /// It is not what it ought to be.
     pub fn is_missed(&self) -> bool {
         match self.truth {
-            Truth::Healthy => self.alarmed,
+            Truth::Healthy => self.alarmed || self.formula_wrong,
             Truth::Catalogue(_) => !self.classes_right || self.flagged,
             Truth::Outside => !self.flagged || self.formula_wrong || (self.spoken && !self.formula_right),
         }

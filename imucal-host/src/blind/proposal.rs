@@ -136,3 +136,47 @@ fn fitted(effect: &'static Effect) -> Option<Dose> {
     let values = formula.fitted().iter().map(|fitted| fitted.map(|fitted| fitted.value));
     Some(Dose { effect, values: values.collect::<Option<Vec<f64>>>()? })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::effect::user;
+
+    /// An effect on two axes with these fitted amplitudes.
+    fn effect(fitted: [f64; 2]) -> &'static Effect {
+        let [x, y] = fitted.map(|value| format!("{{ value = {value:e}, std_error = 1e-3 }}"));
+        let text = format!(
+            "[[effect]]\nid = \"acc.own\"\nsensor = \"acc\"\naxes = [\"x\", \"y\"]\nformula = \"B\"\nunit = \"SI\"\n\
+             amplitude = {{ typical = 1.0, material = 0.1 }}\nfitted = {{ x = {x}, y = {y} }}\ncause = \"c\"\n\
+             remedy = \"r\"\n"
+        );
+        user::parse(&text, Path::new("own.toml")).unwrap()[0]
+    }
+
+    /// Of a run that changes two axes by the amplitudes alone.
+    fn correlated(truth: [f64; 2], formula: [f64; 2]) -> Option<f64> {
+        let signal = |doses: &[Dose]| {
+            let sum = |at: usize| doses.iter().map(|dose| dose.values[at]).sum();
+            Ok([vec![Vector3::new(sum(0), sum(1), 0.0)], Vec::new(), Vec::new()])
+        };
+        let square = |signal: &Signal| signal.iter().flatten().map(Vector3::norm_squared).sum();
+        let truth = Dose { effect: effect(formula), values: truth.to_vec() };
+        correlation(&[truth], &[effect(formula)], &signal, &square).unwrap()
+    }
+
+    #[test]
+    fn correlation_is_that_of_what_formula_and_truth_change() {
+        let close = |found: Option<f64>, expected: f64| {
+            assert!(found.is_some_and(|found| (found - expected).abs() < 1e-9), "{found:?} {expected}");
+        };
+        close(correlated([1.0, 2.0], [0.1, 0.2]), 1.0);
+        close(correlated([1.0, 2.0], [-0.1, -0.2]), -1.0);
+        close(correlated([1.0, 0.0], [0.0, 3.0]), 0.0);
+        close(correlated([1.0, 0.0], [1.0, 1.0]), 0.5f64.sqrt());
+        assert_eq!(correlated([0.0, 0.0], [1.0, 0.0]), None);
+    }
+}

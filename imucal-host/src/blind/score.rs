@@ -112,6 +112,10 @@ impl Figure {
         let hits = trials.iter().filter(|j| (self.hit)(j)).count();
         Share { name: self.name, hits, trials: trials.len(), must: self.must, aim: self.aim }
     }
+
+    const fn besides(name: &'static str, of: fn(&Judgement) -> bool, hit: fn(&Judgement) -> bool) -> Self {
+        Self { name, of, hit, must: None, aim: None }
+    }
 }
 
 fn is_healthy(j: &Judgement) -> bool {
@@ -242,118 +246,74 @@ const CONTRACT: [Figure; 15] = [
 
 /// Figures next to the contract's.
 const FURTHER: [Figure; 16] = [
-    Figure {
-        name: "one effect, class-correct, λ < 60",
-        of: |j| is_of_one(j) && (0.0..60.0).contains(&j.lambda),
-        hit: |j| j.classes_right,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "one effect, class-correct, λ 60 to 100",
-        of: |j| is_of_one(j) && (60.0..100.0).contains(&j.lambda),
-        hit: |j| j.classes_right,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "one effect, class-correct, λ 100 to 300",
-        of: |j| is_of_one(j) && (100.0..300.0).contains(&j.lambda),
-        hit: |j| j.classes_right,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "one effect, class-correct, λ 300 and more",
-        of: |j| is_of_one(j) && (300.0..f64::INFINITY).contains(&j.lambda),
-        hit: |j| j.classes_right,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "one effect, its class or a declared equivalent's, λ ≥ 100",
-        of: |j| is_of_one(j) && j.lambda >= 100.0,
-        hit: |j| j.right_or_equivalent,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "credible set, λ < 100",
-        of: |j| is_of_one(j) && (0.0..100.0).contains(&j.lambda),
-        hit: |j| j.credible,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "credible set, λ 100 to 300",
-        of: |j| is_of_one(j) && (100.0..300.0).contains(&j.lambda),
-        hit: |j| j.credible,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "credible set, λ 300 and more",
-        of: |j| is_of_one(j) && (300.0..f64::INFINITY).contains(&j.lambda),
-        hit: |j| j.credible,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "two effects, each λ ≥ 60 with the other fitted, exact",
-        of: |j| j.truth == Truth::Catalogue(2) && j.lambda_beside >= 60.0,
-        hit: |j| j.classes_right,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "three effects, each λ ≥ 60 with the others fitted, exact",
-        of: |j| j.truth == Truth::Catalogue(3) && j.lambda_beside >= 60.0,
-        hit: |j| j.classes_right,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "outside the catalogue, flagged, λ < 200",
-        of: |j| j.truth == Truth::Outside && j.lambda < 200.0,
-        hit: |j| j.flagged,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "causes without a closed share",
-        of: |j| j.closed.is_some(),
-        hit: |j| share_of(j).is_none(),
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "without an answer",
-        of: |_| true,
-        hit: |j| j.answer.verdict.is_none(),
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "outside, a formula says it, flagged, λ ≥ 200: right",
-        of: |j| j.spoken && j.flagged && j.lambda >= 200.0,
-        hit: |j| j.formula_right,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "outside, a formula says it: a wrong formula",
-        of: |j| j.spoken,
-        hit: |j| j.formula_wrong,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "a right formula, confirmed on a second recording",
-        of: |j| j.formula_right,
-        hit: |j| j.answer.proposals.iter().all(|proposed| proposed.confirmed == Some(true)),
-        must: None,
-        aim: None,
-    },
+    Figure::besides(
+        "one effect, class-correct, λ < 60",
+        |j| is_of_one(j) && (0.0..60.0).contains(&j.lambda),
+        |j| j.classes_right,
+    ),
+    Figure::besides(
+        "one effect, class-correct, λ 60 to 100",
+        |j| is_of_one(j) && (60.0..100.0).contains(&j.lambda),
+        |j| j.classes_right,
+    ),
+    Figure::besides(
+        "one effect, class-correct, λ 100 to 300",
+        |j| is_of_one(j) && (100.0..300.0).contains(&j.lambda),
+        |j| j.classes_right,
+    ),
+    Figure::besides(
+        "one effect, class-correct, λ 300 and more",
+        |j| is_of_one(j) && (300.0..f64::INFINITY).contains(&j.lambda),
+        |j| j.classes_right,
+    ),
+    Figure::besides(
+        "one effect, its class or a declared equivalent's, λ ≥ 100",
+        |j| is_of_one(j) && j.lambda >= 100.0,
+        |j| j.right_or_equivalent,
+    ),
+    Figure::besides(
+        "credible set, λ < 100",
+        |j| is_of_one(j) && (0.0..100.0).contains(&j.lambda),
+        |j| j.credible,
+    ),
+    Figure::besides(
+        "credible set, λ 100 to 300",
+        |j| is_of_one(j) && (100.0..300.0).contains(&j.lambda),
+        |j| j.credible,
+    ),
+    Figure::besides(
+        "credible set, λ 300 and more",
+        |j| is_of_one(j) && (300.0..f64::INFINITY).contains(&j.lambda),
+        |j| j.credible,
+    ),
+    Figure::besides(
+        "two effects, each λ ≥ 60 with the other fitted, exact",
+        |j| j.truth == Truth::Catalogue(2) && j.lambda_beside >= 60.0,
+        |j| j.classes_right,
+    ),
+    Figure::besides(
+        "three effects, each λ ≥ 60 with the others fitted, exact",
+        |j| j.truth == Truth::Catalogue(3) && j.lambda_beside >= 60.0,
+        |j| j.classes_right,
+    ),
+    Figure::besides(
+        "outside the catalogue, flagged, λ < 200",
+        |j| j.truth == Truth::Outside && j.lambda < 200.0,
+        |j| j.flagged,
+    ),
+    Figure::besides("causes without a closed share", |j| j.closed.is_some(), |j| share_of(j).is_none()),
+    Figure::besides("without an answer", |_| true, |j| j.answer.verdict.is_none()),
+    Figure::besides(
+        "outside, a formula says it, flagged, λ ≥ 200: right",
+        |j| j.spoken && j.flagged && j.lambda >= 200.0,
+        |j| j.formula_right,
+    ),
+    Figure::besides("outside, a formula says it: a wrong formula", |j| j.spoken, |j| j.formula_wrong),
+    Figure::besides(
+        "a right formula, confirmed on a second recording",
+        |j| j.formula_right,
+        |j| j.answer.proposals.iter().all(|proposed| proposed.confirmed == Some(true)),
+    ),
 ];
 
 /// Scores judged trials.

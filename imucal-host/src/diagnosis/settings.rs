@@ -206,8 +206,10 @@ pub struct ProposalSettings {
     pub least_gain: f64,
     /// Share of what is left of its sensor's gap that it closes at least, on stretches that no fit has seen.
     pub least_share: f64,
-    /// Standard errors from zero of the amplitudes that it keeps.
+    /// Standard errors from zero of its largest amplitude, at least.
     pub amplitude_errors: f64,
+    /// An axis whose amplitude is fewer standard errors from zero is left out.
+    pub kept_errors: f64,
     /// What the sensor still follows beside it is at most this share of what it explains. Larger: more wrong formulas.
     pub remainder: f64,
 }
@@ -297,7 +299,7 @@ impl Default for LocationSettings {
 impl Default for ProposalSettings {
     /// That of any source.
     fn default() -> Self {
-        Self { least_gain: 8.0, least_share: 0.5, amplitude_errors: 3.0, remainder: 0.1 }
+        Self { least_gain: 8.0, least_share: 0.5, amplitude_errors: 4.0, kept_errors: 2.0, remainder: 0.1 }
     }
 }
 

@@ -84,7 +84,7 @@ impl RobotJudgement {
     /// It is not what it ought to be.
     pub fn is_missed(&self) -> bool {
         let wrong = match self.label.content {
-            Content::Healthy => self.alarmed,
+            Content::Healthy => self.alarmed || self.formula_wrong,
             Content::Effect => !self.class_right,
             Content::Motion => !self.motion_said,
             Content::Spoken => !self.flagged || !self.formula_right,

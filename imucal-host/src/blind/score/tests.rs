@@ -3,6 +3,7 @@ use crate::{
     blind::{
         answer::{Answer, Finished, tests::asserting},
         case::{Label, Present, Setting},
+        proposal::Proposed,
     },
     diagnosis::Verdict,
 };
@@ -55,6 +56,19 @@ const TWO: [(&str, f64); 2] = [("acc.lever_arm", 400.0), ("gyr.warmup", 90.0)];
 const THREE: [(&str, f64); 3] = [("acc.lever_arm", 400.0), ("gyr.warmup", 90.0), ("mag.transient", 1200.0)];
 const OUTSIDE: [(&str, f64); 1] = [("outside.gyr.ripple", 900.0)];
 
+const SPOKEN: [(&str, f64); 1] = [("outside.acc.crosstalk", 900.0)];
+
+/// A verdict that something unknown is there, with a formula of this correlation with the truth.
+fn proposing(correlation: f64) -> Answer {
+    let proposed = Proposed {
+        sensor: "acc".to_owned(),
+        formula: "k * B_x".to_owned(),
+        correlation: Some(correlation),
+        confirmed: Some(true),
+    };
+    Answer { proposals: vec![proposed], ..naming(Verdict::Unknown, &[]) }
+}
+
 fn ids<const N: usize>(effects: [(&'static str, f64); N]) -> Vec<&'static str> {
     effects.iter().map(|(id, _)| *id).collect()
 }
@@ -73,6 +87,7 @@ fn perfect() -> Vec<Judgement> {
     set.push(judged(&TWO, naming(Verdict::Explained, &ids(TWO)), None));
     set.push(judged(&THREE, naming(Verdict::Explained, &ids(THREE)), None));
     set.push(judged(&OUTSIDE, naming(Verdict::Unknown, &[]), None));
+    set.push(judged(&SPOKEN, proposing(0.99), None));
     set
 }
 
@@ -90,7 +105,7 @@ fn missed(set: &[Judgement]) -> Vec<&'static str> {
 fn a_perfect_set_misses_nothing() {
     assert_eq!(missed(&perfect()), Vec::<&str>::new());
     let score = score(&perfect());
-    assert_eq!(score.trials, [HEALTHY, 23]);
+    assert_eq!(score.trials, [HEALTHY, 24]);
     let (bias, _, count) = score.closed_bias.unwrap();
     assert!((bias + 0.09 / 20.0).abs() < 1e-12 && count == 20, "{bias}");
 }
@@ -134,6 +149,13 @@ fn every_figure_can_be_missed_alone_or_with_those_that_follow_from_it() {
         spoilt(&OUTSIDE, naming(Verdict::Explained, &["gyr.warmup"]), None),
         ["outside the catalogue, flagged, λ ≥ 200", "outside the catalogue, flagged, λ > 800"]
     );
+    const FORMULA: [&str; 1] = ["outside, a formula says it, λ ≥ 200: it or its equal"];
+    assert_eq!(spoilt(&SPOKEN, naming(Verdict::Unknown, &[]), None), FORMULA);
+    assert_eq!(spoilt(&SPOKEN, proposing(0.9), None), FORMULA);
+    let wrong = "outside, no formula says it: no wrong formula";
+    assert_eq!(spoilt(&OUTSIDE, proposing(0.9), None), [wrong]);
+    let healthy = Answer { verdict: Some(Verdict::None), ..proposing(0.0) };
+    assert_eq!(spoilt(&[], healthy, None), ["proposals on healthy recordings"]);
     let flagged = naming(Verdict::Partly, &ids(ONE));
     assert_eq!(spoilt(&ONE, flagged, Some(0.9)), ["within the catalogue, flagged"]);
     assert_eq!(
@@ -170,7 +192,8 @@ fn a_diagnosis_that_came_to_no_end_is_an_alarm_and_a_miss() {
     assert!(crashed.alarmed && crashed.is_missed());
     let crashed = judged(&ONE, Answer::of(None), None);
     assert!(!crashed.classes_right && !crashed.credible && crashed.is_missed());
-    assert_eq!(score(&[crashed]).further.last().unwrap().hits, 1);
+    let further = score(&[crashed]).further;
+    assert_eq!(further.iter().find(|share| share.name == "without an answer").unwrap().hits, 1);
 }
 
 #[test]

@@ -86,7 +86,10 @@ impl Setting<'_> {
             Act::Clock(_) if !provided.table => return Some("there is no clock but the sensors' own"),
             _ => {}
         }
-        if heading && !provided.heading {
+        let field_alone = matches!(effect.act, Act::Formula(..))
+            && provided.gives_field()
+            && self.kinds.contains(&SensorKind::Mag);
+        if heading && !provided.heading && !field_alone {
             Some("the heading is not known, so that Earth's rotation is not known in the sensor's axes")
         } else if thermometer && !self.thermometer {
             Some("no temperature was recorded")

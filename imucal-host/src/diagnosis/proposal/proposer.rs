@@ -71,7 +71,7 @@ pub fn proposed(
         held: Held {
             gimbals: scene.swings.is_some(),
             temperature,
-            field: scene.settings.source.heading && scene.kinds.contains(&SensorKind::Mag),
+            field: scene.settings.source.gives_field() && scene.kinds.contains(&SensorKind::Mag),
         },
         origin: &diagnosis.recording,
     };
@@ -157,8 +157,8 @@ impl<'s> Setting<'_, 's> {
         log_odds: f64,
     ) -> Result<Result<Proposal, String>, DiagnosisError> {
         let (by, kind, best) = (self.settings(), start.problem.kind, &found.best);
-        let axes = best.axes(by.amplitude_errors);
-        if axes.is_empty() {
+        let axes = best.axes(by.kept_errors);
+        if best.axes(by.amplitude_errors).is_empty() {
             return Ok(Err(format!(
                 "the {kind} follows something, and no formula's amplitudes differ from zero"
             )));

@@ -103,7 +103,8 @@ impl Driver {
         let unit = match text {
             "tanh($ / s)" => String::new(),
             _ if power.is_empty() => self.unit.clone(),
-            _ => format!("({}){power}", self.unit),
+            _ if self.unit.contains(['/', ' ']) => format!("({}){power}", self.unit),
+            _ => format!("{}{power}", self.unit),
         };
         Formulated {
             name: format!("{name}_of_{}", self.name),
@@ -200,7 +201,12 @@ impl Formulated {
     /// Unit of its amplitudes.
     pub fn amplitude_unit(&self, kind: SensorKind) -> String {
         let sensor = crate::recording::Unit::of(kind).first().map(ToString::to_string).unwrap_or_default();
-        if self.unit.is_empty() { sensor } else { format!("{sensor}/({})", self.unit) }
+        let is_one = self.unit.starts_with('(') || !self.unit.contains('/');
+        match self.unit.is_empty() {
+            true => sensor,
+            false if is_one && !self.unit.contains(' ') => format!("{sensor}/{}", self.unit),
+            false => format!("{sensor}/({})", self.unit),
+        }
     }
 }
 
@@ -247,7 +253,7 @@ mod tests {
         let cube = next.function("cube", "$^3", 2, None);
         assert_eq!(cube.spelt(&[2]), "k * y_x^3");
         assert_eq!(cube.spelt(&[0, 1]), "x: k_x * y_y^3; y: k_y * y_z^3");
-        assert_eq!(cube.amplitude_unit(SensorKind::Mag), "uT/((uT)^3)");
+        assert_eq!(cube.amplitude_unit(SensorKind::Mag), "uT/uT^3");
         let own = Driver::vector("a", 0, "m/s^2").times(&next).itself(2);
         assert_eq!(own.spelt(&[1]), "k * a_y * y_z");
         assert_eq!(own.texts(0, &[1]), ["a_y * y_z"]);

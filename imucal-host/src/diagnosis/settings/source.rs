@@ -58,3 +58,10 @@ pub struct Provided {
     /// An attitude without noise or a filter of its own.
     pub exact_attitude: bool,
 }
+
+impl Provided {
+    /// Where there is a magnetometer, the field in the sensor's axes: by the heading, or as a stream holds it.
+    pub fn gives_field(&self) -> bool {
+        self.heading || self.followed
+    }
+}

@@ -2,6 +2,7 @@ use super::*;
 use crate::{
     blind::{
         answer::{Answer, Asserted, Finished},
+        proposal::Proposed,
         robot::case::{Departed, RobotLabel, RobotPresent, RobotSetting},
     },
     diagnosis::Verdict,
@@ -56,10 +57,24 @@ fn judged(content: Content, verdict: Verdict, ids: &[&str], delay: Option<(f64, 
     };
     let mut causes: Vec<Asserted> = ids.iter().map(|id| cause(id, None)).collect();
     causes.extend(delay.map(|delay| cause("clk.time_offset", Some(delay))));
-    let answer = Answer { verdict: Some(verdict), causes, ..Answer::of(None) };
+    answered(content, Answer { verdict: Some(verdict), causes, ..Answer::of(None) })
+}
+
+fn answered(content: Content, answer: Answer) -> RobotJudgement {
     let label = serde_json::to_string(&label(content)).unwrap();
     let trial = Finished { case: "case".to_owned(), label, answer, truly_closed: None, seconds: 1.0 };
     RobotJudgement::of(&trial).unwrap()
+}
+
+/// The same with a formula of this correlation with the truth.
+fn proposing(judged: &RobotJudgement, correlation: f64) -> RobotJudgement {
+    let proposed = Proposed {
+        sensor: "acc".to_owned(),
+        formula: "k * a_x".to_owned(),
+        correlation: Some(correlation),
+        confirmed: None,
+    };
+    answered(judged.label.content, Answer { proposals: vec![proposed], ..judged.answer.clone() })
 }
 
 fn perfect() -> Vec<RobotJudgement> {
@@ -68,7 +83,7 @@ fn perfect() -> Vec<RobotJudgement> {
         judged(Content::Healthy, Verdict::Explained, &[], right),
         judged(Content::Effect, Verdict::Explained, &["gyr.g_sensitivity"], right),
         judged(Content::Motion, Verdict::Explained, &["ref.motion_mismatch"], right),
-        judged(Content::Spoken, Verdict::Unknown, &[], right),
+        proposing(&judged(Content::Spoken, Verdict::Unknown, &[], right), 0.99),
         judged(Content::Unspoken, Verdict::Partly, &[], right),
     ]
 }
@@ -101,6 +116,10 @@ fn each_figure_can_be_missed() {
     let two = ["ref.motion_mismatch", "acc.bias_step"];
     assert_eq!(missed(2, judged(Content::Motion, Verdict::Explained, &two, right)), [3]);
     assert_eq!(missed(2, judged(Content::Motion, Verdict::Unknown, &[], right)), [3]);
+    assert_eq!(missed(3, judged(Content::Spoken, Verdict::Unknown, &[], right)), [4]);
+    for (at, figure) in [(0, 6), (3, 4), (4, 5)] {
+        assert_eq!(missed(at, proposing(&perfect()[at], 0.5)), [figure]);
+    }
     // Not reported, too far by its errors, and too far by itself.
     for delay in [None, Some((0.0104, 1e-4)), Some((0.0125, 1e-3))] {
         assert_eq!(missed(0, judged(Content::Healthy, Verdict::None, &[], delay)), [2], "{delay:?}");
