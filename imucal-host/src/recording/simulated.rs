@@ -43,8 +43,24 @@ impl Simulated {
             || self.temperature.as_ref().is_some_and(|temperature| !temperature[row].is_nan())
     }
 
+    /// Whether a row, other than the first, holds the same as the one before.
+    #[must_use]
+    pub fn is_repeated(&self, row: usize) -> bool {
+        let same = |kind: &SensorKind| self.sensor(*kind).is_none_or(|values| values[row] == values[row - 1]);
+        SensorKind::ALL.iter().all(same)
+    }
+
+    /// Without sensors that no row knows anything of.
+    #[must_use]
+    fn without_empty(self) -> Self {
+        let known = |values: &Vec<Vector3<f64>>| values.iter().flatten().any(|value| !value.is_nan());
+        let [acc, gyr, mag] = [self.acc, self.gyr, self.mag].map(|values| values.filter(known));
+        Self { acc, gyr, mag, temperature: self.temperature }
+    }
+
     /// Some of the rows.
-    fn at(&self, rows: &[usize]) -> Self {
+    #[must_use]
+    pub fn at(&self, rows: &[usize]) -> Self {
         let values = |column: &Option<Vec<Vector3<f64>>>| -> Option<Vec<Vector3<f64>>> {
             column.as_ref().map(|column| rows.iter().map(|row| column[*row]).collect())
         };
@@ -90,7 +106,8 @@ impl Stream {
         Some(Self {
             name: named.unwrap_or_else(|| recording.name.clone()),
             time: rows.iter().map(|row| recording.time[*row]).collect(),
-            values: if rows.len() == recording.rows() { values.clone() } else { values.at(&rows) },
+            values: if rows.len() == recording.rows() { values.clone() } else { values.at(&rows) }
+                .without_empty(),
         })
     }
 }

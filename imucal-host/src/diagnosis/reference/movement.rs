@@ -34,8 +34,6 @@ pub struct Reference {
     pub movement: Box<dyn Recorded>,
     /// The rests that it is reconstructed from, where neither encoders nor a reference attitude were recorded.
     pub held: Option<RestToRest>,
-    /// What a reader ought to know of it.
-    pub remarks: Vec<String>,
 }
 
 /// The movement of a recording, of `stream` where a simulator gives one; a reference attitude and a stream are read by
@@ -60,14 +58,10 @@ pub fn reference(
         field_n: site.field_ned_ut.unwrap_or_default().into(),
     };
     let temperature = recording.temperature.clone().unwrap_or_else(|| vec![25.0; recording.rows()]);
-    let (mut held, mut remarks) = (None, Vec::new());
+    let mut held = None;
     let sources = (stream, recording.gimbal.as_deref(), recording.reference.as_deref());
     let movement: Box<dyn Recorded> = match sources {
-        (Some(stream), ..) => {
-            let given = stream::movement(recording, stream, clock, temperature, place)?;
-            remarks = given.remarks;
-            Box::new(given.movement)
-        }
+        (Some(stream), ..) => Box::new(stream::movement(recording, stream, clock, temperature, place)?),
         (None, Some(gimbal), _) => {
             let axes = axes(recording)?;
             if recording.mag.is_some() && site.field_ned_ut.is_none() {
@@ -120,7 +114,7 @@ pub fn reference(
     if !movement.moving().iter().any(|moves| *moves) {
         return Err("the rig does not move: no effect can be distinguished from a bias".to_owned());
     }
-    Ok(Reference { movement, held, remarks })
+    Ok(Reference { movement, held })
 }
 
 /// Positions of `offset` later, s, on the straight line between two rows; NaN where either of them is missing.

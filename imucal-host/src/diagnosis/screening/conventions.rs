@@ -23,7 +23,8 @@ mod stuck_samples;
 mod tests;
 mod unit_error;
 
-use self::pairs::Pairs;
+use self::{gimbal_order::FOLLOWS, pairs::Pairs};
+use super::stream_conventions::axes as stream_axes;
 
 /// No finding is made above this probability of as much by chance.
 const SURE: f64 = 1e-6;
@@ -74,8 +75,9 @@ pub struct Conventions {
     pub findings: Vec<Finding>,
     /// What else a reader ought to know.
     pub remarks: Vec<String>,
-    /// Code of the turn, as `axis_swap` counts them, that all triads share: that of the mount.
-    pub turned: Option<usize>,
+    /// Code of the turn, as `axis_swap` counts them, that all triads share: that of the mount; and the upper bound of the
+    /// probability that there is none.
+    pub turned: Option<(usize, f64)>,
     /// A sensor that cannot be compared with the movement, since that does not hold what it was given.
     pub beyond_movement: Option<SensorKind>,
     /// How the encoders contradict every sensor: no baseline fits before that is mended.
@@ -104,6 +106,34 @@ fn rows(recording: &Recording) -> Vec<usize> {
 
 fn truth(recording: &Recording, motion: &dyn Motion, rows: &[usize], offset: f64) -> Vec<Truth> {
     rows.iter().map(|row| motion.truth(recording.time[*row] + offset, &|_| ())).collect()
+}
+
+/// Axes against those of a simulator's stream. A turn that all sensors share is named for each of them, since nothing
+/// but the mount that the simulator was given says how the unit sits.
+fn against_stream(
+    recording: &Recording,
+    motion: &dyn Motion,
+    pairs: &[Option<Pairs>; 3],
+    found: &mut Conventions,
+) {
+    if let Some((code, p_value)) = found.turned.take() {
+        found.remarks = vec![stream_axes::turned(code)];
+        let is_turned = |kind: &SensorKind| recording.sensor(*kind).is_some() && motion.gives(*kind);
+        let named = SensorKind::ALL.into_iter().filter(is_turned);
+        let named = named.filter_map(|kind| axis_swap::finding(kind, code, p_value));
+        found.findings.extend(named);
+        return;
+    }
+    let codes: Vec<(SensorKind, usize)> = found.findings.iter().filter_map(axis_swap::code_of).collect();
+    if !codes.is_empty() {
+        found.remarks.push(stream_axes::apart(&codes));
+        return;
+    }
+    let mounted = |kind: SensorKind| {
+        let moments = pairs[kind as usize].as_ref()?.trusted().moments();
+        stream_axes::mounted(kind, &moments.cross).filter(|_| moments.unexplained() < FOLLOWS)
+    };
+    found.remarks.extend([SensorKind::Gyr, SensorKind::Acc].into_iter().find_map(mounted));
 }
 
 /// Checks a recording against a movement that was reconstructed from it or recorded with it.
@@ -136,6 +166,9 @@ pub fn check(
         Some(remark) => found.contradiction = Some(remark),
         None => {
             let scales = axis_swap::check(&pairs, &mut found);
+            if source.followed {
+                against_stream(recording, motion, &pairs, &mut found);
+            }
             for (kind, scale) in SensorKind::ALL.into_iter().zip(scales) {
                 if let (Some(scale), Some(triple)) = (scale, recording.sensor(kind)) {
                     unit_error::check(kind, triple.unit, &scale, &mut found);

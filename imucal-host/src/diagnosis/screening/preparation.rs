@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::{
     bandwidth, conventions,
     conventions::{Conventions, Finding},
-    reference_offset,
+    reference_offset, stream_conventions,
 };
 use crate::{
     diagnosis::{
@@ -69,6 +69,10 @@ impl Preparation {
         let model = model.map(|model| Model::new(recording, model)).transpose();
         let model = model.map_err(DiagnosisError::Recording)?.unwrap_or_default();
         let integrity = integrity::inspect(recording);
+        let (fresh, repeated) = stream.map(stream_conventions::held::fresh).unzip();
+        let stream = fresh.as_deref();
+        let of_stream = stream.map(|stream| stream_conventions::check(recording, stream)).transpose();
+        let of_stream = of_stream.map_err(DiagnosisError::Recording)?.unwrap_or_default();
         let of_bandwidth = |clock: StreamClock, bandwidth: f64| {
             movement::reference(recording, &integrity, &model, stream, clock, bandwidth)
                 .map_err(DiagnosisError::Recording)
@@ -88,7 +92,12 @@ impl Preparation {
         if stream.is_none() && recording.position.is_some() {
             as_read = bandwidth::best(recording, &integrity, as_read, &|width| of_bandwidth(clock, width))?;
         }
-        let Reference { movement, held, remarks: of_reference } = as_read;
+        let Reference { movement, held } = as_read;
+        let lacks =
+            stream.and_then(|given| stream_conventions::gravity::missing(recording, given, &*movement));
+        if let Some(lacks) = lacks {
+            return Err(DiagnosisError::Recording(lacks));
+        }
         let conventions = conventions::check(recording, &integrity, &*movement, settings.source);
         if let Some(contradiction) = conventions.contradiction {
             return Err(DiagnosisError::Recording(contradiction));
@@ -97,7 +106,8 @@ impl Preparation {
         if let Some(kind) = conventions.beyond_movement {
             usable[kind as usize].fill(false);
         }
-        for kind in SensorKind::ALL.into_iter().filter(|kind| !movement.gives(*kind)) {
+        let left_out = |kind: &SensorKind| !movement.gives(*kind) || of_stream.left_out[*kind as usize];
+        for kind in SensorKind::ALL.into_iter().filter(left_out) {
             usable[kind as usize].fill(false);
         }
         for usable in &mut usable {
@@ -111,7 +121,7 @@ impl Preparation {
                 }
             }
         }
-        if let Some(turn) = conventions.turned.and_then(axis_swap::signed_permutation) {
+        if let Some(turn) = conventions.turned.and_then(|(code, _)| axis_swap::signed_permutation(code)) {
             triads.iter_mut().for_each(|triad| triad.gain = turn.tr_mul(&triad.gain));
         }
         for finding in &conventions.findings {
@@ -121,7 +131,8 @@ impl Preparation {
             return Err(DiagnosisError::Recording("no sensor has a usable row".to_owned()));
         }
         let mut remarks = conventions.remarks;
-        remarks.extend(of_reference);
+        remarks.extend(repeated.flatten());
+        remarks.extend(of_stream.remarks.iter().cloned());
         remarks.extend(model.remark.clone());
         // A machine's attitudes are no rests of a table, whose pointing errors repeat.
         remarks.extend(revisits::remark(&*movement).filter(|_| settings.noise.scatters));

@@ -45,15 +45,27 @@ pub(crate) fn check(pairs: &[Option<Pairs>; 3], found: &mut Conventions) -> [Opt
     });
     if let Some(code) = turned {
         found.remarks.push(turned_words(*code, codes.len()));
-        found.turned = Some(*code);
+        let least = orders.iter().flatten().map(|order| order.p_value).fold(1.0, f64::min);
+        found.turned = Some((*code, least));
     } else {
         for (kind, order) in SensorKind::ALL.into_iter().zip(&orders) {
             let Some(order) = order.filter(|order| order.code != 0 && order.p_value < SURE) else { continue };
-            let value = [(Some(order.code as f64), Some(0.0))];
-            found.findings.extend(Finding::new(&format!("{kind}.axis_swap"), &value, order.p_value));
+            found.findings.extend(finding(kind, order.code, order.p_value));
         }
     }
     orders.map(|order| order.map(|order| order.scale))
+}
+
+/// A sensor's axes are those of a code.
+pub(crate) fn finding(kind: SensorKind, code: usize, p_value: f64) -> Option<Finding> {
+    Finding::new(&format!("{kind}.axis_swap"), &[(Some(code as f64), Some(0.0))], p_value)
+}
+
+/// The sensor and code of such a finding; `None` of another one.
+pub(crate) fn code_of(finding: &Finding) -> Option<(SensorKind, usize)> {
+    let kind = *finding.effect.sensors.first()?;
+    let is_swap = finding.effect.id == format!("{kind}.axis_swap");
+    Some((kind, finding.parameters.first()?.value.filter(|_| is_swap)? as usize))
 }
 
 /// All triads agree on a turn that a mount can have.
