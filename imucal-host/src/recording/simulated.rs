@@ -2,7 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::{Recording, sensor_kind::SensorKind};
+use super::{
+    Recording,
+    sensor_kind::SensorKind,
+    topic::{self, TopicError},
+};
 
 /// Values of ideal sensors, in the simulated sensor's axes. All columns that are there are of one length.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -52,7 +56,7 @@ impl Simulated {
 
     /// Without sensors that no row knows anything of.
     #[must_use]
-    fn without_empty(self) -> Self {
+    pub fn without_empty(self) -> Self {
         let known = |values: &Vec<Vector3<f64>>| values.iter().flatten().any(|value| !value.is_nan());
         let [acc, gyr, mag] = [self.acc, self.gyr, self.mag].map(|values| values.filter(known));
         Self { acc, gyr, mag, temperature: self.temperature }
@@ -117,12 +121,32 @@ impl Stream {
     /// on those of the recording.
     #[must_use]
     pub fn beside(simulated: &Recording, recording: &Recording) -> Option<Self> {
-        let mut stream = Self::of(simulated)?;
+        Some(Self::of(simulated)?.on_times_of(simulated, recording))
+    }
+
+    /// The stream of a topic of such a file.
+    ///
+    /// # Errors
+    ///
+    /// [`TopicError`].
+    pub fn of_topic(simulated: &Recording, recording: &Recording, name: &str) -> Result<Self, TopicError> {
+        let values = topic::simulated(simulated, name)?;
+        let rows: Vec<usize> = (0..simulated.rows()).filter(|row| values.knows(*row)).collect();
+        let stream = Self {
+            name: name.to_owned(),
+            time: rows.iter().map(|row| simulated.time[*row]).collect(),
+            values: values.at(&rows).without_empty(),
+        };
+        Ok(stream.on_times_of(simulated, recording))
+    }
+
+    /// On the times of a recording, where both files have absolute times.
+    fn on_times_of(mut self, simulated: &Recording, recording: &Recording) -> Self {
         if let (Some(own), Some(others)) = (simulated.epoch, recording.epoch) {
             let later = own.since(others);
-            stream.time.iter_mut().for_each(|time| *time += later);
+            self.time.iter_mut().for_each(|time| *time += later);
         }
-        Some(stream)
+        self
     }
 }
 
