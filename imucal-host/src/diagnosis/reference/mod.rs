@@ -8,6 +8,7 @@
 //! | --- | --- |
 //! | [`model`] | the simulator's present model of the unit: a stored calibration as triads in SI |
 //! | [`movement`] | which of the movements a recording has, and its place on Earth |
+//! | [`pose`] | attitudes and positions of a reference |
 //! | [`rest_to_rest`] | a movement reconstructed from the sensor's own rests and turns (this runs a whole calibration) |
 //! | [`stream`] | the movement of a simulator's stream |
 //! | [`stream_clock`] | its clock against that of the sensor, roughly |
@@ -19,6 +20,7 @@
 
 pub mod model;
 pub mod movement;
+pub mod pose;
 pub mod rest_to_rest;
 pub mod revisits;
 pub mod stream;

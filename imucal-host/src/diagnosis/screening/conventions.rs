@@ -45,7 +45,7 @@ pub struct Finding {
 impl Finding {
     /// Of an effect's id, with its parameters' values and standard errors. `None` where the catalogue has no such
     /// effect or another number of parameters.
-    fn new(id: &str, values: &[(Option<f64>, Option<f64>)], p_value: f64) -> Option<Self> {
+    pub(super) fn new(id: &str, values: &[(Option<f64>, Option<f64>)], p_value: f64) -> Option<Self> {
         let effect = effect::find(id)?;
         let parameters: Vec<Amount> = effect
             .parameters
@@ -114,15 +114,27 @@ fn against_stream(
     recording: &Recording,
     motion: &dyn Motion,
     pairs: &[Option<Pairs>; 3],
+    acc: Option<&Pairs>,
     found: &mut Conventions,
 ) {
+    let acc = acc.filter(|_| motion.gives(SensorKind::Acc));
     if let Some((code, p_value)) = found.turned.take() {
-        found.remarks = vec![stream_axes::turned(code)];
-        let is_turned = |kind: &SensorKind| recording.sensor(*kind).is_some() && motion.gives(*kind);
-        let named = SensorKind::ALL.into_iter().filter(is_turned);
-        let named = named.filter_map(|kind| axis_swap::finding(kind, code, p_value));
-        found.findings.extend(named);
-        return;
+        found.remarks.clear();
+        let other = acc.and_then(|pairs| axis_swap::against_gravity(pairs, code));
+        let is_there = |kind: &SensorKind| recording.sensor(*kind).is_some() && motion.gives(*kind);
+        for kind in SensorKind::ALL.into_iter().filter(is_there) {
+            let own = if kind == SensorKind::Acc { other.unwrap_or(code) } else { code };
+            let finding = axis_swap::finding(kind, own, p_value).filter(|_| own != 0);
+            found.findings.extend(finding);
+        }
+        if other.is_none() {
+            found.remarks.push(stream_axes::turned(code));
+            return;
+        }
+    } else if !found.findings.iter().any(|finding| finding.effect.sensors.contains(&SensorKind::Acc)) {
+        // Gravity shows what a movement without much acceleration does not.
+        let code = acc.and_then(|pairs| axis_swap::against_gravity(pairs, 0));
+        found.findings.extend(code.and_then(|code| axis_swap::finding(SensorKind::Acc, code, 0.0)));
     }
     let codes: Vec<(SensorKind, usize)> = found.findings.iter().filter_map(axis_swap::code_of).collect();
     if !codes.is_empty() {
@@ -159,6 +171,8 @@ pub fn check(
         found.remarks.push(remark);
         found.beyond_movement = Some(SensorKind::Acc);
         pairs[SensorKind::Acc as usize] = None;
+    } else if !source.position && !source.gimbals && source.heading {
+        found.remarks.extend(carried_about::left_open(recording, integrity, &rows, &truth));
     }
     let contradicted = || gimbal_order::remark(recording, integrity, motion, &rows, &truth, &pairs);
     match if source.followed { None } else { contradicted() } {
@@ -167,7 +181,8 @@ pub fn check(
         None => {
             let scales = axis_swap::check(&pairs, &mut found);
             if source.followed {
-                against_stream(recording, motion, &pairs, &mut found);
+                let acc = Pairs::all(recording, integrity, SensorKind::Acc, &rows, &truth);
+                against_stream(recording, motion, &pairs, acc.as_ref(), &mut found);
             }
             for (kind, scale) in SensorKind::ALL.into_iter().zip(scales) {
                 if let (Some(scale), Some(triple)) = (scale, recording.sensor(kind)) {

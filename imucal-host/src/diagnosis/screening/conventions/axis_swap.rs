@@ -17,6 +17,9 @@ const MARGIN: f64 = 6.0;
 /// The best must leave no more than this share of the samples' variance.
 const LEFT: f64 = 0.1;
 
+/// An accelerometer's mean is off by less than this share of gravity, where its axes are right.
+const OFF_GRAVITY: f64 = 0.5;
+
 /// How a triad relates to what it was given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Scale {
@@ -54,6 +57,26 @@ pub(crate) fn check(pairs: &[Option<Pairs>; 3], found: &mut Conventions) -> [Opt
         }
     }
     orders.map(|order| order.map(|order| order.scale))
+}
+
+/// The code under which an accelerometer senses gravity where it should and follows the rest best, where that is not the
+/// given one: its axes are others than those of the other sensors. `None` where it shares theirs.
+pub(crate) fn against_gravity(pairs: &Pairs, code: usize) -> Option<usize> {
+    let (felt, given) = pairs.means();
+    let off = |code: usize| {
+        axis_swap::signed_permutation(code).map_or(f64::INFINITY, |p| (felt - p * given).norm())
+    };
+    let most = OFF_GRAVITY * given.norm();
+    if off(code) < most {
+        return None;
+    }
+    let moments = pairs.trusted().moments();
+    let left = |code: &usize| {
+        let p = axis_swap::signed_permutation(*code).unwrap_or_else(Matrix3::identity);
+        -(p.transpose() * moments.cross).trace()
+    };
+    let upright = (0..axis_swap::CODES).filter(|code| off(*code) < most);
+    upright.min_by(|a, b| left(a).total_cmp(&left(b)))
 }
 
 /// A sensor's axes are those of a code.

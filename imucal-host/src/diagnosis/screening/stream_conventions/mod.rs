@@ -26,6 +26,8 @@ use crate::recording::{Recording, SensorKind, Stream};
 pub struct StreamFaults {
     /// What a reader ought to know.
     pub remarks: Vec<String>,
+    /// Noise of its own is on it, row by row.
+    pub noisy: bool,
     /// Sensors that cannot be compared with the stream, by [`SensorKind::ALL`].
     pub left_out: [bool; 3],
 }
@@ -51,6 +53,16 @@ pub fn check(recording: &Recording, stream: &Stream) -> Result<StreamFaults, Str
             found.remarks.push(remark);
         }
     }
-    found.remarks.extend(own_noise::remarks(recording, stream));
+    let (noise, steps) = (own_noise::noise(recording, stream), own_noise::steps(recording, stream));
+    found.noisy = noise.is_some() || steps.is_some();
+    found.remarks.extend(noise.into_iter().chain(steps));
+    for (kind, drowned) in SensorKind::ALL.into_iter().zip(own_noise::drowned(recording, stream)) {
+        if drowned && !found.left_out[kind as usize] {
+            found.left_out[kind as usize] = true;
+            found.remarks.push(format!(
+                "the {kind} is left out: the stream's own noise or steps are larger than the noise of the recording"
+            ));
+        }
+    }
     Ok(found)
 }

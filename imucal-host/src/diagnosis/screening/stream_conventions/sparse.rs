@@ -21,7 +21,7 @@ const SPARSE: f64 = 1.5;
 /// Error at the interval as a share of that at twice the interval.
 const SHARE: f64 = 0.25;
 /// A sensor is left out where the error is above so many times the noise of its samples.
-const TOO_FAR: f64 = 5.0;
+const TOO_FAR: f64 = 1.0;
 
 /// Why a sensor cannot be compared with its stream, for a reader; `None` where it can be.
 pub fn remark(recording: &Recording, stream: &Stream, kind: SensorKind) -> Option<String> {
@@ -36,11 +36,9 @@ pub fn remark(recording: &Recording, stream: &Stream, kind: SensorKind) -> Optio
         let unit = ["m/s²", "rad/s", "µT"][kind as usize];
         format!(
             "the {kind} is left out: the stream has {:.0} samples a second and the recording {:.0}, and between two of them \
-             the simulated {kind} is known to {error:.2e} {unit} only, which is {:.0} times the noise of a recorded sample; \
-             export the stream at {:.0} Hz or more",
+             the simulated {kind} is known to {error:.2e} {unit} only, with a noise of {noise:.2e} {unit} of a recorded sample; export the stream at {:.0} Hz or more",
             own.recip(),
             others.recip(),
-            error / noise,
             others.recip()
         )
     })

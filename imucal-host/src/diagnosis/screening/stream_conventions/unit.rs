@@ -28,20 +28,25 @@ pub fn wrong(recording: &Recording, stream: &Stream) -> Option<String> {
         let real = &recording.sensor(kind)?.values;
         let (found, is, expected) = match kind {
             SensorKind::Gyr => by_rate(real, ideal)?,
-            SensorKind::Acc | SensorKind::Mag => by_field(kind, ideal)?,
+            SensorKind::Acc | SensorKind::Mag => by_field(kind, real, ideal)?,
         };
         let said = Unit::of(kind).first()?;
-        Some(format!(
-            "{}: the simulated {kind} reads {found}, expected {expected}: it looks like {is} instead of {said}; write \
-             sim_{kind}_* in {said}, or name the columns {kind}_* and give {kind} = \"{is}\" below [units] in the \
-             stream's manifest",
-            stream.name
-        ))
+        let remedy = match is {
+            Some(is) => format!(
+                "it looks like {is} instead of {said}; write sim_{kind}_* in {said}, or name the columns {kind}_* and give \
+                 {kind} = \"{is}\" below [units] in the stream's manifest"
+            ),
+            None => format!("no unit explains it; check what the simulator writes into sim_{kind}_*"),
+        };
+        Some(format!("{}: the simulated {kind} reads {found}, expected {expected}: {remedy}", stream.name))
     })
 }
 
+/// What was found, the unit that it is in, if any explains it, and what was expected.
+type Odd = (String, Option<Unit>, String);
+
 /// Median size of a stream in another unit, and that unit.
-fn by_field(kind: SensorKind, ideal: &[Vector3<f64>]) -> Option<(String, Unit, String)> {
+fn by_field(kind: SensorKind, real: &[Vector3<f64>], ideal: &[Vector3<f64>]) -> Option<Odd> {
     let usual = match kind {
         SensorKind::Acc => Usual { goal: (8.0, 12.0), bounds: (4.0, 25.0), expected: "about 9.8" },
         _ => Usual { goal: (18.0, 75.0), bounds: (8.0, 300.0), expected: "20 to 70" },
@@ -53,17 +58,20 @@ fn by_field(kind: SensorKind, ideal: &[Vector3<f64>]) -> Option<(String, Unit, S
         return None;
     }
     let fits = |unit: &&Unit| unit.per_si().is_some_and(|per_si| within(size / per_si, usual.goal));
-    let unit = Unit::of(kind).iter().filter(|unit| **unit != Unit::Arbitrary).find(fits)?;
-    Some((format!("{size:.4} in the median"), *unit, usual.expected.to_owned()))
+    let unit = Unit::of(kind).iter().filter(|unit| **unit != Unit::Arbitrary).find(fits).copied();
+    // A centrifuge is not at 1 g, nor a magnet's neighbour in Earth's field: then the sensor says so too.
+    let recorded = middle(real.iter().map(Vector3::norm))?;
+    let differs = (size / recorded).ln().abs() > f64::ln(2.0);
+    (unit.is_some() || differs).then(|| (format!("{size:.4} in the median"), unit, usual.expected.to_owned()))
 }
 
 /// How many times the recorded rate that of a stream in degrees is.
-fn by_rate(real: &[Vector3<f64>], ideal: &[Vector3<f64>]) -> Option<(String, Unit, String)> {
+fn by_rate(real: &[Vector3<f64>], ideal: &[Vector3<f64>]) -> Option<Odd> {
     let ratio = spread(ideal)? / spread(real)?;
     let factor = Unit::DegreePerSecond.per_si()?;
     ((ratio / factor).ln().abs() < NEAR.ln()).then(|| {
         let found = format!("{ratio:.1} times the recorded rate");
-        (found, Unit::DegreePerSecond, "as much".to_owned())
+        (found, Some(Unit::DegreePerSecond), "about 1".to_owned())
     })
 }
 
