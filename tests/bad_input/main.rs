@@ -15,10 +15,12 @@ mod containers;
 mod manifests;
 mod motions;
 mod mutations;
+mod poses;
 mod rigs;
 mod samples;
 #[cfg(unix)]
 mod sizes;
+mod streams;
 mod times;
 
 /// A small recording as text, to be spoilt.

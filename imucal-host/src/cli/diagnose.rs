@@ -20,7 +20,7 @@ use crate::{
     diagnosis::{Diagnosis, Options, Verdict, diagnose, proposal::confirmation},
     effect::{CATALOGUE, Effect, user},
     file::OutputSet,
-    recording::{Recording, Stream, Warning},
+    recording::{self, Recording, Stream, Warning},
     report,
 };
 
@@ -36,6 +36,9 @@ pub(super) struct Arguments {
     /// recording
     #[arg(long, value_name = "SIM")]
     sim: Option<PathBuf>,
+    /// Which of several streams in SIM is meant: NAME of columns sim_NAME_acc_x, sim_NAME_gyr_x, … (m/s², rad/s, µT)
+    #[arg(long, value_name = "NAME", requires = "sim")]
+    sim_topic: Option<String>,
     /// Exclude effects from the candidates, or terms (such as acc.misalignment) from the baseline
     #[arg(long, value_name = "EFFECT_OR_TERM", num_args = 1..)]
     without: Vec<String>,
@@ -90,8 +93,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Some(Err(damaged)) => return Ok(refuse(&damaged)),
         model => model.and_then(Result::ok),
     };
-    let stream =
-        arguments.sim.as_deref().map(|path| stream(path, &recording, arguments.reading)).transpose()?;
+    let topic = arguments.sim_topic.as_deref();
+    let stream = arguments.sim.as_deref().map(|path| stream(path, topic, &recording, arguments.reading));
+    let stream = stream.transpose()?;
     let options = Options { without, model, stream, effects: own, frozen, settings: None };
     let progress = Progress::start();
     let diagnosis = diagnose(&recording, &options, &|stage| progress.stage(stage));
@@ -116,19 +120,38 @@ fn frozen(arguments: &Arguments, own: &[&'static Effect]) -> anyhow::Result<Opti
     Ok(Some(String::from_utf8_lossy(&bytes).into_owned()))
 }
 
-/// A simulator's stream for a recording.
-fn stream(path: &Path, recording: &Recording, reading: Reading) -> anyhow::Result<Stream> {
+/// A simulator's stream for a recording, of a topic where its file has several.
+fn stream(
+    path: &Path,
+    topic: Option<&str>,
+    recording: &Recording,
+    reading: Reading,
+) -> anyhow::Result<Stream> {
     let simulated = Recording::read_within(path, &reading.limits())?;
-    // That no sensor is there is what is asked for.
-    let odd = simulated.warnings.iter().filter(|warning| !matches!(warning, Warning::SimulatorAlone { .. }));
-    odd.for_each(|warning| warn(warning));
+    simulated.warnings.iter().filter(|warning| !is_expected(warning)).for_each(|warning| warn(warning));
+    if let Some(topic) = topic {
+        return Stream::of_topic(&simulated, recording, topic).with_context(|| path.display().to_string());
+    }
     Stream::beside(&simulated, recording).with_context(|| {
+        let topics = recording::topic::names(&simulated);
+        let remedy = match topics.as_slice() {
+            [] => "export what an ideal sensor would read".to_owned(),
+            topics => format!("choose a topic with --sim-topic: {}", topics.join(", ")),
+        };
         format!(
-            "{}: found no stream of a simulator, expected columns sim_acc_*, sim_gyr_* or sim_mag_*; export what an ideal \
-             sensor would read",
+            "{}: found no stream of a simulator, expected columns sim_acc_*, sim_gyr_* or sim_mag_*; {remedy}",
             path.display()
         )
     })
+}
+
+/// That a simulator's file has no sensor, or topics beside the one that is meant, is what is asked for.
+fn is_expected(warning: &Warning) -> bool {
+    match warning {
+        Warning::SimulatorAlone { .. } | Warning::NoSensor { .. } => true,
+        Warning::UnknownColumn { column, .. } => recording::topic::split(column).is_some(),
+        _ => false,
+    }
 }
 
 fn print(arguments: &Arguments, diagnosis: &Diagnosis, mut files: OutputSet) -> anyhow::Result<()> {

@@ -254,7 +254,7 @@ fn draw(simulation: &mut Simulation) -> anyhow::Result<()> {
 }
 
 fn is_drawn(effect: &Effect) -> bool {
-    !matches!(omission(effect), Some(Omission::Baseline | Omission::Convention))
+    !matches!(omission(effect), Some(Omission::Baseline | Omission::Convention | Omission::Reference))
 }
 
 fn sealed(mut simulation: Simulation, out: &Path, overwrite: Overwrite) -> anyhow::Result<Ending> {

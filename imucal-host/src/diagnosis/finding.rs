@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::effect::Effect;
+use crate::{effect::Effect, recording::manifest::ReferenceKind};
 
 /// The contract's name of what [`Diagnosis`] is serialised to.
 pub const FORMAT: &str = "imucal-diagnosis/1";
@@ -34,6 +34,9 @@ pub struct Diagnosis {
     pub recording: String,
     /// The answer in one word.
     pub verdict: Verdict,
+    /// What the recording was compared with, where that is neither a rig nor the sensor's own rests.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<ReferenceKind>,
     /// Why there is no better answer, where there is none; else what a reader should know besides.
     pub remarks: Vec<String>,
     /// What was noticed when the recording was read.

@@ -75,8 +75,15 @@ pub fn try_diagnose(
     let own =
         if source == Source::Simulator && options.stream.is_none() { Stream::of(recording) } else { None };
     let stream = options.stream.as_ref().or(own.as_ref());
-    let settings = options.settings.clone().unwrap_or_else(|| Settings::preset(source));
+    let mut settings = options.settings.clone().unwrap_or_else(|| Settings::preset(source));
     let mut preparation = Preparation::new(recording, stream, options.model.as_ref(), &settings)?;
+    if preparation.noisy_stream {
+        // Noise of the stream is averaged over a block only where it is taken row by row, at rest too.
+        settings.residual.resting_points = settings.residual.moving_points;
+    }
+    if preparation.without_position {
+        (settings.source.placed, settings.source.position) = (false, false);
+    }
     let (usable, movement) = (preparation.usable.clone(), &*preparation.movement);
     let mut scene = ForwardModel::new(recording, usable, movement, preparation.triads, &settings);
     if let Some(held) = &preparation.held {
@@ -113,7 +120,11 @@ pub fn try_diagnose(
             // In a shape of the search a user's formula has no value; each such effect is withdrawn once.
             Err(DiagnosisError::Formula(cause))
                 if candidates.withdraw(&cause.effect, cause.without_row()) => {}
-            diagnosis => return diagnosis.map(|diagnosis| diagnosis.with_words_of(&options.effects)),
+            diagnosis => {
+                let reference = source.reference();
+                return diagnosis
+                    .map(|diagnosis| Diagnosis { reference, ..diagnosis }.with_words_of(&options.effects));
+            }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Rate that angular acceleration feigns: `gyr.angular_acceleration`.
 
-use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, XYZ, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, XYZ, vector};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -10,6 +10,7 @@ pub(super) fn effect() -> Effect {
     };
     let act = Act::Sensor(SensorKind::Gyr, alter);
     Effect::new("gyr.angular_acceleration", act, Parameter::amplitudes(&XYZ, "s", 2e-3), words)
+        .needing(Needs::READ_TOGETHER)
         .like("gyr.bandwidth", "none at low frequency: a common delay is the same")
         .like("clk.time_offset", "the accelerometer: it is late only where the clock is")
 }

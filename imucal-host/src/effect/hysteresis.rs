@@ -4,7 +4,7 @@
 //! z follows x only where it is more than d behind (play);      y += h (z − x) / d
 //! ```
 
-use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, of, si, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, of, si, vector};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -14,7 +14,10 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     };
     let mut parameters = Parameter::amplitudes(&XYZ, &si(kind), of(kind, 5e-3, 1e-3, 0.1));
     parameters.push(Parameter::shape("play", &si(kind), of(kind, 0.5, 0.05, 2.0)));
+    // The filter of a reference attitude lags behind a rate as play does.
+    let needs = if kind == SensorKind::Gyr { Needs::EXACT_ATTITUDE } else { Needs::NOTHING };
     Effect::member(kind, "hysteresis", Act::Sensor(kind, alter), parameters, words)
+        .needing(needs)
         .like(&member_id(kind, "bias_drift"), "the same attitude from both sides, early and late")
         .like(&member_id(kind, "scale_asymmetry"), "the same attitude from both sides")
 }

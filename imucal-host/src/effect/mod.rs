@@ -14,6 +14,7 @@ use imucal_core::triad::Triad;
 use crate::recording::{SensorKind, Unit};
 
 mod angular_acceleration;
+pub mod attitude_noise;
 mod axis_nonorthogonality;
 pub mod axis_swap;
 mod bandwidth;
@@ -47,10 +48,12 @@ mod matrices;
 mod misalignment;
 pub mod motion_mismatch;
 mod motor_current;
+mod mount_slip;
 mod mounting;
 mod noise_burst;
 mod parameter;
 mod part;
+pub mod position_noise;
 mod rate_error;
 mod room_gradient;
 mod saturation;
@@ -66,6 +69,7 @@ mod temp_bias_quadratic;
 mod temp_scale;
 mod time_offset;
 mod transient;
+mod tremble;
 mod triad_entries;
 mod truth;
 mod unit_error;
@@ -317,6 +321,9 @@ pub static CATALOGUE: LazyLock<Vec<Effect>> = LazyLock::new(|| {
         time_offset::effect(),
         rate_error::effect(),
         motion_mismatch::effect(),
+        mount_slip::effect(),
+        attitude_noise::effect(),
+        position_noise::effect(),
         gravity_error::effect(),
         lever_arm::effect(),
         earth_rate::effect(),

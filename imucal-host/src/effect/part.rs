@@ -68,6 +68,10 @@ pub struct Needs {
     pub exact_attitude: bool,
     /// A place, or a sensor that is not moved to and fro.
     pub position: bool,
+    /// A reference on the body, of a tracker or a simulator: neither a rig nor the sensor's own rests.
+    pub outside: bool,
+    /// That all sensors were read at the same time: else a delay of one of them is the reference's clock.
+    pub read_together: bool,
 }
 
 impl Needs {
@@ -79,6 +83,8 @@ impl Needs {
         other_calibration: false,
         exact_attitude: false,
         position: false,
+        outside: false,
+        read_together: false,
     };
     /// Gimbals.
     pub const GIMBALS: Self = Self { gimbals: true, ..Self::NOTHING };
@@ -90,6 +96,10 @@ impl Needs {
     pub const OTHER_CALIBRATION: Self = Self { other_calibration: true, ..Self::NOTHING };
     /// A place.
     pub const POSITION: Self = Self { position: true, ..Self::NOTHING };
+    /// A reference on the body.
+    pub const OUTSIDE: Self = Self { outside: true, ..Self::NOTHING };
+    /// Sensors that were read together.
+    pub const READ_TOGETHER: Self = Self { read_together: true, ..Self::NOTHING };
     /// An exact attitude.
     pub const EXACT_ATTITUDE: Self = Self { exact_attitude: true, ..Self::NOTHING };
 }

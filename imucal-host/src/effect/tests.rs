@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use super::*;
 
 /// The contract's list, families spelt `P.`.
-const CONTRACT: &str = "ref.motion_mismatch rig.level_tilt rig.heading P.bias P.scale P.misalignment acc.gravity_error \
+const CONTRACT: &str = "ref.motion_mismatch ref.mount_slip ref.attitude_noise ref.position_noise rig.level_tilt rig.heading P.bias P.scale P.misalignment acc.gravity_error \
     rig.encoder_harmonic rig.encoder_offset rig.axis_nonorthogonality rig.wobble clk.time_offset clk.rate_error \
     P.scale_quadratic P.scale_cubic P.scale_asymmetry P.cross_axis_product P.temp_bias P.temp_bias_quadratic \
     P.temp_scale P.warmup P.bias_drift P.bias_step P.saturation P.bandwidth P.stuck_samples P.noise_burst \

@@ -17,6 +17,7 @@ pub mod read;
 mod read_error;
 mod sensor_kind;
 pub mod simulated;
+pub mod topic;
 mod triple;
 pub mod unit;
 mod warning;

@@ -2,7 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::{Recording, sensor_kind::SensorKind};
+use super::{
+    Recording,
+    sensor_kind::SensorKind,
+    topic::{self, TopicError},
+};
 
 /// Values of ideal sensors, in the simulated sensor's axes. All columns that are there are of one length.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -43,8 +47,24 @@ impl Simulated {
             || self.temperature.as_ref().is_some_and(|temperature| !temperature[row].is_nan())
     }
 
+    /// Whether a row, other than the first, holds the same as the one before.
+    #[must_use]
+    pub fn is_repeated(&self, row: usize) -> bool {
+        let same = |kind: &SensorKind| self.sensor(*kind).is_none_or(|values| values[row] == values[row - 1]);
+        SensorKind::ALL.iter().all(same)
+    }
+
+    /// Without sensors that no row knows anything of.
+    #[must_use]
+    pub fn without_empty(self) -> Self {
+        let known = |values: &Vec<Vector3<f64>>| values.iter().flatten().any(|value| !value.is_nan());
+        let [acc, gyr, mag] = [self.acc, self.gyr, self.mag].map(|values| values.filter(known));
+        Self { acc, gyr, mag, temperature: self.temperature }
+    }
+
     /// Some of the rows.
-    fn at(&self, rows: &[usize]) -> Self {
+    #[must_use]
+    pub fn at(&self, rows: &[usize]) -> Self {
         let values = |column: &Option<Vec<Vector3<f64>>>| -> Option<Vec<Vector3<f64>>> {
             column.as_ref().map(|column| rows.iter().map(|row| column[*row]).collect())
         };
@@ -90,7 +110,8 @@ impl Stream {
         Some(Self {
             name: named.unwrap_or_else(|| recording.name.clone()),
             time: rows.iter().map(|row| recording.time[*row]).collect(),
-            values: if rows.len() == recording.rows() { values.clone() } else { values.at(&rows) },
+            values: if rows.len() == recording.rows() { values.clone() } else { values.at(&rows) }
+                .without_empty(),
         })
     }
 }
@@ -100,12 +121,32 @@ impl Stream {
     /// on those of the recording.
     #[must_use]
     pub fn beside(simulated: &Recording, recording: &Recording) -> Option<Self> {
-        let mut stream = Self::of(simulated)?;
+        Some(Self::of(simulated)?.on_times_of(simulated, recording))
+    }
+
+    /// The stream of a topic of such a file.
+    ///
+    /// # Errors
+    ///
+    /// [`TopicError`].
+    pub fn of_topic(simulated: &Recording, recording: &Recording, name: &str) -> Result<Self, TopicError> {
+        let values = topic::simulated(simulated, name)?;
+        let rows: Vec<usize> = (0..simulated.rows()).filter(|row| values.knows(*row)).collect();
+        let stream = Self {
+            name: name.to_owned(),
+            time: rows.iter().map(|row| simulated.time[*row]).collect(),
+            values: values.at(&rows).without_empty(),
+        };
+        Ok(stream.on_times_of(simulated, recording))
+    }
+
+    /// On the times of a recording, where both files have absolute times.
+    fn on_times_of(mut self, simulated: &Recording, recording: &Recording) -> Self {
         if let (Some(own), Some(others)) = (simulated.epoch, recording.epoch) {
             let later = own.since(others);
-            stream.time.iter_mut().for_each(|time| *time += later);
+            self.time.iter_mut().for_each(|time| *time += later);
         }
-        Some(stream)
+        self
     }
 }
 

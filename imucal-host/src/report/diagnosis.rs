@@ -12,7 +12,10 @@ use crate::{
         finding::{Amount, Cause, Gap, Place, Proposal, ProposalStatus},
     },
     effect::{self, Effect},
+    recording::manifest::ReferenceKind,
 };
+
+mod change;
 
 /// Drivers that are printed; the JSON has all.
 const PLACES: usize = 6;
@@ -33,7 +36,14 @@ fn write_page(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
     for remark in diagnosis.remarks.iter().skip(said).filter(|remark| !remark.is_empty()) {
         text.push_str(&hanging("note: ", remark));
     }
-    write_gap(text, &diagnosis.gap)?;
+    match diagnosis.reference {
+        Some(ReferenceKind::Simulator | ReferenceKind::Pose) => {
+            change::write_changes(text, diagnosis)?;
+            write_gap(text, &diagnosis.gap)?;
+            change::write_remainder(text, diagnosis)?;
+        }
+        Some(ReferenceKind::Attitude) | None => write_gap(text, &diagnosis.gap)?,
+    }
     write_places(text, &diagnosis.places)?;
     write_causes(text, diagnosis)?;
     write_proposals(text, &diagnosis.proposals)?;
@@ -183,10 +193,17 @@ fn write_equivalents(text: &mut String, effect: Option<&Effect>, cause: &Cause) 
     }
 }
 
+/// A shorter time than this is told in milliseconds, s.
+const SHORT: f64 = 0.1;
+
 /// `x 1.90 ± 0.02 uT`.
 fn amount(amount: &Amount) -> String {
-    let unit = if amount.unit == "-" { String::new() } else { format!(" {}", amount.unit) };
-    let value = match (amount.value, amount.std_error) {
+    let is_short =
+        amount.unit == "s" && amount.value.is_some_and(|value| value != 0.0 && value.abs() < SHORT);
+    let (scale, unit) = if is_short { (1e3, "ms") } else { (1.0, amount.unit.as_str()) };
+    let unit = if unit == "-" { String::new() } else { format!(" {unit}") };
+    let scaled = |value: f64| scale * value;
+    let value = match (amount.value.map(scaled), amount.std_error.map(scaled)) {
         (None, _) => return format!("{} open", amount.name),
         (Some(value), Some(std)) if std.is_finite() && std > 0.0 => measure(value, std),
         (Some(value), _) => plain(value),

@@ -27,6 +27,8 @@ use crate::{
 const SPEED: f64 = 0.03;
 /// Fewer positions than this are none.
 const FEWEST: usize = 10;
+/// Positions further apart than so many of their usual intervals have a gap between them.
+const GAP: f64 = 1.5;
 /// Rows so close to one without a position are not known, s.
 const NEAR: f64 = 0.1;
 
@@ -48,8 +50,10 @@ impl Posed {
     /// `bandwidth`, rad/s, is taken for noise. `None` where hardly a row has one.
     pub fn new(tracked: Tracked, time: &[f64], positions: &[[f64; 3]], bandwidth: f64) -> Option<Self> {
         let is_given = |row: &[f64; 3]| row.iter().all(|value| value.is_finite());
-        let interval = median(time.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
-        if positions.iter().filter(|row| is_given(row)).count() < FEWEST {
+        let given: Vec<f64> =
+            time.iter().zip(positions).filter(|(_, row)| is_given(row)).map(|(time, _)| *time).collect();
+        let interval = median(given.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
+        if given.len() < FEWEST {
             return None;
         }
         let axes: Vec<Vec<Smoothed>> = [0, 1, 2]
@@ -61,11 +65,15 @@ impl Posed {
             .collect();
         let of = |row: usize, order: usize| Vector3::from_fn(|axis, _| axes[axis][row].state[order]);
         let is_moved = |row: usize| of(row, 1).norm() > SPEED;
-        let missing: Vec<f64> =
-            time.iter().zip(positions).filter(|(_, row)| !is_given(row)).map(|(time, _)| *time).collect();
+        let is_gap = |pair: &&[f64]| pair[1] - pair[0] > GAP * interval;
+        let within = given.windows(2).filter(is_gap).map(|pair| (pair[0], pair[1]));
+        // Before the first and after the last position there is none.
+        let mut gaps = vec![(f64::NEG_INFINITY, given[0] - GAP * interval)];
+        gaps.extend(within);
+        gaps.push((given[given.len() - 1] + GAP * interval, f64::INFINITY));
         let is_near = |time: f64| {
-            let next = missing.partition_point(|gap| *gap < time - NEAR);
-            missing.get(next).is_some_and(|gap| *gap <= time + NEAR)
+            let next = gaps.partition_point(|gap| gap.1 < time - NEAR);
+            gaps.get(next).is_some_and(|gap| gap.0 <= time + NEAR)
         };
         let middle = (0..time.len()).map(|row| of(row, 0)).sum::<Vector3<f64>>() / time.len() as f64;
         let error = |row: usize| axes.iter().map(|axis| axis[row].error.powi(2)).sum::<f64>().sqrt();

@@ -12,7 +12,7 @@
 use crate::recording::order_statistics::std_of_median;
 use std::{f64::consts::TAU, sync::OnceLock};
 
-use nalgebra::{Matrix3, Matrix4, Vector4};
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use rayon::prelude::*;
 
 use super::{
@@ -226,6 +226,11 @@ pub fn reading_noise(readings: impl Iterator<Item = f64>) -> f64 {
     let bend = |w: &[f64]| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs();
     let bends = readings.windows(5).map(bend).filter(|bend| bend.is_finite());
     std_of_median(bends.collect()).unwrap_or(0.0) / 70.0f64.sqrt()
+}
+
+/// That of readings with three axes, the largest of them.
+pub fn readings_noise(values: &[Vector3<f64>]) -> f64 {
+    (0..3).map(|axis| reading_noise(values.iter().map(|value| value[axis]))).fold(0.0, f64::max)
 }
 
 /// Rows at which a gimbal moves.

@@ -23,6 +23,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use super::{
     place::Place,
     recent::Recent,
+    replay::{nearest, readings_noise},
     truth::{Motion, Recorded, in_the_open},
 };
 use crate::{
@@ -39,6 +40,11 @@ const WINDOW: f64 = 0.1;
 const TURNS: f64 = 0.02;
 /// or its specific force changes by more than this, m/s².
 const SWAYS: f64 = 0.1;
+
+/// What trembles by less than so many times the noise of a stream that is not ideal does not move.
+const NOISES: f64 = 5.0;
+/// Samples within which noise is estimated.
+const STRETCH: usize = 100;
 
 /// How the clock of a stream stands to that of the sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -153,7 +159,7 @@ impl Streamed {
             speeds.push(speed.norm());
         }
         let at = |row: &f64| {
-            let sample = super::replay::nearest(&self.time, self.clock.stream_time(*row));
+            let sample = nearest(&self.time, self.clock.stream_time(*row));
             speeds.get(sample).copied().unwrap_or(0.0)
         };
         Some(self.rows.iter().map(at).collect())
@@ -161,11 +167,15 @@ impl Streamed {
 
     /// Whether it turns or sways at each row.
     fn movement(&self) -> Vec<bool> {
+        let [acc, gyr, _] = &self.channels;
+        let trembles = |own: fn(&Channel) -> &[Vector3<f64>], channel: &Option<Channel>| {
+            channel.as_ref().map_or(0.0, |channel| NOISES * own_noise(own(channel)))
+        };
+        let (turning, swaying) = (trembles(|c| &c.values, gyr), trembles(|c| &c.slopes, acc) * WINDOW);
         let samples: Vec<bool> = (0..self.time.len())
             .map(|k| {
-                let turns = |c: &Channel| c.values[k].norm() > TURNS;
-                let sways = |c: &Channel| c.slopes[k].norm() * WINDOW > SWAYS;
-                let [acc, gyr, _] = &self.channels;
+                let turns = |c: &Channel| c.values[k].norm() > TURNS + turning;
+                let sways = |c: &Channel| c.slopes[k].norm() * WINDOW > SWAYS + swaying;
                 gyr.as_ref().is_some_and(turns) || acc.as_ref().is_some_and(sways)
             })
             .collect();
@@ -203,7 +213,7 @@ impl Motion for Streamed {
         (truth.w_it_t, truth.dw_it_t) = (w, dw);
         truth.f_t = of(SensorKind::Acc).unwrap_or(still).0;
         truth.b_t = of(SensorKind::Mag).unwrap_or(still).0;
-        let row = super::replay::nearest(&self.rows, time);
+        let row = nearest(&self.rows, time);
         truth.temperature = self.temperature.get(row).copied().unwrap_or(truth.temperature);
         truth
     }
@@ -268,6 +278,14 @@ impl Channel {
         let slope = (leaves + (bend * 2.0 + cube * (3.0 * x)) * x) / span;
         (value, slope)
     }
+}
+
+/// Noise of a sample in the stillest tenth of a stream, the largest of the axes'; none of an ideal stream: noise is there
+/// all the time, a movement that is too fast for the samples is not.
+pub fn own_noise(values: &[Vector3<f64>]) -> f64 {
+    let mut noises: Vec<f64> = values.chunks(STRETCH).map(readings_noise).collect();
+    noises.sort_by(f64::total_cmp);
+    noises.get(noises.len() / 10).copied().unwrap_or(0.0)
 }
 
 /// Samples with missing ones put on the line between their neighbours.

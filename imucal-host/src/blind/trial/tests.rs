@@ -8,6 +8,7 @@ fn nothing(recording: &Recording) -> Diagnosis {
         format: FORMAT.to_owned(),
         recording: recording.name.clone(),
         verdict: Verdict::None,
+        reference: None,
         remarks: Vec::new(),
         warnings: Vec::new(),
         gap: Vec::new(),

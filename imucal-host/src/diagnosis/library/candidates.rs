@@ -73,8 +73,16 @@ impl Setting<'_> {
 
     /// Why the recording cannot show an effect.
     fn cannot_show(&self, effect: &Effect) -> Option<&'static str> {
-        let Needs { gimbals, thermometer, heading, other_calibration, exact_attitude, position } =
-            effect.needs;
+        let Needs {
+            gimbals,
+            thermometer,
+            heading,
+            other_calibration,
+            exact_attitude,
+            position,
+            outside,
+            read_together,
+        } = effect.needs;
         let provided = &self.provided;
         match effect.act {
             Act::Rig(_) if !provided.table => {
@@ -89,6 +97,15 @@ impl Setting<'_> {
         let field_alone = matches!(effect.act, Act::Formula(..))
             && provided.gives_field()
             && self.kinds.contains(&SensorKind::Mag);
+        if outside && (provided.gimbals || !provided.table) {
+            return Some("there is no reference on the body: neither a tracker's nor a simulator's");
+        }
+        if read_together && provided.lags && provided.clock {
+            return Some(
+                "nothing says that the sensors were read at the same time: a delay of the gyroscope is the reference's \
+                 clock, which is fitted",
+            );
+        }
         if heading && !provided.heading && !field_alone {
             Some("the heading is not known, so that Earth's rotation is not known in the sensor's axes")
         } else if thermometer && !self.thermometer {
@@ -105,8 +122,8 @@ impl Setting<'_> {
             )
         } else if exact_attitude && !provided.exact_attitude {
             Some(
-                "a reference attitude has noise and a filter of its own: nothing distinguishes a sensor's low-pass from \
-                 them",
+                "a reference attitude has noise and a filter of its own: nothing distinguishes a sensor's low-pass or \
+                 play from them",
             )
         } else if gimbals && !provided.gimbals {
             Some("no gimbals turn the sensor")

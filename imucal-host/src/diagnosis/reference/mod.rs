@@ -8,8 +8,9 @@
 //! | --- | --- |
 //! | [`model`] | the simulator's present model of the unit: a stored calibration as triads in SI |
 //! | [`movement`] | which of the movements a recording has, and its place on Earth |
+//! | [`pose`] | attitudes and positions of a reference |
 //! | [`rest_to_rest`] | a movement reconstructed from the sensor's own rests and turns (this runs a whole calibration) |
-//! | [`stream`] | the movement of a simulator's stream, and what is wrong with one that gives none |
+//! | [`stream`] | the movement of a simulator's stream |
 //! | [`impact`] | rows near an impact that the samples of a stream do not resolve |
 //! | [`stream_clock`] | its clock against that of the sensor, roughly |
 //! | [`revisits`] | whether attitudes are held more than once, without which repeatability cannot be estimated |
@@ -21,6 +22,7 @@
 pub mod impact;
 pub mod model;
 pub mod movement;
+pub mod pose;
 pub mod rest_to_rest;
 pub mod revisits;
 pub mod stream;

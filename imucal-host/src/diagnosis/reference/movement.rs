@@ -3,9 +3,9 @@
 
 use nalgebra::Vector3;
 
-use super::{impact::Unmatched, model::Model, rest_to_rest::RestToRest, stream};
+use super::{impact::Unmatched, model::Model, pose::Pose, rest_to_rest::RestToRest, stream};
 use crate::{
-    observe::{motion, motion::Attitudes},
+    observe::motion::Attitudes,
     recording::{
         Recording, SensorKind, Stream, check::integrity::Integrity, manifest::Axis, median,
         unit::STANDARD_GRAVITY,
@@ -40,8 +40,8 @@ pub struct Reference {
     pub remarks: Vec<String>,
 }
 
-/// The movement of a recording, of `stream` where a simulator gives one; a reference attitude and a stream are read by
-/// `clock`, positions to a `bandwidth`, rad/s.
+/// The movement of a recording, of `stream` where a simulator gives one, of `pose` where there is a reference; both are read
+/// by `clock`, positions to a `bandwidth`, rad/s.
 ///
 /// # Errors
 ///
@@ -51,6 +51,7 @@ pub fn reference(
     integrity: &Integrity,
     model: &Model,
     stream: Option<&Stream>,
+    pose: Option<&Pose>,
     clock: StreamClock,
     bandwidth: f64,
 ) -> Result<Reference, String> {
@@ -63,11 +64,12 @@ pub fn reference(
     };
     let temperature = recording.temperature.clone().unwrap_or_else(|| vec![25.0; recording.rows()]);
     let (mut held, mut unmatched, mut remarks) = (None, Vec::new(), Vec::new());
-    let sources = (stream, recording.gimbal.as_deref(), recording.reference.as_deref());
+    let sources = (stream, recording.gimbal.as_deref(), pose);
     let movement: Box<dyn Recorded> = match sources {
         (Some(stream), ..) => {
             let given = stream::movement(recording, stream, clock, temperature, place)?;
-            (unmatched, remarks) = (given.unmatched, given.remarks);
+            unmatched = given.unmatched;
+            remarks.extend(given.unresolved);
             Box::new(given.movement)
         }
         (None, Some(gimbal), _) => {
@@ -81,8 +83,7 @@ pub fn reference(
             let replay = Replay::new(&recording.time, gimbal, temperature, axes, place);
             Box::new(replay.ok_or("no row has a reading of all three encoders")?)
         }
-        (None, None, Some(reference)) => {
-            let attitudes = motion::of_reference(reference);
+        (None, None, Some(pose)) => {
             let tracked = |attitudes: &Attitudes| {
                 let mut place = place;
                 if site.field_ned_ut.is_none() {
@@ -91,14 +92,7 @@ pub fn reference(
                 let tracked = Tracked::new(&recording.time, attitudes, temperature.clone(), place);
                 tracked.ok_or("no row has a reference attitude")
             };
-            let (attitudes, positions) = match clock.offset {
-                0.0 => (attitudes, recording.position.clone()),
-                offset => {
-                    let later = motion::later(&recording.time, &attitudes, -offset);
-                    let positions = recording.position.as_ref();
-                    (later, positions.map(|positions| moved(&recording.time, positions, offset)))
-                }
-            };
+            let Pose { attitudes, positions } = pose.moved(&recording.time, clock.offset);
             let tracked = tracked(&attitudes)?;
             let posed = positions
                 .and_then(|positions| Posed::new(tracked.clone(), &recording.time, &positions, bandwidth));
@@ -123,21 +117,6 @@ pub fn reference(
         return Err("the rig does not move: no effect can be distinguished from a bias".to_owned());
     }
     Ok(Reference { movement, held, unmatched, remarks })
-}
-
-/// Positions of `offset` later, s, on the straight line between two rows; NaN where either of them is missing.
-fn moved(time: &[f64], positions: &[[f64; 3]], offset: f64) -> Vec<[f64; 3]> {
-    let at = |now: &f64| {
-        let then = now + offset;
-        let next = time.partition_point(|t| *t <= then);
-        let pair = next
-            .checked_sub(1)
-            .and_then(|before| Some((before, positions.get(before)?, positions.get(next)?)));
-        let Some((before, from, to)) = pair else { return [f64::NAN; 3] };
-        let share = (then - time[before]) / (time[next] - time[before]);
-        [0, 1, 2].map(|axis| from[axis] + (to[axis] - from[axis]) * share)
-    };
-    time.iter().map(at).collect()
 }
 
 /// The field in the frame of a reference, µT: the median of what the magnetometer shows there, component by component.

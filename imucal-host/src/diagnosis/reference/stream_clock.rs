@@ -42,6 +42,9 @@ const UNITS: [(f64, &str); 6] = [
     (1e-9, "billions of seconds"),
 ];
 
+/// A stream in its right unit is as long as the recording within this ratio.
+const AS_LONG: f64 = 10.0;
+
 /// Times, s, and what is sensed at them, without its direction.
 type Sizes = Vec<(f64, f64)>;
 
@@ -116,8 +119,8 @@ fn sizes<'r>(
     };
     let of = |(at, pair): (usize, (&f64, &Vector3<f64>))| size(pair).filter(|_| usable[at]);
     let real = recording.time.iter().zip(values).enumerate().filter_map(of).collect();
-    let ideal = stream.time.iter().zip(stream.values.sensor(kind)?).filter_map(size).collect();
-    Some((real, ideal))
+    let ideal: Sizes = stream.time.iter().zip(stream.values.sensor(kind)?).filter_map(size).collect();
+    (!ideal.is_empty()).then_some((real, ideal))
 }
 
 /// The lag of the stream at which the sizes agree best, s, and their correlation there; the stream's times count
@@ -156,9 +159,13 @@ fn other_unit(
 ) -> Option<String> {
     let (real, ideal) = sizes(recording, integrity, stream, kind)?;
     let agrees = |per_second: f64| {
-        first_lag(&real, &ideal, per_second).is_some_and(|(_, agreement)| agreement > FOLLOWS)
+        first_lag(&real, &ideal, per_second).is_some_and(|(_, agreement)| agreement > LOCAL)
     };
-    let (_, unit) = UNITS.into_iter().find(|(per_second, _)| agrees(*per_second))?;
+    let length = |of: &Sizes| Some(of.last()?.0 - of.first()?.0);
+    let ratio = length(&ideal)? / length(&real)?;
+    let is_as_long = |per_second: f64| (ratio / per_second).ln().abs() < AS_LONG.ln();
+    let (_, unit) =
+        UNITS.into_iter().find(|(per_second, _)| is_as_long(*per_second) && agrees(*per_second))?;
     Some(format!(
         "{}: the times of the stream look like {unit}, expected seconds; give their unit as `t` below [units] in its \
          manifest",

@@ -23,7 +23,8 @@ mod stuck_samples;
 mod tests;
 mod unit_error;
 
-use self::pairs::Pairs;
+use self::{gimbal_order::FOLLOWS, pairs::Pairs};
+use super::stream_conventions::axes as stream_axes;
 
 /// No finding is made above this probability of as much by chance.
 const SURE: f64 = 1e-6;
@@ -44,7 +45,7 @@ pub struct Finding {
 impl Finding {
     /// Of an effect's id, with its parameters' values and standard errors. `None` where the catalogue has no such
     /// effect or another number of parameters.
-    fn new(id: &str, values: &[(Option<f64>, Option<f64>)], p_value: f64) -> Option<Self> {
+    pub(super) fn new(id: &str, values: &[(Option<f64>, Option<f64>)], p_value: f64) -> Option<Self> {
         let effect = effect::find(id)?;
         let parameters: Vec<Amount> = effect
             .parameters
@@ -74,8 +75,9 @@ pub struct Conventions {
     pub findings: Vec<Finding>,
     /// What else a reader ought to know.
     pub remarks: Vec<String>,
-    /// Code of the turn, as `axis_swap` counts them, that all triads share: that of the mount.
-    pub turned: Option<usize>,
+    /// Code of the turn, as `axis_swap` counts them, that all triads share: that of the mount; and the upper bound of the
+    /// probability that there is none.
+    pub turned: Option<(usize, f64)>,
     /// A sensor that cannot be compared with the movement, since that does not hold what it was given.
     pub beyond_movement: Option<SensorKind>,
     /// How the encoders contradict every sensor: no baseline fits before that is mended.
@@ -106,6 +108,46 @@ fn truth(recording: &Recording, motion: &dyn Motion, rows: &[usize], offset: f64
     rows.iter().map(|row| motion.truth(recording.time[*row] + offset, &|_| ())).collect()
 }
 
+/// Axes against those of a simulator's stream. A turn that all sensors share is named for each of them, since nothing
+/// but the mount that the simulator was given says how the unit sits.
+fn against_stream(
+    recording: &Recording,
+    motion: &dyn Motion,
+    pairs: &[Option<Pairs>; 3],
+    acc: Option<&Pairs>,
+    found: &mut Conventions,
+) {
+    let acc = acc.filter(|_| motion.gives(SensorKind::Acc));
+    if let Some((code, p_value)) = found.turned.take() {
+        found.remarks.clear();
+        let other = acc.and_then(|pairs| axis_swap::against_gravity(pairs, code));
+        let is_there = |kind: &SensorKind| recording.sensor(*kind).is_some() && motion.gives(*kind);
+        for kind in SensorKind::ALL.into_iter().filter(is_there) {
+            let own = if kind == SensorKind::Acc { other.unwrap_or(code) } else { code };
+            let finding = axis_swap::finding(kind, own, p_value).filter(|_| own != 0);
+            found.findings.extend(finding);
+        }
+        if other.is_none() {
+            found.remarks.push(stream_axes::turned(code));
+            return;
+        }
+    } else if !found.findings.iter().any(|finding| finding.effect.sensors.contains(&SensorKind::Acc)) {
+        // Gravity shows what a movement without much acceleration does not.
+        let code = acc.and_then(|pairs| axis_swap::against_gravity(pairs, 0));
+        found.findings.extend(code.and_then(|code| axis_swap::finding(SensorKind::Acc, code, 0.0)));
+    }
+    let codes: Vec<(SensorKind, usize)> = found.findings.iter().filter_map(axis_swap::code_of).collect();
+    if !codes.is_empty() {
+        found.remarks.push(stream_axes::apart(&codes));
+        return;
+    }
+    let mounted = |kind: SensorKind| {
+        let moments = pairs[kind as usize].as_ref()?.trusted().moments();
+        stream_axes::mounted(kind, &moments.cross).filter(|_| moments.unexplained() < FOLLOWS)
+    };
+    found.remarks.extend([SensorKind::Gyr, SensorKind::Acc].into_iter().find_map(mounted));
+}
+
 /// Checks a recording against a movement that was reconstructed from it or recorded with it.
 pub fn check(
     recording: &Recording,
@@ -129,6 +171,8 @@ pub fn check(
         found.remarks.push(remark);
         found.beyond_movement = Some(SensorKind::Acc);
         pairs[SensorKind::Acc as usize] = None;
+    } else if !source.position && !source.gimbals && source.heading {
+        found.remarks.extend(carried_about::left_open(recording, integrity, &rows, &truth));
     }
     let contradicted = || gimbal_order::remark(recording, integrity, motion, &rows, &truth, &pairs);
     match if source.followed { None } else { contradicted() } {
@@ -136,6 +180,10 @@ pub fn check(
         Some(remark) => found.contradiction = Some(remark),
         None => {
             let scales = axis_swap::check(&pairs, &mut found);
+            if source.followed {
+                let acc = Pairs::all(recording, integrity, SensorKind::Acc, &rows, &truth);
+                against_stream(recording, motion, &pairs, acc.as_ref(), &mut found);
+            }
             for (kind, scale) in SensorKind::ALL.into_iter().zip(scales) {
                 if let (Some(scale), Some(triple)) = (scale, recording.sensor(kind)) {
                     unit_error::check(kind, triple.unit, &scale, &mut found);

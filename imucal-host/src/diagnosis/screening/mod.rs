@@ -8,6 +8,8 @@
 //! | --- | --- |
 //! | [`bandwidth`] | how fast a movement recorded positions can be believed to follow |
 //! | [`conventions`] | axis order and signs, units, gimbal order, clipping, repeated samples, noise bursts |
+//! | [`pose_conventions`] | what a reference's attitudes and positions hold instead of what they should: order, frame, rate, jumps, steps, unit |
+//! | [`stream_conventions`] | what a simulator's stream holds instead of what it should: unit, gravity, axes, noise, steps, too few samples |
 //! | [`reference_offset`] | a large offset of the reference's clock, by the share of variance that no gain and bias explain |
 //! | [`preparation`] | all of them together: what the rest of the diagnosis starts from |
 //!
@@ -18,5 +20,7 @@
 
 pub mod bandwidth;
 pub mod conventions;
+pub mod pose_conventions;
 pub mod preparation;
 pub mod reference_offset;
+pub mod stream_conventions;

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::{
     bandwidth, conventions,
     conventions::{Conventions, Finding},
-    reference_offset,
+    pose_conventions, reference_offset, stream_conventions,
 };
 use crate::{
     diagnosis::{
@@ -55,6 +55,10 @@ pub struct Preparation {
     pub findings: Vec<Finding>,
     /// What else a reader ought to know.
     pub remarks: Vec<String>,
+    /// The reference's positions tremble so much that they give no acceleration.
+    pub without_position: bool,
+    /// A simulator's stream has noise of its own, row by row.
+    pub noisy_stream: bool,
 }
 
 impl Preparation {
@@ -72,8 +76,23 @@ impl Preparation {
         let model = model.map(|model| Model::new(recording, model)).transpose();
         let model = model.map_err(DiagnosisError::Recording)?.unwrap_or_default();
         let integrity = integrity::inspect(recording);
+        let (fresh, repeated) = stream.map(stream_conventions::held::fresh).unzip();
+        let stream = fresh.as_deref();
+        let of_stream = stream.map(|stream| stream_conventions::check(recording, stream)).transpose();
+        let of_stream = of_stream.map_err(DiagnosisError::Recording)?.unwrap_or_default();
+        let smoothed = stream.filter(|_| of_stream.noisy);
+        let smoothed = smoothed.map(|noisy| stream_conventions::own_noise::smoothed(recording, noisy));
+        let stream = smoothed.as_ref().or(stream);
+        let of_pose = match stream {
+            Some(_) => pose_conventions::Prepared::default(),
+            None => {
+                let prepared = pose_conventions::prepared(recording, &integrity);
+                prepared.map_err(DiagnosisError::Recording)?
+            }
+        };
+        let pose = of_pose.pose.as_ref();
         let of_bandwidth = |clock: StreamClock, bandwidth: f64| {
-            movement::reference(recording, &integrity, &model, stream, clock, bandwidth)
+            movement::reference(recording, &integrity, &model, stream, pose, clock, bandwidth)
                 .map_err(DiagnosisError::Recording)
         };
         let reference = |clock: StreamClock| of_bandwidth(clock, bandwidth::USUAL);
@@ -88,19 +107,30 @@ impl Preparation {
                 as_read = reference(clock)?;
             }
         }
-        if stream.is_none() && recording.position.is_some() {
+        if settings.source.placed {
             as_read = bandwidth::best(recording, &integrity, as_read, &|width| of_bandwidth(clock, width))?;
         }
         let Reference { movement, held, unmatched, remarks: of_reference } = as_read;
+        let lacks =
+            stream.and_then(|given| stream_conventions::gravity::missing(recording, given, &*movement));
+        if let Some(lacks) = lacks {
+            return Err(DiagnosisError::Recording(lacks));
+        }
         let conventions = conventions::check(recording, &integrity, &*movement, settings.source);
-        if let Some(contradiction) = conventions.contradiction {
+        // A reference that trembles contradicts the sensors by that alone.
+        if let Some(contradiction) = conventions.contradiction.clone().filter(|_| of_pose.findings.is_empty())
+        {
             return Err(DiagnosisError::Recording(contradiction));
         }
         let mut usable = SensorKind::ALL.map(|kind| usable_rows(recording, &integrity, &conventions, kind));
         if let Some(kind) = conventions.beyond_movement {
             usable[kind as usize].fill(false);
         }
-        for kind in SensorKind::ALL.into_iter().filter(|kind| !movement.gives(*kind)) {
+        let without_acc = |kind: SensorKind| of_pose.without_acc && kind == SensorKind::Acc;
+        let left_out = |kind: &SensorKind| {
+            without_acc(*kind) || !movement.gives(*kind) || of_stream.left_out[*kind as usize]
+        };
+        for kind in SensorKind::ALL.into_iter().filter(left_out) {
             usable[kind as usize].fill(false);
         }
         for usable in &mut usable {
@@ -114,23 +144,40 @@ impl Preparation {
                 }
             }
         }
-        if let Some(turn) = conventions.turned.and_then(axis_swap::signed_permutation) {
+        if let Some(turn) = conventions.turned.and_then(|(code, _)| axis_swap::signed_permutation(code)) {
             triads.iter_mut().for_each(|triad| triad.gain = turn.tr_mul(&triad.gain));
         }
         for finding in &conventions.findings {
             undo(finding, recording, &mut usable, &mut triads);
         }
         if !usable.iter().flatten().any(|row| *row) {
-            return Err(DiagnosisError::Recording("no sensor has a usable row".to_owned()));
+            let why = [vec!["no sensor has a usable row".to_owned()], of_stream.remarks].concat().join("; ");
+            return Err(DiagnosisError::Recording(why));
         }
         let mut remarks = conventions.remarks;
+        remarks.extend(repeated.flatten());
+        remarks.extend(of_pose.remarks);
+        remarks.extend(of_stream.remarks.iter().cloned());
         remarks.extend(of_reference);
         remarks.extend(model.remark.clone());
         // A machine's attitudes are no rests of a table, whose pointing errors repeat.
         remarks.extend(revisits::remark(&*movement).filter(|_| settings.noise.scatters));
         remarks.extend(shortcomings(recording));
-        let findings = conventions.findings;
-        Ok(Self { movement, held, clock, usable, triads, model, unmatched, findings, remarks })
+        let mut findings = of_pose.findings;
+        findings.extend(conventions.findings);
+        Ok(Self {
+            movement,
+            held,
+            clock,
+            usable,
+            triads,
+            model,
+            unmatched,
+            findings,
+            remarks,
+            without_position: of_pose.without_acc,
+            noisy_stream: of_stream.noisy,
+        })
     }
 }
 

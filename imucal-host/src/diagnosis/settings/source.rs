@@ -1,6 +1,6 @@
 //! Where the movement of a recording comes from, and what that provides.
 
-use crate::recording::{Recording, Stream};
+use crate::recording::{Recording, Stream, manifest::ReferenceKind};
 
 /// Where the movement of a recording comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,11 +25,27 @@ impl Source {
             (Some(_), ..) => Self::Simulator,
             (None, Some(_), ..) => Self::Rig,
             (None, None, Some(_), _) => Self::Simulator,
-            (None, None, None, Some(_)) if recording.position.is_some() => Self::Pose,
+            (None, None, None, Some(_)) if has_positions(recording) => Self::Pose,
             (None, None, None, Some(_)) => Self::Reference,
             (None, None, None, None) => Self::Rests,
         }
     }
+
+    /// The kind of a reference on the body; `None` of a rig and of rests.
+    pub fn reference(self) -> Option<ReferenceKind> {
+        match self {
+            Self::Reference => Some(ReferenceKind::Attitude),
+            Self::Pose => Some(ReferenceKind::Pose),
+            Self::Simulator => Some(ReferenceKind::Simulator),
+            Self::Rig | Self::Rests => None,
+        }
+    }
+}
+
+/// Positions are given somewhere.
+fn has_positions(recording: &Recording) -> bool {
+    let given = |row: &[f64; 3]| row.iter().all(|value| value.is_finite());
+    recording.position.as_ref().is_some_and(|positions| positions.iter().any(given))
 }
 
 /// What the source of a movement provides; an effect's needs are compared with it.

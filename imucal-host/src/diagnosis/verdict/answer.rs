@@ -30,6 +30,7 @@ pub fn untestable(recording: &Recording, why: String) -> Diagnosis {
         format: finding::FORMAT.to_owned(),
         recording: recording.name.clone(),
         verdict: Verdict::NotTestable,
+        reference: None,
         remarks: vec![why],
         warnings: recording.warnings.iter().map(ToString::to_string).collect(),
         gap: Vec::new(),
@@ -165,7 +166,7 @@ pub fn answer(
     let terms = reference_clock::terms(explained, preparation.clock)?;
     let apart = reference_clock::candidates(explained.linear.candidates, &terms);
     let clock = match &apart {
-        Some(apart) => reference_clock::clock(explained, apart, &terms, remainder)?,
+        Some(apart) => reference_clock::clock(explained, apart, &terms, &found, remainder)?,
         None => None,
     };
     let closed = clock.as_ref().map_or(&tested.closed, |clock| &clock.closed);

@@ -72,24 +72,28 @@ pub fn candidates(candidates: &Candidates, terms: &[Term]) -> Option<Candidates>
     (!named.is_empty()).then_some(with)
 }
 
-/// The named terms that held-out blocks bear out; `remainder` is the whitened size of what a driver still follows. `None`
+/// The named terms that held-out blocks bear out beside the `confirmed` causes; `remainder` is the whitened size of what a driver still follows. `None`
 /// where there is none.
 pub fn clock<'s>(
     explained: &'s Solution<'s>,
     candidates: &'s Candidates,
     terms: &[Term],
+    confirmed: &[Cause],
     remainder: f64,
 ) -> Result<Option<Clock<'s>>, DiagnosisError> {
     let Solution { linear, best, fit, .. } = explained;
-    let set: Vec<&'static Effect> =
-        best.set.iter().copied().chain(terms.iter().map(|term| term.effect)).collect();
+    // An effect that is not asserted would take its share of the held-out blocks all the same.
+    let is_confirmed = |effect: &&'static Effect| confirmed.iter().any(|cause| cause.effect == effect.id);
+    let mut set: Vec<&'static Effect> = best.set.iter().copied().filter(is_confirmed).collect();
+    let others = set.len();
+    set.extend(terms.iter().map(|term| term.effect));
     let shown = |term: &Term| {
         let value = |amount: &Amount| amount.value.unwrap_or_default().clamp(-LINEAR, LINEAR);
         (term.effect, term.parameters.iter().map(value).collect())
     };
     let linear = linear.with_effects(candidates, fit, terms.iter().map(shown).collect());
     let closed = shares::closed(&linear, &set, &best.noise, remainder)?;
-    let own = terms.iter().zip(&closed.each[best.set.len()..]).filter(|(_, share)| share.interval[0] > 0.0);
+    let own = terms.iter().zip(&closed.each[others..]).filter(|(_, share)| share.interval[0] > 0.0);
     let causes: Vec<Cause> = own
         .map(|(term, share)| Cause {
             effect: term.effect.id.clone(),

@@ -13,8 +13,11 @@ use crate::{
 };
 
 /// Effects of the catalogue that are no formula, `P.` for each sensor, and why.
-const NO_FORMULAS: [(&str, &str); 32] = [
+const NO_FORMULAS: [(&str, &str); 35] = [
     ("ref.motion_mismatch", "it moves the machine"),
+    ("ref.mount_slip", "it turns all that is sensed before the triads"),
+    ("ref.attitude_noise", "it has no pattern"),
+    ("ref.position_noise", "it has no pattern"),
     ("rig.level_tilt", "it moves the rig"),
     ("rig.heading", "it moves the rig"),
     ("rig.encoder_offset", "it moves the rig"),

@@ -8,7 +8,7 @@ use super::{
     header_fault::{HeaderFault, MisspeltColumn, names_listed},
 };
 use crate::recording::{
-    ExtraColumn, place::Places, read_error::ReadError, sensor_kind::SensorKind, unit::TimeUnit,
+    ExtraColumn, place::Places, read_error::ReadError, sensor_kind::SensorKind, topic, unit::TimeUnit,
     warning::Warning,
 };
 
@@ -194,7 +194,7 @@ impl Layout {
             let (expected, unit) = meant(found, &absent)?;
             Some(MisspeltColumn { found: found.clone(), expected, unit })
         };
-        self.extra.iter().filter_map(guess).collect()
+        self.extra.iter().filter(|name| topic::split(name).is_none()).filter_map(guess).collect()
     }
 
     /// Bytes that a row takes in memory, but for the text of unknown columns.

@@ -26,6 +26,7 @@ fn diagnosis(verdict: Verdict) -> Diagnosis {
         format: FORMAT.to_owned(),
         recording: "case-0007.csv".to_owned(),
         verdict,
+        reference: None,
         remarks: Vec::new(),
         warnings: Vec::new(),
         gap: vec![Gap {
@@ -104,4 +105,28 @@ fn what_is_no_number_is_null_in_the_json() {
     let json = serde_json::to_value(&odd).unwrap();
     assert!(json["gap"][0]["noise_floor"].is_null() && json["gap_closed_total"].is_null());
     assert_eq!((&json["verdict"], &json["where"][0]["share"]), (&"partly".into(), &0.83.into()));
+}
+
+#[test]
+fn a_simulator_s_page_says_what_to_change_first_and_what_remains() {
+    let mut beside = diagnosis(Verdict::Explained);
+    beside.reference = Some(ReferenceKind::Simulator);
+    let mut clock = cause();
+    clock.effect = "clk.time_offset".into();
+    clock.parameters = vec![amount("offset", Some(0.0124), Some(1e-4), "s")];
+    (clock.gap_closed, clock.gap_closed_ci95) = (Some(0.99), Some([0.98, 1.0]));
+    beside.causes.push(clock);
+    beside.gap[0].noise_floor = 0.05;
+    let text = page(&beside);
+    let place = |part: &str| text.find(part).unwrap_or_else(|| panic!("{part} is missing in {text}"));
+    let parts = [
+        "what to change in the simulator",
+        "1. clk.time_offset, 99 % (98 to 100 %): offset 12.40 ± 0.10 ms",
+        "2. mag.bias_step, 97 %",
+        "before      after",
+        "what remains\n  nothing beyond the noise",
+    ];
+    assert!(parts.map(place).is_sorted(), "{text}");
+    beside.gap[0].noise_floor = 0.01;
+    assert!(page(&beside).contains("mag x: 5.1e-2 uT beyond the noise"), "{}", page(&beside));
 }

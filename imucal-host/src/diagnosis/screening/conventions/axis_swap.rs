@@ -17,6 +17,9 @@ const MARGIN: f64 = 6.0;
 /// The best must leave no more than this share of the samples' variance.
 const LEFT: f64 = 0.1;
 
+/// An accelerometer's mean is off by less than this share of gravity, where its axes are right.
+const OFF_GRAVITY: f64 = 0.5;
+
 /// How a triad relates to what it was given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Scale {
@@ -45,15 +48,47 @@ pub(crate) fn check(pairs: &[Option<Pairs>; 3], found: &mut Conventions) -> [Opt
     });
     if let Some(code) = turned {
         found.remarks.push(turned_words(*code, codes.len()));
-        found.turned = Some(*code);
+        let least = orders.iter().flatten().map(|order| order.p_value).fold(1.0, f64::min);
+        found.turned = Some((*code, least));
     } else {
         for (kind, order) in SensorKind::ALL.into_iter().zip(&orders) {
             let Some(order) = order.filter(|order| order.code != 0 && order.p_value < SURE) else { continue };
-            let value = [(Some(order.code as f64), Some(0.0))];
-            found.findings.extend(Finding::new(&format!("{kind}.axis_swap"), &value, order.p_value));
+            found.findings.extend(finding(kind, order.code, order.p_value));
         }
     }
     orders.map(|order| order.map(|order| order.scale))
+}
+
+/// The code under which an accelerometer senses gravity where it should and follows the rest best, where that is not the
+/// given one: its axes are others than those of the other sensors. `None` where it shares theirs.
+pub(crate) fn against_gravity(pairs: &Pairs, code: usize) -> Option<usize> {
+    let (felt, given) = pairs.means();
+    let off = |code: usize| {
+        axis_swap::signed_permutation(code).map_or(f64::INFINITY, |p| (felt - p * given).norm())
+    };
+    let most = OFF_GRAVITY * given.norm();
+    if off(code) < most {
+        return None;
+    }
+    let moments = pairs.trusted().moments();
+    let left = |code: &usize| {
+        let p = axis_swap::signed_permutation(*code).unwrap_or_else(Matrix3::identity);
+        -(p.transpose() * moments.cross).trace()
+    };
+    let upright = (0..axis_swap::CODES).filter(|code| off(*code) < most);
+    upright.min_by(|a, b| left(a).total_cmp(&left(b)))
+}
+
+/// A sensor's axes are those of a code.
+pub(crate) fn finding(kind: SensorKind, code: usize, p_value: f64) -> Option<Finding> {
+    Finding::new(&format!("{kind}.axis_swap"), &[(Some(code as f64), Some(0.0))], p_value)
+}
+
+/// The sensor and code of such a finding; `None` of another one.
+pub(crate) fn code_of(finding: &Finding) -> Option<(SensorKind, usize)> {
+    let kind = *finding.effect.sensors.first()?;
+    let is_swap = finding.effect.id == format!("{kind}.axis_swap");
+    Some((kind, finding.parameters.first()?.value.filter(|_| is_swap)? as usize))
 }
 
 /// All triads agree on a turn that a mount can have.

@@ -39,11 +39,7 @@ pub(crate) fn check(
     if of_acc <= FOLLOWS || of_gyr > FOLLOWS {
         return None;
     }
-    let (samples, usable) = (&recording.acc.as_ref()?.values, &integrity.sensor(SensorKind::Acc)?.usable);
-    let rows = rows.iter().zip(truth).filter(|(row, _)| usable[**row]);
-    let rows: Vec<(Vector3<f64>, Entries)> = rows
-        .map(|(row, truth)| (samples[*row], Entries::from_iterator(truth.c_t_p.iter().copied())))
-        .collect();
+    let rows = gravity_rows(recording, integrity, rows, truth)?;
     let (acceleration, variance) = left(&rows)?;
     (acceleration > STRONG * STRONG && acceleration > FOLLOWS * variance).then(|| {
         format!(
@@ -54,6 +50,37 @@ pub(crate) fn check(
             acceleration.sqrt()
         )
     })
+}
+
+/// What a reference attitude leaves open of an accelerometer that is compared with it: it predicts no linear acceleration.
+pub(crate) fn left_open(
+    recording: &Recording,
+    integrity: &Integrity,
+    rows: &[usize],
+    truth: &[Truth],
+) -> Option<String> {
+    let (acceleration, variance) = left(&gravity_rows(recording, integrity, rows, truth)?)?;
+    (variance > 0.0).then(|| {
+        format!(
+            "the reference holds no position, so that linear acceleration is not predicted: {:.2} m/s² root mean square of \
+             the accelerometer's samples, {:.1} % of their variance, stays open between movement, noise and the sensor",
+            acceleration.sqrt(),
+            100.0 * acceleration / variance
+        )
+    })
+}
+
+/// Usable samples beside the entries of the attitude.
+fn gravity_rows(
+    recording: &Recording,
+    integrity: &Integrity,
+    rows: &[usize],
+    truth: &[Truth],
+) -> Option<Vec<(Vector3<f64>, Entries)>> {
+    let (samples, usable) = (&recording.acc.as_ref()?.values, &integrity.sensor(SensorKind::Acc)?.usable);
+    let rows = rows.iter().zip(truth).filter(|(row, _)| usable[**row]);
+    let entries = |truth: &Truth| Entries::from_iterator(truth.c_t_p.iter().copied());
+    Some(rows.map(|(row, truth)| (samples[*row], entries(truth))).collect())
 }
 
 /// Mean square of what no linear function of the entries explains of the samples, and the samples' variance.

@@ -58,6 +58,20 @@ impl Pairs {
         rows: &[usize],
         truth: &[Truth],
     ) -> Option<Self> {
+        let pairs = Self::all(recording, integrity, kind, rows, truth)?;
+        let moments = pairs.moments();
+        let spread = (f64::max(moments.input.trace(), moments.output) / moments.rows).sqrt();
+        (pairs.rows.len() >= FEWEST && spread > STRONG[kind as usize]).then_some(pairs)
+    }
+
+    /// Likewise, however little they vary. `None` without the sensor.
+    pub(crate) fn all(
+        recording: &Recording,
+        integrity: &Integrity,
+        kind: SensorKind,
+        rows: &[usize],
+        truth: &[Truth],
+    ) -> Option<Self> {
         let samples = &recording.sensor(kind)?.values;
         let sensor = integrity.sensor(kind)?;
         let measured = |row: usize| samples[row].iter().all(|component| component.is_finite());
@@ -67,18 +81,21 @@ impl Pairs {
         let taken = |row: usize| if beyond { measured(row) } else { sensor.usable[row] };
         let rows = rows.iter().zip(truth).filter(|(row, _)| taken(**row));
         let rows: Vec<_> = rows.map(|(row, truth)| (samples[*row], given(kind, truth))).collect();
-        let pairs = Self { rows };
-        let moments = pairs.moments();
-        let spread = (f64::max(moments.input.trace(), moments.output) / moments.rows).sqrt();
-        (pairs.rows.len() >= FEWEST && spread > STRONG[kind as usize]).then_some(pairs)
+        Some(Self { rows })
+    }
+
+    /// Means of samples and inputs.
+    pub(crate) fn means(&self) -> (Vector3<f64>, Vector3<f64>) {
+        let sum =
+            self.rows.iter().fold((Vector3::zeros(), Vector3::zeros()), |(y, v), row| (y + row.0, v + row.1));
+        let rows = self.rows.len().max(1) as f64;
+        (sum.0 / rows, sum.1 / rows)
     }
 
     /// Moments of all rows.
     pub(crate) fn moments(&self) -> Moments {
         let rows = self.rows.len() as f64;
-        let (y, v) =
-            self.rows.iter().fold((Vector3::zeros(), Vector3::zeros()), |(y, v), row| (y + row.0, v + row.1));
-        let (y, v) = (y / rows, v / rows);
+        let (y, v) = self.means();
         let mut moments = Moments { rows, cross: Matrix3::zeros(), output: 0.0, input: Matrix3::zeros() };
         for row in &self.rows {
             let (y, v) = (row.0 - y, row.1 - v);
