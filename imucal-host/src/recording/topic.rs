@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn each_topic_has_its_own_columns() {
         let recording =
-            Fixture::new("run.csv", "", &format!("{HEADER}0,0,0,9.8,1,2,3\n0.01,,,,4,5,6\n")).read();
+            Fixture::new("run.csv", "", format!("{HEADER}0,0,0,9.8,1,2,3\n0.01,,,,4,5,6\n")).read();
         assert_eq!(names(&recording), ["torso", "left_foot"]);
         let torso = simulated(&recording, "torso").unwrap();
         let acc = torso.acc.unwrap();
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_with_a_topic_is_said() {
-        let recording = Fixture::new("run.csv", "", &format!("{HEADER}0,0,0,up,1,2,3\n")).read();
+        let recording = Fixture::new("run.csv", "", format!("{HEADER}0,0,0,up,1,2,3\n")).read();
         let told = |name: &str| simulated(&recording, name).unwrap_err().to_string();
         assert!(
             told("feet").contains("no topic `feet`, expected one of torso, left_foot"),

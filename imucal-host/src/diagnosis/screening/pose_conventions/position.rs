@@ -144,7 +144,7 @@ mod tests {
         let way = |t: f64| if t < 20.0 { t.sin() } else { t.sin() + 0.4 };
         let positions = |step: f64| {
             let round = |p: f64| if step > 0.0 { (p / step).round() * step } else { p };
-            Some(time.iter().map(|t| [round(way(*t)), round(0.1 * t), 0.0]).collect::<Vec<_>>())
+            Some(time.iter().map(|t| [round(way(*t)), round(0.1 * (0.7 * t).cos()), 0.0]).collect::<Vec<_>>())
         };
         let mut pose = Pose { attitudes: vec![None; 4000], positions: positions(0.0) };
         let told = mend_jumps(&time, &mut pose).unwrap();
