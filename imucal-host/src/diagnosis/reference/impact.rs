@@ -44,7 +44,7 @@ const PAUSE: f64 = 3.0;
 const LEAST_SCATTER: f64 = 0.3;
 /// One impact counts no more than so many standard deviations, and the mean of several in a row is unusual from so many on.
 const LARGEST: f64 = 4.0;
-const UNUSUAL: f64 = 6.5;
+const UNUSUAL: f64 = 8.5;
 
 /// The impacts of a recording and of the stream that it is compared with.
 #[derive(Clone, Debug, PartialEq)]
