@@ -156,7 +156,7 @@ mod tests {
     /// A turn that comes and goes within 3 to 7 s, rad, and its rate, rad/s.
     fn turned(time: f64) -> (Vector3<f64>, Vector3<f64>) {
         let phase = ((time - 3.0) / 4.0).clamp(0.0, 1.0) * std::f64::consts::TAU;
-        let size = Vector3::new(2e-3, -3e-3, 8e-3);
+        let size = Vector3::new(5e-3, -8e-3, 2e-2);
         (size * (1.0 - phase.cos()) * 0.5, size * (phase.sin() * std::f64::consts::TAU / 8.0))
     }
 
