@@ -3,7 +3,7 @@
 //! | file | what |
 //! | --- | --- |
 //! | [`held`] | values that are repeated until the next one comes |
-//! | [`unit`] | values in another unit |
+//! | [`mod@unit`] | values in another unit |
 //! | [`gravity`] | coordinate acceleration instead of specific force |
 //! | [`sparse`] | samples too far apart for what lies between them |
 //! | [`own_noise`] | noise and steps of the stream's own |
