@@ -98,8 +98,9 @@ fn a_small_set_of_sealed_trials_with_robots_is_answered_as_the_contract_asks() {
     let score = robot_score(&judged);
     println!("{}", score.table());
     judged.iter().filter(|judged| judged.is_missed()).for_each(|judged| println!("{}", judged.line()));
+    // Of formulas so few are drawn that none may be right by chance; the full set says how often they are.
     for share in &score.shares {
-        assert!(!is_refused(share), "{}: {} of {}", share.name, share.hits, share.trials);
+        assert!(!is_beyond_chance(share), "{}: {} of {}", share.name, share.hits, share.trials);
     }
 }
 
