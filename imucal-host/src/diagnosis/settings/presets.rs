@@ -80,7 +80,6 @@ impl Settings {
             verdict: VerdictSettings {
                 confirms_held_out: true,
                 only_material: true,
-                errors_from_parts: true,
                 outweighs_remainder: true,
                 carried: 10.0,
                 least_of_all: 0.01,
@@ -99,6 +98,7 @@ impl Settings {
         Self {
             source: Provided { position: true, placed: true, ..reference.source },
             residual: ResidualSettings { weighs_vibration: true, ..reference.residual },
+            verdict: VerdictSettings { errors_from_parts: true, ..reference.verdict },
             ..reference
         }
     }

@@ -14,6 +14,7 @@ use crate::{
     diagnosis::{
         error::DiagnosisError,
         finding::{self, Cause, Diagnosis, Place, Verdict},
+        library::candidates::Candidates,
         location::{covariate::Covariate, covariates, score_test, score_test::Following},
         reference::{model::Model, movement},
         screening::preparation::Preparation,
@@ -120,9 +121,13 @@ impl Asserted {
         self.remarks.extend(self.causes.extract_if(.., is_within).map(remark));
     }
 
-    /// Takes out the causes that close less than a share of the gap once the clock's terms are a part of it.
-    fn take_out_smallest(&mut self, least: f64) {
-        let is_small = |cause: &mut Cause| cause.gap_closed.is_some_and(|share| share < least);
+    /// Takes out the causes that close less than a share of the gap once the clock's terms are a part of it. Terms that were
+    /// taken out of the baseline stay: every sensor has them.
+    fn take_out_smallest(&mut self, least: f64, candidates: &Candidates) {
+        let was_taken_out = |id: &str| candidates.taken_out.iter().any(|term| term.id == id);
+        let is_small = |cause: &mut Cause| {
+            cause.gap_closed.is_some_and(|share| share < least) && !was_taken_out(&cause.effect)
+        };
         let credible_set = &mut self.credible_set;
         let remark = |cause: Cause| {
             credible_set.retain(|id| *id != cause.effect && !cause.equivalents.contains(id));
@@ -186,7 +191,7 @@ pub fn answer(
     let mut total = is_closed.then_some(closed.total);
     if let Some(clock) = &clock {
         share_with(clock, &mut asserted.causes);
-        asserted.take_out_smallest(settings.verdict.least_of_all);
+        asserted.take_out_smallest(settings.verdict.least_of_all, explained.linear.candidates);
         clock.causes.iter().rev().for_each(|cause| asserted.put_first(cause.clone()));
     }
     preparation.findings.iter().rev().for_each(|finding| asserted.put_first(fault::cause(finding)));
@@ -249,14 +254,15 @@ fn small(effect: &str, share: f64) -> String {
     format!("not asserted: {effect} closes {:.1} % of the gap", 100.0 * share)
 }
 
-/// Takes out the causes that explain less of a sensor than what its residual still follows, or next to nothing of the gap;
-/// remarks on them.
+/// Takes out the causes that explain less of a sensor than what its residual still follows, or next to nothing of the gap, unless
+/// every sensor has them; remarks on them.
 fn outweighed(causes: &mut Vec<Cause>, explained: &Solution<'_>, tested: &Tested) -> Vec<String> {
     let settings = explained.linear.scene.settings;
     let remark = |cause: &Cause| {
         let at = explained.best.set.iter().position(|effect| effect.id == cause.effect)?;
         let share = tested.closed.each.get(at)?.value;
-        if share < settings.verdict.least_of_all {
+        let was_taken_out = explained.linear.candidates.was_taken_out(explained.best.set[at]);
+        if share < settings.verdict.least_of_all && !was_taken_out {
             return Some(small(&cause.effect, share));
         }
         let own = share * tested.closed.explainable;
