@@ -261,8 +261,10 @@ fn outweighed(causes: &mut Vec<Cause>, explained: &Solution<'_>, tested: &Tested
     let remark = |cause: &Cause| {
         let at = explained.best.set.iter().position(|effect| effect.id == cause.effect)?;
         let share = tested.closed.each.get(at)?.value;
-        let was_taken_out = explained.linear.candidates.was_taken_out(explained.best.set[at]);
-        if share < settings.verdict.least_of_all && !was_taken_out {
+        if explained.linear.candidates.was_taken_out(explained.best.set[at]) {
+            return None;
+        }
+        if share < settings.verdict.least_of_all {
             return Some(small(&cause.effect, share));
         }
         let own = share * tested.closed.explainable;
