@@ -97,23 +97,23 @@ const BINS: [f64; 6] = [0.0, 0.5, 0.8, 0.95, 0.99, 1.0];
 
 use Goal::{AtLeast, AtMost, Within};
 
-/// A share of trials: among which, which of them hit, and what the contract asks of it.
-struct Figure {
-    name: &'static str,
-    of: fn(&Judgement) -> bool,
-    hit: fn(&Judgement) -> bool,
-    must: Option<Goal>,
-    aim: Option<Goal>,
+/// A share of judged trials: among which, which of them hit, and what the contract asks of it.
+pub(in crate::blind) struct Figure<J> {
+    pub(super) name: &'static str,
+    pub(super) of: fn(&J) -> bool,
+    pub(super) hit: fn(&J) -> bool,
+    pub(super) must: Option<Goal>,
+    pub(super) aim: Option<Goal>,
 }
 
-impl Figure {
-    fn of(&self, judged: &[Judgement]) -> Share {
-        let trials: Vec<&Judgement> = judged.iter().filter(|j| (self.of)(j)).collect();
+impl<J> Figure<J> {
+    pub(super) fn of(&self, judged: &[J]) -> Share {
+        let trials: Vec<&J> = judged.iter().filter(|j| (self.of)(j)).collect();
         let hits = trials.iter().filter(|j| (self.hit)(j)).count();
         Share { name: self.name, hits, trials: trials.len(), must: self.must, aim: self.aim }
     }
 
-    const fn besides(name: &'static str, of: fn(&Judgement) -> bool, hit: fn(&Judgement) -> bool) -> Self {
+    pub(super) const fn besides(name: &'static str, of: fn(&J) -> bool, hit: fn(&J) -> bool) -> Self {
         Self { name, of, hit, must: None, aim: None }
     }
 }
@@ -136,7 +136,7 @@ fn share_of(j: &Judgement) -> Option<Closed> {
 }
 
 /// The contract's figures.
-const CONTRACT: [Figure; 15] = [
+const CONTRACT: [Figure<Judgement>; 15] = [
     Figure {
         name: "false alarm on healthy recordings",
         of: is_healthy,
@@ -245,7 +245,7 @@ const CONTRACT: [Figure; 15] = [
 ];
 
 /// Figures next to the contract's.
-const FURTHER: [Figure; 16] = [
+const FURTHER: [Figure<Judgement>; 16] = [
     Figure::besides(
         "one effect, class-correct, λ < 60",
         |j| is_of_one(j) && (0.0..60.0).contains(&j.lambda),

@@ -1,7 +1,7 @@
 //! The frozen scorer of trials with robots: the figures of the contract's table, from judged trials.
 
 use super::{case::Content, judgement::RobotJudgement};
-use crate::blind::score::{Goal, Share};
+use crate::blind::score::{Figure, Goal, Share};
 
 use Goal::{AtLeast, AtMost};
 
@@ -18,31 +18,6 @@ pub struct RobotScore {
     pub seconds: [f64; 2],
 }
 
-/// A share of trials: among which, which of them hit, and what the contract asks of it.
-struct Figure {
-    name: &'static str,
-    of: fn(&RobotJudgement) -> bool,
-    hit: fn(&RobotJudgement) -> bool,
-    must: Option<Goal>,
-    aim: Option<Goal>,
-}
-
-impl Figure {
-    fn of(&self, judged: &[RobotJudgement]) -> Share {
-        let trials: Vec<&RobotJudgement> = judged.iter().filter(|j| (self.of)(j)).collect();
-        let hits = trials.iter().filter(|j| (self.hit)(j)).count();
-        Share { name: self.name, hits, trials: trials.len(), must: self.must, aim: self.aim }
-    }
-
-    const fn besides(
-        name: &'static str,
-        of: fn(&RobotJudgement) -> bool,
-        hit: fn(&RobotJudgement) -> bool,
-    ) -> Self {
-        Self { name, of, hit, must: None, aim: None }
-    }
-}
-
 fn holds(j: &RobotJudgement, content: Content) -> bool {
     j.label.content == content
 }
@@ -53,7 +28,7 @@ fn has_delay(j: &RobotJudgement) -> bool {
 }
 
 /// The contract's figures.
-const CONTRACT: [Figure; 7] = [
+const CONTRACT: [Figure<RobotJudgement>; 7] = [
     Figure {
         name: "healthy pairs, false alarm",
         of: |j| holds(j, Content::Healthy),
@@ -106,7 +81,7 @@ const CONTRACT: [Figure; 7] = [
 ];
 
 /// Figures next to the contract's.
-const FURTHER: [Figure; 13] = [
+const FURTHER: [Figure<RobotJudgement>; 13] = [
     Figure::besides(
         "one effect, class-correct, λ < 100",
         |j| holds(j, Content::Effect) && j.lambda < 100.0,
@@ -149,27 +124,21 @@ const FURTHER: [Figure; 13] = [
     ),
     Figure::besides("within the catalogue, flagged", |j| holds(j, Content::Effect), |j| j.flagged),
     Figure::besides("without an answer", |_| true, |j| j.answer.verdict.is_none()),
-    Figure {
-        name: "outside, a formula says it, flagged, λ ≥ 200: right",
-        of: |j| holds(j, Content::Spoken) && j.flagged && j.lambda >= 200.0,
-        hit: |j| j.formula_right,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "outside, a formula says it: a wrong formula",
-        of: |j| holds(j, Content::Spoken),
-        hit: |j| j.formula_wrong,
-        must: None,
-        aim: None,
-    },
-    Figure {
-        name: "a right formula, confirmed on a second recording",
-        of: |j| j.formula_right,
-        hit: |j| j.answer.proposals.iter().all(|proposed| proposed.confirmed == Some(true)),
-        must: None,
-        aim: None,
-    },
+    Figure::besides(
+        "outside, a formula says it, flagged, λ ≥ 200: right",
+        |j| holds(j, Content::Spoken) && j.flagged && j.lambda >= 200.0,
+        |j| j.formula_right,
+    ),
+    Figure::besides(
+        "outside, a formula says it: a wrong formula",
+        |j| holds(j, Content::Spoken),
+        |j| j.formula_wrong,
+    ),
+    Figure::besides(
+        "a right formula, confirmed on a second recording",
+        |j| j.formula_right,
+        |j| j.answer.proposals.iter().all(|proposed| proposed.confirmed == Some(true)),
+    ),
 ];
 
 /// Scores judged trials.
