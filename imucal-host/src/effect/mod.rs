@@ -293,7 +293,7 @@ fn only(kind: SensorKind) -> &'static [SensorKind] {
 }
 
 /// The SI-side unit of a sensor, as text.
-fn si(kind: SensorKind) -> String {
+pub(crate) fn si(kind: SensorKind) -> String {
     Unit::of(kind).first().map(ToString::to_string).unwrap_or_default()
 }
 
@@ -307,7 +307,7 @@ fn of<T>(kind: SensorKind, acc: T, gyr: T, mag: T) -> T {
 }
 
 /// The axes' names, for parameters of which there is one an axis.
-const XYZ: [&str; 3] = ["x", "y", "z"];
+pub(crate) const XYZ: [&str; 3] = ["x", "y", "z"];
 
 /// Every effect there is, in the order of the chain.
 pub static CATALOGUE: LazyLock<Vec<Effect>> = LazyLock::new(|| {

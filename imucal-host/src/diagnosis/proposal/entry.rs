@@ -4,11 +4,10 @@ use std::{fmt::Write, path::Path};
 
 use super::term::Formulated;
 use crate::{
-    effect::{Effect, user},
+    effect::{Effect, XYZ, user},
     recording::SensorKind,
 };
 
-const AXES: [&str; 3] = ["x", "y", "z"];
 /// Endings of the ids of a formula of two terms.
 const TERMS: [&str; 2] = ["_cos", "_sin"];
 /// A proposal's amplitude matters from this share of its fitted size on.
@@ -43,7 +42,7 @@ fn write_entry(
     let ending = if formula.terms.len() > 1 { TERMS[term] } else { "" };
     let quoted =
         |list: &[String]| list.iter().map(|text| format!("\"{text}\"")).collect::<Vec<_>>().join(", ");
-    let names: Vec<String> = axes.iter().map(|axis| AXES[*axis].to_owned()).collect();
+    let names: Vec<String> = axes.iter().map(|axis| XYZ[*axis].to_owned()).collect();
     let texts = formula.texts(term, axes);
     let size = amounts.iter().fold(1e-29f64, |most, (value, _)| most.max(value.abs()));
     writeln!(text, "[[effect]]")?;
@@ -68,7 +67,7 @@ fn write_entry(
     let fitted = |(name, value, error): (&str, f64, f64)| {
         format!("{name} = {{ value = {value:e}, std_error = {error:e} }}")
     };
-    let amplitudes = axes.iter().zip(amounts).map(|(axis, (value, error))| (AXES[*axis], *value, *error));
+    let amplitudes = axes.iter().zip(amounts).map(|(axis, (value, error))| (XYZ[*axis], *value, *error));
     let shape = formula.shape.iter().map(|s| (&*s.name, s.value, s.std_error.unwrap_or(0.0)));
     let all: Vec<String> = amplitudes.chain(shape).map(fitted).collect();
     writeln!(text, "fitted = {{ {} }}", all.join(", "))?;

@@ -11,7 +11,7 @@
 //! An amplitude an axis. Left out: what the baseline always has, such as the axis' own input.
 
 use super::term::{Driver, Formulated, Shape};
-use crate::recording::{SensorKind, Unit};
+use crate::{effect::si, recording::SensorKind};
 
 /// Periods a turn of a sinusoid in an angle.
 const PERIODS: std::ops::RangeInclusive<u32> = 2..=24;
@@ -61,11 +61,10 @@ pub fn formulas(kind: SensorKind, held: Held, largest: &dyn Fn(&Driver) -> f64) 
 
 /// Vectors that an axis may follow: of each, the component of the axis itself, of the next, and of the one after.
 fn vectors(kind: SensorKind, held: Held) -> Vec<Driver> {
-    let unit = |kind: SensorKind| Unit::of(kind).first().map(ToString::to_string).unwrap_or_default();
     let others = [("a", SensorKind::Acc), ("w", SensorKind::Gyr), ("B", SensorKind::Mag)];
     let known = |(_, of): &(&str, SensorKind)| *of != kind && (*of != SensorKind::Mag || held.field);
-    let mut fields = vec![("y", unit(kind))];
-    fields.extend(others.into_iter().filter(known).map(|(name, of)| (name, unit(of))));
+    let mut fields = vec![("y", si(kind))];
+    fields.extend(others.into_iter().filter(known).map(|(name, of)| (name, si(of))));
     fields.push(("wd", "rad/s^2".to_owned()));
     let each =
         fields.iter().flat_map(|(name, unit)| (0..3).map(move |next| Driver::vector(name, next, unit)));

@@ -20,11 +20,9 @@ use crate::{
         search::stepwise::Solution,
         settings::ProposalSettings,
     },
-    effect::Effect,
+    effect::{Effect, XYZ},
     recording::SensorKind,
 };
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// What all sensors have in common.
 struct Setting<'a, 's> {
@@ -216,7 +214,7 @@ impl<'s> Setting<'_, 's> {
         });
         Proposal {
             sensor: kind.prefix().to_owned(),
-            axes: axes.iter().map(|axis| AXES[*axis].to_owned()).collect(),
+            axes: axes.iter().map(|axis| XYZ[*axis].to_owned()).collect(),
             formula: formula.spelt(axes),
             parameters: tried.amounts.iter().enumerate().map(amplitude).chain(shape).collect(),
             equivalents: found.equivalents.iter().map(|other| other.formula.spelt(axes)).collect(),

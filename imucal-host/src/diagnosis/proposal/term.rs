@@ -1,11 +1,12 @@
 //! One formula that is tried: what each axis' amplitude multiplies, and how it is spelt.
 
 use crate::{
-    effect::user::{Formula, FormulaFault},
+    effect::{
+        XYZ, si,
+        user::{Formula, FormulaFault},
+    },
     recording::SensorKind,
 };
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A quantity that a formula is a function of.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,7 +59,7 @@ impl Driver {
     pub fn vector(name: &str, next: usize, unit: &str) -> Self {
         let text = |axis: usize| match next {
             0 => name.to_owned(),
-            next => format!("{name}_{}", AXES[(axis + next) % 3]),
+            next => format!("{name}_{}", XYZ[(axis + next) % 3]),
         };
         let which = ["own", "next", "last"][next];
         Self {
@@ -169,7 +170,7 @@ impl Formulated {
         let of_axis = |axis: &usize| {
             let amplitude = |term: usize| match axes.len() {
                 1 => AMPLITUDES[term].to_owned(),
-                _ => format!("{}_{}", AMPLITUDES[term], AXES[*axis]),
+                _ => format!("{}_{}", AMPLITUDES[term], XYZ[*axis]),
             };
             let term = |at: usize| format!("{} * {}", amplitude(at), factor(&self.on_axis(at, *axis)));
             (0..self.terms.len()).map(term).collect::<Vec<_>>().join(" + ")
@@ -177,7 +178,7 @@ impl Formulated {
         match axes {
             [axis] => of_axis(axis),
             axes => {
-                let line = |axis: &usize| format!("{}: {}", AXES[*axis], of_axis(axis));
+                let line = |axis: &usize| format!("{}: {}", XYZ[*axis], of_axis(axis));
                 axes.iter().map(line).collect::<Vec<_>>().join("; ")
             }
         }
@@ -185,7 +186,7 @@ impl Formulated {
 
     /// Name of an amplitude in what [`Self::spelt`] prints.
     pub fn amplitude_name(term: usize, axis: usize, axes: usize) -> String {
-        if axes == 1 { AMPLITUDES[term].to_owned() } else { format!("{}_{}", AMPLITUDES[term], AXES[axis]) }
+        if axes == 1 { AMPLITUDES[term].to_owned() } else { format!("{}_{}", AMPLITUDES[term], XYZ[axis]) }
     }
 
     /// A term's text in a user's file, of one axis or of all three.
@@ -200,7 +201,7 @@ impl Formulated {
 
     /// Unit of its amplitudes.
     pub fn amplitude_unit(&self, kind: SensorKind) -> String {
-        let sensor = crate::recording::Unit::of(kind).first().map(ToString::to_string).unwrap_or_default();
+        let sensor = si(kind);
         let is_one = self.unit.starts_with('(') || !self.unit.contains('/');
         match self.unit.is_empty() {
             true => sensor,
@@ -234,7 +235,7 @@ fn named_on(text: &str, axis: usize) -> String {
         named.push_str(&word);
         if ["y", "a", "w", "wd", "B"].contains(&word.as_str()) {
             named.push('_');
-            named.push_str(AXES[axis]);
+            named.push_str(XYZ[axis]);
         }
         word.clear();
         named.push(c);

@@ -27,7 +27,7 @@ use crate::{
         },
         search::linearisation::Linearisation,
     },
-    effect::Effect,
+    effect::{Effect, si},
     recording::SensorKind,
 };
 
@@ -306,10 +306,7 @@ pub fn table(
         Gap {
             sensor: channel.kind.prefix().to_owned(),
             axis: linear.scene.axis(channel.kind, channel.axis).to_owned(),
-            unit: crate::recording::Unit::of(channel.kind)
-                .first()
-                .map(ToString::to_string)
-                .unwrap_or_default(),
+            unit: si(channel.kind),
             rms_before: rms(&linear.baseline, &before),
             rms_after: rms(&all, &after),
             noise_floor: weighted(counts, |block| linear.weighing.variance(channel, noise, block)),

@@ -7,8 +7,8 @@
 use imucal_core::rotation::log;
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::super::reference::pose::Pose;
 use crate::{
+    diagnosis::reference::pose::Pose,
     observe::motion,
     recording::{Recording, SensorKind, check::integrity::Integrity},
 };

@@ -6,11 +6,12 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-use super::{
-    super::super::reference::pose::Pose,
-    attitude::{mount, rates},
+use super::attitude::{mount, rates};
+use crate::{
+    diagnosis::reference::pose::Pose,
+    effect::XYZ,
+    recording::{Recording, SensorKind, check::integrity::Integrity, unit::STANDARD_GRAVITY},
 };
-use crate::recording::{Recording, check::integrity::Integrity, unit::STANDARD_GRAVITY};
 
 /// The mean shows the vertical where it is at least this share of gravity.
 const SHOWN: f64 = 0.7;
@@ -28,13 +29,12 @@ pub fn level(recording: &Recording, integrity: &Integrity, pose: &Pose) -> Optio
     }
     let half_turn = Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
     let turn = Rotation3::rotation_between(&up, &down).map_or(half_turn, Rotation3::into_inner);
-    let names = ["x", "y", "z"];
     let axis = up.iamax();
     let sign = if up[axis] < 0.0 { '−' } else { '+' };
     let remark = format!(
         "the reference's frame has {sign}{} up, by what the accelerometer senses on average, where z down was expected; it is \
          turned by {:.0}°; write ref_q* and ref_p* in a frame whose third axis is down",
-        names[axis],
+        XYZ[axis],
         tilt.to_degrees()
     );
     Some((turn, remark))
@@ -42,8 +42,7 @@ pub fn level(recording: &Recording, integrity: &Integrity, pose: &Pose) -> Optio
 
 /// Up in the frame, where the accelerometer shows it.
 fn up(recording: &Recording, integrity: &Integrity, pose: &Pose) -> Option<Vector3<f64>> {
-    let (samples, usable) =
-        (&recording.acc.as_ref()?.values, &integrity.sensor(crate::recording::SensorKind::Acc)?.usable);
+    let (samples, usable) = (&recording.acc.as_ref()?.values, &integrity.sensor(SensorKind::Acc)?.usable);
     let mount = mount(&rates(recording, integrity, &recording.time, &pose.attitudes))
         .unwrap_or_else(Matrix3::identity);
     let rows = pose.attitudes.iter().zip(samples).zip(usable);

@@ -16,8 +16,11 @@ pub mod noise;
 pub mod position;
 pub mod rate;
 
-use super::{super::reference::pose::Pose, conventions::Finding};
-use crate::recording::{Recording, check::integrity::Integrity};
+use super::conventions::Finding;
+use crate::{
+    diagnosis::reference::pose::Pose,
+    recording::{Recording, check::integrity::Integrity},
+};
 
 /// The reference's pose, put right, and what was found in it.
 #[derive(Clone, Debug, Default)]

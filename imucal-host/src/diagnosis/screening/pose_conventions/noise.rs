@@ -7,8 +7,11 @@
 use imucal_core::rotation::log;
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::{super::reference::pose::Pose, bandwidth, conventions::Finding};
 use crate::{
+    diagnosis::{
+        reference::pose::Pose,
+        screening::{bandwidth, conventions::Finding},
+    },
     effect::{attitude_noise, position_noise},
     recording::{Recording, manifest::ReferenceKind, median, order_statistics::std_of_median},
     simulator::{

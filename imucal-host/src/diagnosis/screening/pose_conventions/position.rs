@@ -5,11 +5,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{
-    super::{super::reference::pose::Pose, bandwidth},
-    attitude::{mount, rates},
-};
+use super::attitude::{mount, rates};
 use crate::{
+    diagnosis::{reference::pose::Pose, screening::bandwidth},
     observe::quantum::quantum,
     recording::{Recording, SensorKind, check::integrity::Integrity, median},
     simulator::position_smoother::Readings,

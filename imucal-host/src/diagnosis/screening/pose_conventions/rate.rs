@@ -11,13 +11,12 @@
 use imucal_core::rotation::{exp, log};
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::super::reference::pose::Pose;
-use crate::{observe::motion::Attitudes, recording::median};
+use crate::{
+    diagnosis::{reference::pose::Pose, screening::held_values::held},
+    observe::motion::Attitudes,
+    recording::median,
+};
 
-/// Attitudes are repeated where half of them stand this often or more.
-const REPEATED: f64 = 2.0;
-/// Fewer changes than this are a body at rest.
-const FEWEST: usize = 50;
 /// Attitudes further apart than so many of their usual intervals have a gap between them, and those further apart than
 /// this, s, say nothing of what lies between.
 const GAP: f64 = 2.5;
@@ -29,24 +28,18 @@ const LONGEST: f64 = 0.12;
 pub fn fill(time: &[f64], pose: &mut Pose, fresh: bool) -> Vec<String> {
     let mut remarks = Vec::new();
     let same_attitude = |row: usize, pose: &Pose| pose.attitudes[row] == pose.attitudes[row - 1];
-    let repeated = repeated(time.len(), &|row| same_attitude(row, pose));
-    if let Some((rows, held)) = repeated {
-        rows.iter().for_each(|row| pose.attitudes[*row] = None);
-        remarks.push(held_words("attitude", "ref_q", held));
+    if let Some(found) = held(time.len(), &|row| same_attitude(row, pose)) {
+        found.repeated.iter().for_each(|row| pose.attitudes[*row] = None);
+        remarks.push(held_words("attitude", "ref_q", found.rows));
     }
     if let Some(positions) = pose.positions.as_mut().filter(|_| fresh) {
-        let repeated = repeated_positions(positions);
-        if let Some((rows, held)) = repeated {
-            rows.iter().for_each(|row| positions[*row] = [f64::NAN; 3]);
-            remarks.push(held_words("position", "ref_p", held));
+        if let Some(found) = held(positions.len(), &|row| positions[row] == positions[row - 1]) {
+            found.repeated.iter().for_each(|row| positions[*row] = [f64::NAN; 3]);
+            remarks.push(held_words("position", "ref_p", found.rows));
         }
     }
     remarks.extend(filled(time, &mut pose.attitudes));
     remarks
-}
-
-fn repeated_positions(positions: &[[f64; 3]]) -> Option<(Vec<usize>, f64)> {
-    repeated(positions.len(), &|row| positions[row] == positions[row - 1])
 }
 
 fn held_words(what: &str, column: &str, held: f64) -> String {
@@ -54,22 +47,6 @@ fn held_words(what: &str, column: &str, held: f64) -> String {
         "each {what} of the reference ({column}*) stands in {held:.0} rows, expected a new one in each or empty fields; the \
          first row of each is used"
     )
-}
-
-/// Rows that repeat the one before, and how many rows hold the same; `None` where most are new. At rest one that comes
-/// again after as many rows is as fresh as before.
-fn repeated(rows: usize, same: &dyn Fn(usize) -> bool) -> Option<(Vec<usize>, f64)> {
-    let starts: Vec<usize> = (0..rows).filter(|row| *row == 0 || !same(*row)).collect();
-    let held = median(starts.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect())?;
-    if held < REPEATED || starts.len() < FEWEST {
-        return None;
-    }
-    let ends = starts.iter().skip(1).copied().chain([rows]);
-    let old = |(start, end): (&usize, usize)| {
-        let start = *start;
-        (start..end).filter(move |row| !(row - start).is_multiple_of(held as usize))
-    };
-    Some((starts.iter().zip(ends).flat_map(old).collect(), held))
 }
 
 /// Fills in the rows between two attitudes.

@@ -5,34 +5,28 @@
 
 use std::borrow::Cow;
 
-use crate::recording::{Simulated, Stream, median};
-
-/// Values are repeated where half of them stand this often or more.
-const REPEATED: f64 = 2.0;
-/// Fewer changes than this are a machine at rest.
-const FEWEST: usize = 50;
+use crate::{
+    diagnosis::screening::held_values::held,
+    recording::{Simulated, Stream},
+};
 
 /// The stream without repeated values, and what a reader ought to know.
 pub fn fresh(stream: &Stream) -> (Cow<'_, Stream>, Option<String>) {
-    let rows = stream.time.len();
-    let starts: Vec<usize> = (0..rows).filter(|row| *row == 0 || !stream.values.is_repeated(*row)).collect();
-    let lengths = starts.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect();
-    let held = median(lengths).filter(|held| *held >= REPEATED && starts.len() > FEWEST);
-    let Some(held) = held else { return (Cow::Borrowed(stream), None) };
-    let step = held as usize;
-    // At rest the same value comes again and again, each time as fresh as before.
-    let ends = starts.iter().skip(1).copied().chain([rows]);
+    let Some(found) = held(stream.time.len(), &|row| stream.values.is_repeated(row)) else {
+        return (Cow::Borrowed(stream), None);
+    };
+    let mut repeated = found.repeated.iter().peekable();
     let kept: Vec<usize> =
-        starts.iter().zip(ends).flat_map(|(start, end)| (*start..end).step_by(step)).collect();
+        (0..stream.time.len()).filter(|row| repeated.next_if(|next| *next == row).is_none()).collect();
     let thinned = Stream {
         name: stream.name.clone(),
         time: kept.iter().map(|row| stream.time[*row]).collect(),
         values: Simulated::at(&stream.values, &kept),
     };
     let remark = format!(
-        "{}: each value of the stream stands in {held:.0} rows, expected a new one in each; the first row of each is \
+        "{}: each value of the stream stands in {:.0} rows, expected a new one in each; the first row of each is \
          used, the others are left out; export the simulator's samples at their own rate",
-        stream.name
+        stream.name, found.rows
     );
     (Cow::Owned(thinned), Some(remark))
 }

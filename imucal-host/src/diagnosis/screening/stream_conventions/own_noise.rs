@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::{
+    effect::si,
     observe::quantum::quantum,
     recording::{Recording, SensorKind, Simulated, Stream},
     simulator::{replay::readings_noise, streamed::own_noise},
@@ -10,10 +11,6 @@ use crate::{
 
 /// Noise of a stream above this share of the recorded one hides a part of the gap.
 const NOISY: f64 = 0.2;
-
-fn unit(kind: SensorKind) -> &'static str {
-    ["m/s²", "rad/s", "µT"][kind as usize]
-}
 
 /// Those sensors for which `found` is more than a share of the recorded noise, in words.
 fn shares(
@@ -76,7 +73,7 @@ fn parabolas(values: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
 /// Noise that is on a stream, for a reader.
 pub fn noise(recording: &Recording, stream: &Stream) -> Option<String> {
     let words = |kind: SensorKind, size: f64, share: f64| {
-        format!("{kind} {size:.2e} {} a sample, {:.0} % of the recorded", unit(kind), 100.0 * share)
+        format!("{kind} {size:.2e} {} a sample, {:.0} % of the recorded", si(kind), 100.0 * share)
     };
     let found = shares(recording, stream, &own_noise, &words);
     (!found.is_empty()).then(|| {
@@ -96,7 +93,7 @@ fn rounding(values: &[Vector3<f64>]) -> f64 {
 pub fn steps(recording: &Recording, stream: &Stream) -> Option<String> {
     let words = |kind: SensorKind, size: f64, share: f64| {
         let step = size * 12.0f64.sqrt();
-        format!("{kind} {step:.2e} {}, an error of {:.0} % of the recorded noise", unit(kind), 100.0 * share)
+        format!("{kind} {step:.2e} {}, an error of {:.0} % of the recorded noise", si(kind), 100.0 * share)
     };
     let found = shares(recording, stream, &rounding, &words);
     (!found.is_empty()).then(|| {

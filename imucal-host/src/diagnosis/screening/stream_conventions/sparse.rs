@@ -12,6 +12,7 @@
 use nalgebra::Vector3;
 
 use crate::{
+    effect::si,
     recording::{Recording, SensorKind, Stream, median},
     simulator::replay::readings_noise,
 };
@@ -33,7 +34,7 @@ pub fn remark(recording: &Recording, stream: &Stream, kind: SensorKind) -> Optio
     let error = SHARE * between(stream.values.sensor(kind)?)?;
     let noise = readings_noise(&recording.sensor(kind)?.values);
     (error > TOO_FAR * noise).then(|| {
-        let unit = ["m/s²", "rad/s", "µT"][kind as usize];
+        let unit = si(kind);
         format!(
             "the {kind} is left out: the stream has {:.0} samples a second and the recording {:.0}, and between two of them \
              the simulated {kind} is known to {error:.2e} {unit} only, with a noise of {noise:.2e} {unit} of a recorded sample; export the stream at {:.0} Hz or more",
