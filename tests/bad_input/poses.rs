@@ -1,4 +1,4 @@
-//! A reference's attitudes and positions that hold something else than they should: each is refused, or told and put right.
+//! A reference's attitudes and positions that hold something else than they should: each is refused, or reported and put right.
 
 use std::sync::OnceLock;
 

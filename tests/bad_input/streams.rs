@@ -1,4 +1,4 @@
-//! A simulator's stream, or a reference's pose, that holds something else than it should: each is refused or told in words
+//! A simulator's stream, or a reference's pose, that holds something else than it should: each is refused or reported in words
 //! that name what was found and what to do, and nothing of it is taken for an effect of a sensor.
 
 use std::{fs, path::Path, sync::OnceLock};

@@ -4,8 +4,8 @@
 //! C_t_n → C_t_n Exp(θ)      f_t → Exp(θ)ᵀ f_t,  w_t → Exp(θ)ᵀ w_t,  b_t → Exp(θ)ᵀ b_t      from t_start to t_end
 //! ```
 //!
-//! All sensors see the same turn at once. A slip that nobody mends has no end. Not modelled: the slip itself, which is over within a block or two, and one that
-//! goes on creeping.
+//! All sensors see the same turn at once. A slip that nobody mends has no end. Not modelled: the slip itself, which is over
+//! within a block or two, and one that goes on creeping.
 
 use imucal_core::rotation::exp;
 

@@ -128,13 +128,13 @@ mod tests {
     #[test]
     fn what_is_wrong_with_a_topic_is_said() {
         let recording = Fixture::new("run.csv", "", format!("{HEADER}0,0,0,up,1,2,3\n")).read();
-        let told = |name: &str| simulated(&recording, name).unwrap_err().to_string();
+        let said = |name: &str| simulated(&recording, name).unwrap_err().to_string();
         assert!(
-            told("feet").contains("no topic `feet`, expected one of torso, left_foot"),
+            said("feet").contains("no topic `feet`, expected one of torso, left_foot"),
             "{}",
-            told("feet")
+            said("feet")
         );
-        assert!(told("torso").contains("`sim_torso_acc_z`, row 1: found `up`"), "{}", told("torso"));
+        assert!(said("torso").contains("`sim_torso_acc_z`, row 1: found `up`"), "{}", said("torso"));
         let plain = Fixture::new("run.csv", "", "t,sim_acc_x,sim_acc_y,sim_acc_z\n0,0,0,9\n").read();
         assert!(simulated(&plain, "torso").unwrap_err().to_string().contains("leave --sim-topic out"));
         let cut = Fixture::new("run.csv", "", "t,sim_torso_acc_x,sim_torso_acc_y\n0,0,0\n").read();

@@ -193,7 +193,7 @@ fn write_equivalents(text: &mut String, effect: Option<&Effect>, cause: &Cause) 
     }
 }
 
-/// A shorter time than this is told in milliseconds, s.
+/// A shorter time than this is given in milliseconds, s.
 const SHORT: f64 = 0.1;
 
 /// `x 1.90 ± 0.02 uT`.

@@ -271,7 +271,7 @@ mod tests {
         effect::find,
         simulator::{
             Dose,
-            robot::{RobotKind, RobotScene},
+            robot::{MismatchKind, RobotKind, RobotScene},
         },
     };
 
@@ -291,6 +291,33 @@ mod tests {
             let scene = RobotScene { vibration: 3.0, ..of(kind) };
             let share = left_out(&scene);
             assert!(share < 0.05, "{kind:?} {share}");
+        }
+    }
+
+    #[test]
+    fn feet_that_strike_harder_than_the_simulator_says_are_a_stretch_and_others_are_none() {
+        let scene = RobotScene {
+            kind: RobotKind::Legged,
+            duration: 240.0,
+            real_rate: 500.0,
+            sim_rate: 500.0,
+            seed: 4,
+            ..RobotScene::default()
+        };
+        let unmatched = |scene: &RobotScene| {
+            let pair = scene.record("pair").unwrap();
+            impacts(&pair.real, &Stream::of(&pair.simulated).unwrap(), StreamClock::default()).unmatched
+        };
+        assert_eq!(unmatched(&scene), []);
+        let harder = RobotScene { mismatch: Some((MismatchKind::Contact, 6.0)), ..scene };
+        let stretches = harder.moved().unwrap().mismatch.stretches;
+        let found = unmatched(&harder);
+        assert!(!found.is_empty());
+        for found in found {
+            let (start, end) = (found.time.start + 1.0, found.time.end - 1.0);
+            let is_true =
+                stretches.iter().any(|stretch| start > stretch.span.0 - 1.0 && end < stretch.span.1 + 1.0);
+            assert!(is_true && found.force > 1.0, "{found:?} {stretches:?}");
         }
     }
 

@@ -12,7 +12,7 @@ use crate::{
     report::prose::hanging,
 };
 
-/// What is left above the noise from this ratio on is told.
+/// What is left above the noise from this ratio on is reported.
 const ABOVE_NOISE: f64 = 1.2;
 /// Stretches repeat where this share of their distances are whole periods, to this share of a period.
 const REPEATED: f64 = 0.8;
@@ -177,16 +177,16 @@ mod tests {
     }
 
     #[test]
-    fn stretches_that_repeat_are_told_by_their_period() {
-        let told = motion(&stretches(&[3.2, 7.21, 11.19, 19.2, 23.2], 0.4));
-        assert!(told.contains("in 5 stretches, 3.2–3.6 s of each 4.0 s, 2.0 s in all"), "{told}");
-        assert!(told.contains("up to 0.20 rad/s that the simulator lacks"), "{told}");
+    fn stretches_that_repeat_are_reported_by_their_period() {
+        let said = motion(&stretches(&[3.2, 7.21, 11.19, 19.2, 23.2], 0.4));
+        assert!(said.contains("in 5 stretches, 3.2–3.6 s of each 4.0 s, 2.0 s in all"), "{said}");
+        assert!(said.contains("up to 0.20 rad/s that the simulator lacks"), "{said}");
     }
 
     #[test]
-    fn stretches_that_do_not_repeat_are_told_one_by_one() {
-        let told = motion(&stretches(&[3.0, 9.0, 31.0, 40.0], 2.0));
-        assert!(told.contains("in 4 stretches (3.0–5.0, 9.0–11.0, 31.0–33.0, … s)"), "{told}");
+    fn stretches_that_do_not_repeat_are_reported_one_by_one() {
+        let said = motion(&stretches(&[3.0, 9.0, 31.0, 40.0], 2.0));
+        assert!(said.contains("in 4 stretches (3.0–5.0, 9.0–11.0, 31.0–33.0, … s)"), "{said}");
         assert!(motion(&stretches(&[3.0], 2.0)).contains("from 3.0 to 5.0 s"));
     }
 }

@@ -17,7 +17,7 @@ use crate::{
 const LOST: f64 = 0.02;
 /// and another reading is the right one where it leaves less than this share of that.
 const BETTER: f64 = 0.2;
-/// Readings that leave as much within this ratio are not told apart.
+/// Readings that leave as much within this ratio are not distinguished.
 const ALIKE: f64 = 1.5;
 /// Rows that are compared.
 const ROWS: usize = 4000;

@@ -16,7 +16,7 @@ use crate::{
 /// Nothing that is tracked is faster than this, m/s, nor so many times faster than it is in all but a thousandth of rows.
 const FASTEST: f64 = 10.0;
 const TIMES: f64 = 5.0;
-/// Steps from this on are told, m.
+/// Steps from this on are reported, m.
 const COARSE: f64 = 5e-4;
 /// Accelerations that belong together correlate by this at least.
 const FOLLOWS: f64 = 0.6;
@@ -82,14 +82,14 @@ pub fn other_unit(recording: &Recording, integrity: &Integrity, pose: &Pose) -> 
         .filter_map(|row| Some((pose.attitudes[row]? * mount.tr_mul(&samples[row]), moved[row]?)))
         .collect();
     let mean = pairs.iter().map(|(felt, _)| felt).sum::<Vector3<f64>>() / pairs.len().max(1) as f64;
-    let (mut along, mut felt, mut told) = (0.0, 0.0, 0.0);
+    let (mut along, mut felt, mut given) = (0.0, 0.0, 0.0);
     for (own, moved) in &pairs {
         let own = own - mean;
         along += own.dot(moved);
         felt += own.norm_squared();
-        told += moved.norm_squared();
+        given += moved.norm_squared();
     }
-    let follows = along / (felt * told).sqrt();
+    let follows = along / (felt * given).sqrt();
     if follows < -FOLLOWS {
         return Some(format!(
             "the reference's position moves against what the accelerometer senses (correlation {follows:.2}), expected along \
@@ -100,7 +100,7 @@ pub fn other_unit(recording: &Recording, integrity: &Integrity, pose: &Pose) -> 
     if follows.is_nan() || follows < FOLLOWS {
         return None;
     }
-    let scale = along / told;
+    let scale = along / given;
     let apart = |unit: f64| (scale / unit).ln().abs();
     let (unit, name) = UNITS.into_iter().min_by(|a, b| apart(a.0).total_cmp(&apart(b.0)))?;
     (apart(unit) < ALIKE.ln()).then(|| {
@@ -137,7 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn jumps_are_mended_and_steps_told() {
+    fn jumps_are_mended_and_steps_reported() {
         let time: Vec<f64> = (0..4000).map(|k| 0.01 * f64::from(k)).collect();
         let way = |t: f64| if t < 20.0 { t.sin() } else { t.sin() + 0.4 };
         let positions = |step: f64| {
@@ -145,8 +145,8 @@ mod tests {
             Some(time.iter().map(|t| [round(way(*t)), round(0.1 * (0.7 * t).cos()), 0.0]).collect::<Vec<_>>())
         };
         let mut pose = Pose { attitudes: vec![None; 4000], positions: positions(0.0) };
-        let told = mend_jumps(&time, &mut pose).unwrap();
-        assert!(told.contains("jumps 1 times, first at 20.00 s"), "{told}");
+        let said = mend_jumps(&time, &mut pose).unwrap();
+        assert!(said.contains("jumps 1 times, first at 20.00 s"), "{said}");
         let mended = pose.positions.as_ref().unwrap();
         let off = |row: usize| (mended[row][0] - time[row].sin()).abs();
         assert!(off(1999) < 1e-9 && off(2000) < 1e-3 && off(3999) < 1e-3);

@@ -123,8 +123,8 @@ mod tests {
         };
         for (repeats, remarks) in [(false, 1), (true, 2)] {
             let mut pose = thinned(repeats);
-            let told = fill(&time, &mut pose, true);
-            assert!(told.len() == remarks && told[remarks - 1].contains("30 attitudes a second"), "{told:?}");
+            let said = fill(&time, &mut pose, true);
+            assert!(said.len() == remarks && said[remarks - 1].contains("30 attitudes a second"), "{said:?}");
             for (time, found) in time.iter().zip(&pose.attitudes).take(5800).skip(200) {
                 let found = found.expect("filled in");
                 assert!(log(&found.tr_mul(&attitude(*time))).norm() < 2e-4, "{time}");

@@ -7,8 +7,8 @@ use crate::{
     recording::SensorKind,
 };
 
-/// A mount beyond this is told, rad: five degrees.
-const TOLD: f64 = 0.087;
+/// A mount beyond this is reported, rad: five degrees.
+const REPORTED: f64 = 0.087;
 /// All but the weakest direction of the movement must be at least this share of the strongest to show a turn.
 const SHOWN: f64 = 1e-3;
 
@@ -64,7 +64,7 @@ pub fn mounted(kind: SensorKind, cross: &Matrix3<f64>) -> Option<String> {
     sign[(weakest, weakest)] = (u * v_t).determinant().signum();
     let rotation = Rotation3::from_matrix_unchecked(u * sign * v_t);
     let (axis, angle) = rotation.axis_angle()?;
-    (angle > TOLD).then(|| {
+    (angle > REPORTED).then(|| {
         format!(
             "the {kind} is turned against the simulator's axes by {:.1}° about ({:.2}, {:.2}, {:.2}); the baseline takes it \
              up; give the simulated sensor the mounting of the real one",
@@ -83,20 +83,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mount_is_told_from_five_degrees_on() {
+    fn a_mount_is_reported_from_five_degrees_on() {
         let cross = |degrees: f64| {
             let mount = Rotation3::from_scaled_axis(Vector3::z() * degrees.to_radians());
             // Components go the other way than the sensor.
             mount.inverse().matrix() * Matrix3::from_diagonal(&Vector3::new(4.0, 2.0, 0.3))
         };
         assert_eq!(mounted(SensorKind::Gyr, &cross(3.0)), None);
-        let told = mounted(SensorKind::Gyr, &cross(30.0)).unwrap();
-        assert!(told.contains("by 30.0° about") && told.contains("1.00)"), "{told}");
+        let said = mounted(SensorKind::Gyr, &cross(30.0)).unwrap();
+        assert!(said.contains("by 30.0° about") && said.contains("1.00)"), "{said}");
         assert_eq!(mounted(SensorKind::Gyr, &Matrix3::from_diagonal(&Vector3::new(1.0, 0.0, 0.0))), None);
     }
 
     #[test]
-    fn mirrored_axes_and_reversed_gravity_are_told_apart() {
+    fn mirrored_axes_and_reversed_gravity_are_distinguished() {
         let left = apart(&[(SensorKind::Acc, 2), (SensorKind::Gyr, 5)]);
         assert!(left.contains("acc_y is negated") && left.contains("left-handed"), "{left}");
         assert!(apart(&[(SensorKind::Acc, 7)]).contains("gravity minus acceleration"));

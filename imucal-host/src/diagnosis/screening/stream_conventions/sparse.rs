@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 use crate::{
     effect::si,
-    recording::{Recording, SensorKind, Stream, median},
+    recording::{Recording, SensorKind, Stream, median, order_statistics::mean_without_largest},
     simulator::replay::readings_noise,
 };
 
@@ -21,6 +21,8 @@ use crate::{
 const SPARSE: f64 = 1.5;
 /// Error at the interval as a share of that at twice the interval.
 const SHARE: f64 = 0.25;
+/// The largest one in so many errors is one of impacts.
+const IMPACTS: usize = 5;
 /// A sensor is left out where the error is above so many times the noise of its samples.
 const TOO_FAR: f64 = 1.0;
 
@@ -45,14 +47,38 @@ pub fn remark(recording: &Recording, stream: &Stream, kind: SensorKind) -> Optio
     })
 }
 
-/// Root mean square of what neighbours do not predict, of the worst axis.
+/// Root mean square of what neighbours do not predict, of the worst axis, without the largest fifth: rows near impacts are
+/// left out anyhow ([`crate::diagnosis::reference::impact`]).
 fn between(values: &[Vector3<f64>]) -> Option<f64> {
     let errors: Vec<Vector3<f64>> = values
         .windows(7)
         .map(|w| w[3] - ((w[2] + w[4]) * 9.0 - w[0] - w[6]) / 16.0)
         .filter(|error| error.iter().all(|value| value.is_finite()))
         .collect();
-    let square = |axis: usize| errors.iter().map(|error| error[axis].powi(2)).sum::<f64>();
+    let square =
+        |axis: usize| mean_without_largest(errors.iter().map(|error| error[axis].powi(2)).collect(), IMPACTS);
     let most = (0..3).map(square).fold(0.0, f64::max);
-    (!errors.is_empty()).then(|| (most / errors.len() as f64).sqrt())
+    (!errors.is_empty()).then(|| most.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sway of 0.5 Hz, of so many samples a second, with a pulse of one sample in every so many.
+    fn sway(rate: f64, pulses: Option<usize>) -> Vec<Vector3<f64>> {
+        let value = |k: usize| {
+            let pulse = pulses.filter(|every| k.is_multiple_of(*every)).map_or(0.0, |_| 8.0);
+            Vector3::repeat((std::f64::consts::PI * k as f64 / rate).sin() + pulse)
+        };
+        (0..4000).map(value).collect()
+    }
+
+    #[test]
+    fn impacts_say_nothing_of_how_far_a_stream_is_known_between_its_samples() {
+        let [dense, slow] = [100.0, 3.0].map(|rate| between(&sway(rate, None)).unwrap());
+        assert!(dense < 1e-5 && slow > 1e-2, "{dense} {slow}");
+        let struck = between(&sway(100.0, Some(50))).unwrap();
+        assert!(struck < 10.0 * dense, "{struck} {dense}");
+    }
 }
