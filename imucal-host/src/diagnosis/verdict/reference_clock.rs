@@ -72,8 +72,8 @@ pub fn candidates(candidates: &Candidates, terms: &[Term]) -> Option<Candidates>
     (!named.is_empty()).then_some(with)
 }
 
-/// The named terms that held-out blocks bear out beside the `confirmed` causes; `remainder` is the whitened size of what a driver still follows. `None`
-/// where there is none.
+/// The named terms that held-out blocks bear out together with the `confirmed` causes; `remainder` is the whitened size of
+/// what a driver still follows. `None` where there is none.
 pub fn clock<'s>(
     explained: &'s Solution<'s>,
     candidates: &'s Candidates,
