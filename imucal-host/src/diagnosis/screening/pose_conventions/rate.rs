@@ -32,11 +32,11 @@ pub fn fill(time: &[f64], pose: &mut Pose, fresh: bool) -> Vec<String> {
         found.repeated.iter().for_each(|row| pose.attitudes[*row] = None);
         remarks.push(held_words("attitude", "ref_q", found.rows));
     }
-    if let Some(positions) = pose.positions.as_mut().filter(|_| fresh) {
-        if let Some(found) = held(positions.len(), &|row| positions[row] == positions[row - 1]) {
-            found.repeated.iter().for_each(|row| positions[*row] = [f64::NAN; 3]);
-            remarks.push(held_words("position", "ref_p", found.rows));
-        }
+    if let Some(positions) = pose.positions.as_mut().filter(|_| fresh)
+        && let Some(found) = held(positions.len(), &|row| positions[row] == positions[row - 1])
+    {
+        found.repeated.iter().for_each(|row| positions[*row] = [f64::NAN; 3]);
+        remarks.push(held_words("position", "ref_p", found.rows));
     }
     remarks.extend(filled(time, &mut pose.attitudes));
     remarks
