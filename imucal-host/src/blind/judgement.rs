@@ -148,11 +148,8 @@ impl Judgement {
         };
         let there: Vec<String> = self.label.effects.iter().map(effect).collect();
         let cause = |cause: &Asserted| {
-            let equivalents = match cause.equivalents.len() {
-                0 => String::new(),
-                _ => format!(" = {}", cause.equivalents.join(", ")),
-            };
-            format!("{} p {:.3}{equivalents}", cause.effect, cause.probability.unwrap_or(f64::NAN))
+            let probability = cause.probability.unwrap_or(f64::NAN);
+            format!("{} p {probability:.3}{}", cause.effect, equivalents(cause))
         };
         let causes: Vec<String> = self.answer.causes.iter().map(cause).collect();
         let verdict = self.answer.verdict.and_then(|verdict| serde_json::to_value(verdict).ok());
@@ -175,6 +172,14 @@ impl Judgement {
     }
 }
 
+/// The declared equivalents of a cause, as a part of a line; empty without one.
+pub(super) fn equivalents(cause: &Asserted) -> String {
+    match cause.equivalents.len() {
+        0 => String::new(),
+        _ => format!(" = {}", cause.equivalents.join(", ")),
+    }
+}
+
 /// The proposed formulas in words, as a part of a line; empty without one.
 pub(super) fn formulas(answer: &Answer) -> String {
     let one = |proposed: &Proposed| {
@@ -193,7 +198,8 @@ fn stands_for(cause: &Asserted, id: &str) -> bool {
     cause.effect == id || cause.equivalents.iter().take(COUNTED).any(|equivalent| equivalent == id)
 }
 
-fn stands_for_class(cause: &Asserted, id: &str) -> bool {
+/// The cause or one of its declared equivalents is of the class of an id.
+pub(super) fn stands_for_class(cause: &Asserted, id: &str) -> bool {
     let equivalents = cause.equivalents.iter().take(COUNTED);
     std::iter::once(&cause.effect).chain(equivalents).any(|named| class(named) == class(id))
 }

@@ -27,6 +27,7 @@ use crate::{
         world::{RigWorld, World, WorldKind},
     },
     diagnosis::{Diagnosis, Options, diagnose},
+    effect::Effect,
     file::Limits,
     recording::{Recording, Stream},
     simulator::robot::RobotPair,
@@ -134,9 +135,10 @@ fn scored(folder: &Folder) -> anyhow::Result<(String, Vec<String>)> {
     })
 }
 
-/// Diagnoses a robot's recording against its simulator's stream.
-fn diagnose_pair(pair: &RobotPair, options: &Options) -> Diagnosis {
-    let options = Options { stream: Stream::of(&pair.simulated), ..options.clone() };
+/// Diagnoses a robot's recording against its simulator's stream, with these effects of a user's as candidates.
+fn diagnose_pair(pair: &RobotPair, own: &[&'static Effect]) -> Diagnosis {
+    let options =
+        Options { stream: Stream::of(&pair.simulated), effects: own.to_vec(), ..Options::default() };
     diagnose(&pair.real, &options, &|_| ())
 }
 
@@ -150,9 +152,8 @@ fn trials(arguments: &Arguments) -> anyhow::Result<Folder> {
     let progress = Progress::start();
     let heard = |over: usize| progress.stage(&format!("{over} of {} cases", cases.len()));
     let diagnose_recording = |recording: &Recording| diagnose(recording, &options, &|_| ());
-    let diagnose_pair = |pair: &RobotPair| diagnose_pair(pair, &options);
     let rig = RigWorld { diagnose: &diagnose_recording, own: folder.own() };
-    let robots = robot::trial::RobotWorld(&diagnose_pair);
+    let robots = robot::trial::RobotWorld { diagnose: &diagnose_pair, own: folder.own() };
     let world: &dyn World = match arguments.world {
         WorldKind::Rig => &rig,
         WorldKind::Robot => &robots,
@@ -172,7 +173,7 @@ fn open(nonce: Nonce, case: Case, arguments: &Arguments) -> anyhow::Result<Endin
     std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
     let label = folder.join(format!("{}.label.json", case.name()));
     if arguments.world == WorldKind::Robot {
-        return open_pair(&robot::case::draw(&nonce, case)?, case, &label, arguments);
+        return open_pair(&robot::case::draw(&nonce, case, &own(arguments)?)?, case, &label, arguments);
     }
     let name = format!("{}.csv.gz", case.name());
     let path = folder.join(&name);

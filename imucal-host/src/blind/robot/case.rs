@@ -5,16 +5,17 @@ use serde::{Deserialize, Serialize};
 use super::{
     lambda::RobotLambda,
     outside::{SPOKEN, UNSPOKEN},
-    setting,
+    own, setting,
 };
 use crate::{
     blind::{
         case::{Case, SIZES, omission, shaped, sized},
-        lambda::difference,
+        lambda::{Signal, difference},
         seal::{Nonce, hex},
         setting::logarithmic,
+        trial::OwnEffects,
     },
-    effect::{Act, CATALOGUE, Effect},
+    effect::{Act, CATALOGUE, Effect, Role},
     simulator::{
         Dose, SimulationError,
         random::{Purpose, Random},
@@ -23,18 +24,22 @@ use crate::{
 };
 
 /// What an afflicted pair holds, in rounds of this order.
-const ROUND: [Content; 12] = [
+const ROUND: [Content; 16] = [
     Content::Effect,
     Content::Motion,
     Content::Effect,
     Content::Spoken,
+    Content::Own,
     Content::Effect,
     Content::Motion,
-    Content::Effect,
     Content::Effect,
     Content::Unspoken,
     Content::Effect,
+    Content::Spoken,
     Content::Motion,
+    Content::Effect,
+    Content::Own,
+    Content::Unspoken,
     Content::Effect,
 ];
 /// How far a robot departs from its simulator, in multiples of the usual.
@@ -57,6 +62,8 @@ pub enum Content {
     Spoken,
     /// One that no formula says.
     Unspoken,
+    /// An effect that a user has written down.
+    Own,
 }
 
 /// What is sealed.
@@ -118,6 +125,9 @@ pub struct RobotPresent {
     pub parameters: Vec<(String, f64)>,
     /// λ beside triads, mounts and clock.
     pub lambda: f64,
+    /// Least λ with one effect of the catalogue on the same sensor taken out as well; of mechanisms that a formula says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lambda_beyond: Option<f64>,
 }
 
 /// A movement that the simulator does not know.
@@ -142,12 +152,12 @@ pub struct RobotDrawn {
     pub label: RobotLabel,
 }
 
-/// Draws a pair of the set that follows from a nonce.
+/// Draws a pair of the set that follows from a nonce, and from the effects that a user has written down.
 ///
 /// # Errors
 ///
-/// [`SimulationError`]; none is known.
-pub fn draw(nonce: &Nonce, case: Case) -> Result<RobotDrawn, SimulationError> {
+/// [`SimulationError`], as where a formula has no value.
+pub fn draw(nonce: &Nonce, case: Case, own: &OwnEffects) -> Result<RobotDrawn, SimulationError> {
     let name = case.name();
     let seed = nonce.seed(&format!("imucal blind robot seed {name}"));
     let mut random = Random::new(seed, Purpose::Case);
@@ -175,6 +185,7 @@ pub fn draw(nonce: &Nonce, case: Case) -> Result<RobotDrawn, SimulationError> {
         Content::Effect => CATALOGUE.iter().filter(|effect| is_drawn(effect)).collect(),
         Content::Spoken => SPOKEN.iter().collect(),
         Content::Unspoken => UNSPOKEN.iter().collect(),
+        Content::Own => own::drawn(own).to_vec(),
     };
     affect(&mut scene, &mut label, pool, &mut random)?;
     Ok(RobotDrawn { scene, label })
@@ -228,11 +239,37 @@ fn affect(
             effect: effect.id.clone(),
             parameters: names.zip(dose.values.iter().copied()).collect(),
             lambda: size(&dose)?,
+            lambda_beyond: match label.content {
+                Content::Spoken => Some(beyond_catalogue(&lambda, &dose, scene)?),
+                _ => None,
+            },
         });
         scene.doses = vec![dose];
         break;
     }
     Ok(())
+}
+
+/// Least λ of a mechanism with one effect of the catalogue taken out as well: what no effect on the same sensor explains.
+fn beyond_catalogue(lambda: &RobotLambda, dose: &Dose, scene: &RobotScene) -> Result<f64, SimulationError> {
+    let signal = |dose: Dose| Ok(difference(&lambda.run(&[dose])?, &lambda.healthy));
+    let own = signal(dose.clone())?;
+    let mut least = lambda.of(&own, &[]);
+    let is_rival = |effect: &&Effect| is_drawn(effect) && effect.sensors == dose.effect.sensors;
+    for effect in CATALOGUE.iter().filter(is_rival) {
+        let usual = Dose::sized(effect, 1.0, scene.seed, scene.duration);
+        let amplitudes = (0..usual.values.len()).filter(|at| effect.parameters[*at].role == Role::Amplitude);
+        let one = |kept: usize| {
+            let mut values = usual.values.clone();
+            for at in (0..values.len()).filter(|at| effect.parameters[*at].role == Role::Amplitude) {
+                values[at] = if at == kept { effect.parameters[at].prior_scale } else { 0.0 };
+            }
+            signal(Dose { effect, values })
+        };
+        let columns: Vec<Signal> = amplitudes.map(one).collect::<Result<_, SimulationError>>()?;
+        least = least.min(lambda.of(&own, &columns));
+    }
+    Ok(least)
 }
 
 /// Another motion than the simulator's, large enough to be seen.
@@ -246,7 +283,8 @@ fn depart(
     if (scene.kind, kind) == (RobotKind::Flying, MismatchKind::Contact) {
         kind = MismatchKind::Gait;
     }
-    let mut size = logarithmic(DEPARTURE, random);
+    let drawn = logarithmic(DEPARTURE, random);
+    let mut size = drawn;
     loop {
         let run = lambda.run_otherwise((kind, size))?;
         let found = lambda.of(&difference(&run, &lambda.healthy), &[]);
@@ -262,8 +300,11 @@ fn depart(
             return Ok(());
         }
         // Where no bump lies in the stretches there is no contact to miss: then it slips.
-        kind = if size > 0.5 * LARGEST { MismatchKind::Slip } else { kind };
-        size *= 2.0;
+        if size > 0.5 * LARGEST && kind == MismatchKind::Contact {
+            (kind, size) = (MismatchKind::Slip, drawn);
+        } else {
+            size *= 2.0;
+        }
     }
 }
 
@@ -274,8 +315,9 @@ mod tests {
     #[test]
     fn a_case_follows_from_nonce_and_name_and_holds_what_its_round_says() {
         let nonce = Nonce::parse("12").unwrap();
-        let label = |index| draw(&nonce, Case::Afflicted(index)).unwrap().label;
-        for index in [0, 1, 3, 8] {
+        let own = OwnEffects::default();
+        let label = |index| draw(&nonce, Case::Afflicted(index), &own).unwrap().label;
+        for index in [0, 1, 3, 4, 8] {
             let label = label(index);
             assert_eq!(label.content, ROUND[index]);
             match label.content {
@@ -283,13 +325,18 @@ mod tests {
                 _ => {
                     let present = label.effect.unwrap();
                     assert!((SIZES.0 * 0.6..SIZES.1 * 1.6).contains(&present.lambda), "{present:?}");
+                    assert!(
+                        present.lambda_beyond.is_none_or(|beyond| beyond <= present.lambda),
+                        "{present:?}"
+                    );
+                    assert_eq!(present.lambda_beyond.is_some(), ROUND[index] == Content::Spoken);
                 }
             }
         }
         assert_eq!(label(1), label(1));
-        let healthy = draw(&nonce, Case::Healthy(0)).unwrap();
+        let healthy = draw(&nonce, Case::Healthy(0), &own).unwrap();
         assert!(healthy.label.effect.is_none() && healthy.scene.doses.is_empty());
-        assert_ne!(healthy.label.salt, draw(&nonce, Case::Healthy(1)).unwrap().label.salt);
+        assert_ne!(healthy.label.salt, draw(&nonce, Case::Healthy(1), &own).unwrap().label.salt);
     }
 
     #[test]

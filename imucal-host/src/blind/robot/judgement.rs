@@ -8,7 +8,7 @@ use super::{
 use crate::{
     blind::{
         answer::{Answer, Asserted, Finished},
-        judgement::formulas,
+        judgement::{equivalents, formulas, stands_for_class},
         proposal::Proposed,
     },
     diagnosis::Verdict,
@@ -33,10 +33,14 @@ pub struct RobotJudgement {
     pub answer: Answer,
     /// λ of what is there; 0 without.
     pub lambda: f64,
+    /// Likewise beyond what one effect of the catalogue explains, where that was measured.
+    pub lambda_beyond: f64,
     /// Something other than the clock is said to be there.
     pub alarmed: bool,
-    /// Besides the clock the asserted classes are those that are there, and none besides.
+    /// Besides the clock one class is asserted, that of the effect that is there.
     pub class_right: bool,
+    /// Likewise where an asserted cause may stand for one of its declared equivalents, as in the contract's figure.
+    pub right_or_equivalent: bool,
     /// It is said that the robot moved otherwise, and no sensor is blamed.
     pub motion_said: bool,
     /// The verdict is that something unknown is there.
@@ -67,8 +71,12 @@ impl RobotJudgement {
         let lambda = [there.map(|present| present.lambda), label.mismatch.as_ref().map(|m| m.lambda)];
         Some(Self {
             lambda: lambda.into_iter().flatten().fold(0.0, f64::max),
+            lambda_beyond: there.and_then(|present| present.lambda_beyond).unwrap_or(0.0),
             alarmed: !answered || flagged || !besides.is_empty(),
             class_right: there.is_some_and(|present| !besides.is_empty() && of_class(&present.effect)),
+            right_or_equivalent: there.is_some_and(|present| {
+                !besides.is_empty() && besides.iter().all(|cause| stands_for_class(cause, &present.effect))
+            }),
             motion_said: !besides.is_empty() && of_class(MOTION),
             flagged,
             delay: delay(&label, &answer),
@@ -85,7 +93,7 @@ impl RobotJudgement {
     pub fn is_missed(&self) -> bool {
         let wrong = match self.label.content {
             Content::Healthy => self.alarmed || self.formula_wrong,
-            Content::Effect => !self.class_right,
+            Content::Effect | Content::Own => !self.right_or_equivalent,
             Content::Motion => !self.motion_said,
             Content::Spoken => !self.flagged || !self.formula_right,
             Content::Unspoken => !self.flagged || self.formula_wrong,
@@ -108,14 +116,17 @@ impl RobotJudgement {
             })
         };
         let cause = |cause: &Asserted| {
-            format!("{}{} p {:.3}", cause.effect, amount(cause), cause.probability.unwrap_or(f64::NAN))
+            let probability = cause.probability.unwrap_or(f64::NAN);
+            format!("{}{} p {probability:.3}{}", cause.effect, amount(cause), equivalents(cause))
         };
         let causes: Vec<String> = self.answer.causes.iter().map(cause).collect();
         let verdict = self.answer.verdict.and_then(|verdict| serde_json::to_value(verdict).ok());
         let verdict = verdict.as_ref().and_then(|verdict| verdict.as_str()).unwrap_or("no answer").to_owned();
+        let beyond = label.effect.as_ref().and_then(|present| present.lambda_beyond);
+        let beyond = beyond.map_or(String::new(), |lambda| format!("; beyond the catalogue {lambda:.0}"));
         let setting = &label.setting;
         format!(
-            "{}: {there} [λ {:.0}], delay {:.3} ms | {verdict}: {} | {}credible {} | {} {} {:.0}/{:.0} Hz {:.0} s",
+            "{}: {there} [λ {:.0}{beyond}], delay {:.3} ms | {verdict}: {} | {}credible {} | {} {} {:.0}/{:.0} Hz {:.0} s",
             label.case,
             self.lambda,
             1e3 * setting.clock_offset,

@@ -2,14 +2,14 @@
 //!
 //! As with the rig a nonce draws every case, and labels are hashed before the pair is diagnosed. Each pair has clocks and
 //! a mount of its own. Besides that it is healthy, or has one effect of the catalogue, or stretches in which the robot
-//! moved otherwise than its simulator, or one mechanism from outside the catalogue.
-//!
-//! Not drawn yet: a user's own effects. Not scored yet: formulas that a diagnosis proposes.
+//! moved otherwise than its simulator, or one mechanism from outside the catalogue, or an effect that a user has written down
+//! and that is a candidate of the pair's diagnosis.
 
 pub mod case;
 pub mod judgement;
 pub mod lambda;
 pub mod outside;
+pub mod own;
 pub mod score;
 mod setting;
 mod table;

@@ -28,7 +28,7 @@ fn has_delay(j: &RobotJudgement) -> bool {
 }
 
 /// The contract's figures.
-const CONTRACT: [Figure<RobotJudgement>; 7] = [
+const CONTRACT: [Figure<RobotJudgement>; 8] = [
     Figure {
         name: "healthy pairs, false alarm",
         of: |j| holds(j, Content::Healthy),
@@ -37,9 +37,9 @@ const CONTRACT: [Figure<RobotJudgement>; 7] = [
         aim: Some(AtMost(0.02)),
     },
     Figure {
-        name: "one effect beside clock and mount, class-correct, λ ≥ 100",
+        name: "one effect, its class or a declared equivalent's, λ ≥ 100",
         of: |j| holds(j, Content::Effect) && j.lambda >= 100.0,
-        hit: |j| j.class_right,
+        hit: |j| j.right_or_equivalent,
         must: Some(AtLeast(0.95)),
         aim: Some(AtLeast(0.98)),
     },
@@ -58,8 +58,15 @@ const CONTRACT: [Figure<RobotJudgement>; 7] = [
         aim: Some(AtLeast(0.98)),
     },
     Figure {
-        name: "outside, a formula says it, λ ≥ 200: it or its equal",
-        of: |j| holds(j, Content::Spoken) && j.lambda >= 200.0,
+        name: "a user's own effect, given in TOML: named, λ ≥ 100",
+        of: |j| holds(j, Content::Own) && j.lambda >= 100.0,
+        hit: |j| j.right_or_equivalent,
+        must: Some(AtLeast(0.95)),
+        aim: None,
+    },
+    Figure {
+        name: "outside, λ ≥ 200 beyond the catalogue: a right formula",
+        of: |j| holds(j, Content::Spoken) && j.lambda_beyond >= 200.0,
         hit: |j| j.formula_right,
         must: Some(AtLeast(0.80)),
         aim: Some(AtLeast(0.95)),
@@ -81,16 +88,21 @@ const CONTRACT: [Figure<RobotJudgement>; 7] = [
 ];
 
 /// Figures next to the contract's.
-const FURTHER: [Figure<RobotJudgement>; 13] = [
+const FURTHER: [Figure<RobotJudgement>; 16] = [
     Figure::besides(
-        "one effect, class-correct, λ < 100",
-        |j| holds(j, Content::Effect) && j.lambda < 100.0,
+        "one effect, its class itself, λ ≥ 100",
+        |j| holds(j, Content::Effect) && j.lambda >= 100.0,
         |j| j.class_right,
     ),
     Figure::besides(
-        "one effect, class-correct, λ 300 and more",
+        "one effect, its class or a declared equivalent's, λ < 100",
+        |j| holds(j, Content::Effect) && j.lambda < 100.0,
+        |j| j.right_or_equivalent,
+    ),
+    Figure::besides(
+        "one effect, its class or a declared equivalent's, λ ≥ 300",
         |j| holds(j, Content::Effect) && j.lambda >= 300.0,
-        |j| j.class_right,
+        |j| j.right_or_equivalent,
     ),
     Figure::besides(
         "one effect, λ ≥ 100, said to be motion",
@@ -108,8 +120,18 @@ const FURTHER: [Figure<RobotJudgement>; 13] = [
         |j| j.delay == Some(true),
     ),
     Figure::besides(
-        "outside, a formula says it, flagged, λ ≥ 200",
+        "a user's own effect, its own id and no equivalent, λ ≥ 100",
+        |j| holds(j, Content::Own) && j.lambda >= 100.0,
+        |j| j.class_right,
+    ),
+    Figure::besides(
+        "outside, a formula says it, λ ≥ 200: a right formula",
         |j| holds(j, Content::Spoken) && j.lambda >= 200.0,
+        |j| j.formula_right,
+    ),
+    Figure::besides(
+        "outside, λ ≥ 200 beyond the catalogue: flagged",
+        |j| holds(j, Content::Spoken) && j.lambda_beyond >= 200.0,
         |j| j.flagged,
     ),
     Figure::besides(
@@ -125,8 +147,8 @@ const FURTHER: [Figure<RobotJudgement>; 13] = [
     Figure::besides("within the catalogue, flagged", |j| holds(j, Content::Effect), |j| j.flagged),
     Figure::besides("without an answer", |_| true, |j| j.answer.verdict.is_none()),
     Figure::besides(
-        "outside, a formula says it, flagged, λ ≥ 200: right",
-        |j| holds(j, Content::Spoken) && j.flagged && j.lambda >= 200.0,
+        "outside, λ ≥ 200 beyond the catalogue, flagged: right",
+        |j| holds(j, Content::Spoken) && j.flagged && j.lambda_beyond >= 200.0,
         |j| j.formula_right,
     ),
     Figure::besides(

@@ -12,7 +12,6 @@ impl RobotScore {
         );
         text += &head();
         self.shares.iter().for_each(|share| text += &line(share));
-        text += "\nNot drawn yet: a user's own effects.\n";
         text += "\nBesides the contract's figures:\n";
         self.further.iter().for_each(|share| text += &line(share));
         let [median, largest] = self.seconds;

@@ -9,8 +9,12 @@ use crate::{
 };
 
 fn label(content: Content) -> RobotLabel {
-    let present =
-        |effect: &str| RobotPresent { effect: effect.to_owned(), parameters: Vec::new(), lambda: 250.0 };
+    let present = |effect: &str| RobotPresent {
+        effect: effect.to_owned(),
+        parameters: Vec::new(),
+        lambda: 250.0,
+        lambda_beyond: (content == Content::Spoken).then_some(220.0),
+    };
     RobotLabel {
         format: "imucal-blind-robot-label/1".to_owned(),
         salt: String::new(),
@@ -34,6 +38,7 @@ fn label(content: Content) -> RobotLabel {
             Content::Effect => Some(present("gyr.g_sensitivity")),
             Content::Spoken => Some(present("outside.acc.knee")),
             Content::Unspoken => Some(present("outside.acc.preisach")),
+            Content::Own => Some(present("gyr.load_gain")),
             Content::Healthy | Content::Motion => None,
         },
         mismatch: (content == Content::Motion).then(|| Departed {
@@ -85,6 +90,7 @@ fn perfect() -> Vec<RobotJudgement> {
         judged(Content::Motion, Verdict::Explained, &["ref.motion_mismatch"], right),
         proposing(&judged(Content::Spoken, Verdict::Unknown, &[], right), 0.99),
         judged(Content::Unspoken, Verdict::Partly, &[], right),
+        judged(Content::Own, Verdict::Explained, &["gyr.load_gain"], right),
     ]
 }
 
@@ -93,7 +99,7 @@ fn a_perfect_set_misses_nothing() {
     let perfect = perfect();
     assert!(perfect.iter().all(|judgement| !judgement.is_missed()));
     let score = score(&perfect);
-    assert_eq!(score.trials, [1, 4]);
+    assert_eq!(score.trials, [1, 5]);
     assert!(score.shares.iter().all(|share| share.trials > 0 && share.meets_must()), "{score:?}");
     assert!(!score.table().contains("missed"));
 }
@@ -116,12 +122,22 @@ fn each_figure_can_be_missed() {
     let two = ["ref.motion_mismatch", "acc.bias_step"];
     assert_eq!(missed(2, judged(Content::Motion, Verdict::Explained, &two, right)), [3]);
     assert_eq!(missed(2, judged(Content::Motion, Verdict::Unknown, &[], right)), [3]);
-    assert_eq!(missed(3, judged(Content::Spoken, Verdict::Unknown, &[], right)), [4]);
-    for (at, figure) in [(0, 6), (3, 4), (4, 5)] {
+    assert_eq!(missed(5, judged(Content::Own, Verdict::Explained, &["gyr.scale_cubic"], right)), [4]);
+    assert_eq!(missed(3, judged(Content::Spoken, Verdict::Unknown, &[], right)), [5]);
+    for (at, figure) in [(0, 7), (3, 5), (4, 6)] {
         assert_eq!(missed(at, proposing(&perfect()[at], 0.5)), [figure]);
     }
     // Not reported, too far by its errors, and too far by itself.
     for delay in [None, Some((0.0104, 1e-4)), Some((0.0125, 1e-3))] {
         assert_eq!(missed(0, judged(Content::Healthy, Verdict::None, &[], delay)), [2], "{delay:?}");
     }
+}
+
+#[test]
+fn a_declared_equivalent_counts_in_the_contract_s_figure_and_not_as_the_class_itself() {
+    let mut answer = judged(Content::Effect, Verdict::Ambiguous, &["gyr.warmup"], None).answer;
+    assert!(!answered(Content::Effect, answer.clone()).right_or_equivalent);
+    answer.causes[0].equivalents = vec!["gyr.temp_bias".to_owned(), "gyr.g_sensitivity".to_owned()];
+    let judged = answered(Content::Effect, answer);
+    assert!(judged.right_or_equivalent && !judged.class_right);
 }
