@@ -35,11 +35,22 @@ pub fn drivers(scene: &ForwardModel<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<
             let middle = |b: &Block| swings.get((b.rows.start + b.rows.end) / 2).copied().unwrap_or_default();
             let swings: Vec<[Swing; 3]> = scene.blocks.iter().map(middle).collect();
             let mut drivers = of_gimbals(&swings);
-            drivers.push(recent_motion(&swings, &scene.blocks));
+            let square = |swings: &[Swing; 3]| swings.iter().map(|s| s.rate * s.rate).sum();
+            drivers.push(recent_motion(swings.iter().map(square), &scene.blocks));
             drivers.push(other_sensors(given));
             drivers
         }
-        None => attitude_covariates::drivers(&scene.plain(), &scene.kinds),
+        None => {
+            let truth = scene.plain();
+            let mut drivers = attitude_covariates::drivers(&truth, &scene.kinds);
+            // A stream holds what is sensed itself; of a reference's attitudes and positions much is smoothed.
+            if scene.settings.source.followed {
+                drivers.push(recent_motion(truth.iter().map(|row| row.w_it_t.norm_squared()), &scene.blocks));
+                drivers.push(other_sensors(given));
+                drivers.push(products(given));
+            }
+            drivers
+        }
     };
     if let Some(speeds) = scene.speeds() {
         let square = speeds.iter().map(|speed| speed * speed).collect();
@@ -135,18 +146,19 @@ fn approach(swings: &[[Swing; 3]]) -> Covariate {
     Covariate { name: "direction_of_approach".into(), functions: functions.collect() }
 }
 
-/// What motion has left behind, fading: heat of the drives, a body that swings out.
-fn recent_motion(swings: &[[Swing; 3]], blocks: &[Block]) -> Covariate {
+/// What motion has left behind, fading: heat of the drives, a body that swings out. `squares` are those of the rate.
+fn recent_motion(squares: impl Iterator<Item = f64>, blocks: &[Block]) -> Covariate {
+    let squares: Vec<f64> = squares.collect();
     let fading = |time: f64| {
         let mut left = 0.0;
         let mut last = blocks.first().map_or(0.0, |block| block.time);
-        let values = swings
+        let values = squares
             .iter()
             .zip(blocks)
-            .map(|(swings, block)| {
+            .map(|(square, block)| {
                 let kept = libm::exp(-(block.time - last) / time);
                 last = block.time;
-                left = kept * left + (1.0 - kept) * swings.iter().map(|s| s.rate * s.rate).sum::<f64>();
+                left = kept * left + (1.0 - kept) * square;
                 left
             })
             .collect();
@@ -199,6 +211,28 @@ fn other_sensors(given: &[Vec<Vector3<f64>>; 3]) -> Covariate {
         }
     }
     Covariate { name: "other_sensors".into(), functions }
+}
+
+/// Products of what the accelerometer's axes sense and what the gyroscope's do; for the magnetometer, of two of the
+/// accelerometer's.
+fn products(given: &[Vec<Vector3<f64>>; 3]) -> Covariate {
+    let force = [0, 1, 2].map(|axis| sensed(given, SensorKind::Acc, axis));
+    let rate = [0, 1, 2].map(|axis| sensed(given, SensorKind::Gyr, axis));
+    let names = ["x", "y", "z"];
+    let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
+    let mut functions = Vec::new();
+    for (kind, axis) in SensorKind::ALL.into_iter().flat_map(|kind| (0..3).map(move |axis| (kind, axis))) {
+        for (one, other) in (0..3).flat_map(|one| (0..3).map(move |other| (one, other))) {
+            let (values, second) = match kind {
+                SensorKind::Mag if other < one => continue,
+                SensorKind::Mag => (product(&force[one], &force[other]), SensorKind::Acc),
+                _ => (product(&force[one], &rate[other]), SensorKind::Gyr),
+            };
+            let detail = format!("{} {} and {second} {}", SensorKind::Acc, names[one], names[other]);
+            functions.push(Function { detail, values, of: Some((kind, axis)) });
+        }
+    }
+    Covariate { name: "products_of_sensors".into(), functions }
 }
 
 /// What the axes of a triad sense, by the temperature.
