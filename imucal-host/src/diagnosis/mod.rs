@@ -26,7 +26,7 @@ use self::{
     residual::forward_model::ForwardModel,
     screening::preparation::Preparation,
     search::{
-        motion_mismatch::{self, LeftOut},
+        motion_mismatch::{self, LeftOut, Stretch},
         stepwise,
     },
     settings::{Settings, Source},
@@ -100,33 +100,52 @@ pub fn try_diagnose(
     };
     let own = if options.frozen.is_some() { &[][..] } else { &options.effects };
     let mut candidates = Candidates::new(&setting, &options.without, own);
-    let LeftOut { scene, stretches, jolts } = motion_mismatch::left_out(scene, &candidates)?;
+    let LeftOut { mut scene, mut stretches, jolts } = motion_mismatch::left_out(scene, &candidates)?;
     preparation.remarks.extend(motion_mismatch::remark(jolts));
-    preparation.findings.extend(motion_mismatch::finding(stretches, &preparation.unmatched));
+    let screened = preparation.findings.clone();
+    preparation.findings.extend(motion_mismatch::finding(stretches.clone(), &preparation.unmatched));
     formulas::sift(&scene, &mut candidates)?;
-    let explain = |candidates: &Candidates| {
-        let explained = stepwise::search(&scene, candidates, progress)?;
-        let mut diagnosis = answer(recording, &preparation, &explained, progress)?;
+    let explain = |scene: &ForwardModel<'_>, preparation: &Preparation, candidates: &Candidates| {
+        let explained = stepwise::search(scene, candidates, progress)?;
+        if let Some(stretch) = motion_mismatch::turned_for_a_while(&explained) {
+            return Ok(Explained::Otherwise(stretch));
+        }
+        let mut diagnosis = answer(recording, preparation, &explained, progress)?;
         let (proposals, remarks) = match &options.frozen {
             Some(toml) => confirmation::confirmed(&explained, &diagnosis, &options.effects, toml)?,
             None => proposer::proposed(&explained, &diagnosis, progress)?,
         };
         diagnosis.proposals = proposals;
         diagnosis.remarks.extend(remarks);
-        Ok(diagnosis)
+        Ok(Explained::Diagnosed(Box::new(diagnosis)))
     };
     loop {
-        match explain(&candidates) {
+        match explain(&scene, &preparation, &candidates) {
+            Ok(Explained::Otherwise(stretch)) => {
+                scene.leave_out(std::slice::from_ref(&stretch.time));
+                stretches.push(stretch);
+                preparation.findings.clone_from(&screened);
+                let finding = motion_mismatch::finding(stretches.clone(), &preparation.unmatched);
+                preparation.findings.extend(finding);
+            }
             // In a shape of the search a user's formula has no value; each such effect is withdrawn once.
             Err(DiagnosisError::Formula(cause))
                 if candidates.withdraw(&cause.effect, cause.without_row()) => {}
-            diagnosis => {
+            Ok(Explained::Diagnosed(diagnosis)) => {
                 let reference = source.reference();
-                return diagnosis
-                    .map(|diagnosis| Diagnosis { reference, ..diagnosis }.with_words_of(&options.effects));
+                return Ok(Diagnosis { reference, ..*diagnosis }.with_words_of(&options.effects));
             }
+            Err(why) => return Err(why),
         }
     }
+}
+
+/// What a search comes to.
+enum Explained {
+    /// A diagnosis.
+    Diagnosed(Box<Diagnosis>),
+    /// A stretch in which the machine moved otherwise, which is left out of another search.
+    Otherwise(Stretch),
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use std::ops::Range;
 use super::{
     motion_evidence::{self, Found},
     refit::refit,
+    stepwise::Solution,
 };
 use crate::{
     diagnosis::{
@@ -16,13 +17,20 @@ use crate::{
         finding::Amount,
         library::candidates::Candidates,
         reference::impact::Unmatched,
-        residual::{forward_model::ForwardModel, vibration},
+        residual::{block::Block, forward_model::ForwardModel, vibration},
         screening::conventions::Finding,
     },
     effect::{self, motion_mismatch},
     simulator::Dose,
 };
 
+/// The effect that turns the sensor from an instant on.
+const SLIP: &str = "ref.mount_slip";
+/// A turn that lasts to within this of the recording's end, s, or for more than this share of it, stays.
+const STAYS: f64 = 5.0;
+const MOST: f64 = 0.5;
+/// Time that it takes to turn and to come back, s.
+const TURNING: f64 = 2.0;
 /// Rounds of fitting and leaving out.
 const ROUNDS: usize = 4;
 /// A stretch's beginning and end are known to within this, s.
@@ -88,6 +96,27 @@ pub fn left_out<'a>(
         stretches.extend(new.stretches);
     }
     Ok(LeftOut { scene, stretches: merged(stretches), jolts })
+}
+
+/// The stretch for which a search has turned the sensor against a simulator's stream, and back: a mount that slips stays
+/// where it is, and a machine that moves otherwise comes back to its simulator's course. `None` where none is that short, or
+/// there is no stream.
+pub fn turned_for_a_while(explained: &Solution<'_>) -> Option<Stretch> {
+    let scene = explained.linear.scene;
+    let slip = explained.fit.doses.iter().find(|dose| dose.effect.id == SLIP)?;
+    let [.., start, end] = slip.values[..] else { return None };
+    let comes_back = end < scene.duration() - STAYS && end - start < MOST * scene.duration();
+    let is_measured = |(at, block): (usize, &Block)| {
+        (start..end).contains(&block.time) && scene.kinds.iter().any(|kind| scene.worth(*kind, at) > 0.0)
+    };
+    let is_new = scene.blocks.iter().enumerate().any(is_measured);
+    let energy = 2.0 * (explained.best.log_evidence - explained.none.log_evidence);
+    (scene.settings.residual.leaves_out_mismatch && comes_back && is_new).then_some(Stretch {
+        time: start - TURNING..end + TURNING,
+        force: None,
+        rate: None,
+        energy: [energy, 0.0, 0.0],
+    })
 }
 
 /// What is said of moments that were left out; `None` without one.
