@@ -2,7 +2,8 @@
 //!
 //! They are looked for in what a fit of the baseline leaves ([`motion_evidence`]), left out, and looked for again, since a fit
 //! that holds them is bent by them. Impacts that one side has and the other lacks are found before, from the samples
-//! ([`crate::diagnosis::reference::impact`]).
+//! ([`crate::diagnosis::reference::impact`]). A turn that the search of effects finds along a stream, and that comes back, is
+//! another; it is left out of a further search.
 
 use std::ops::Range;
 
