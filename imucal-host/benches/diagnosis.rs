@@ -1,6 +1,6 @@
 //! How long `imucal diagnose` takes over nine channels at 100 Hz, reading included, and how much memory it holds: 650 s with no
-//! effect and with one to three, an hour, and four hours. Fails above its limits, so that it needs a machine with nothing
-//! else to do. `IMUCAL_BEFORE=PROGRAM` runs an older program on the same recordings and prints the ratio.
+//! effect and with one to three, an hour, and four hours; and a robot's recording of 650 s with its simulator's stream, of
+//! each machine. Fails above its limits, so that it needs a machine with nothing else to do. `IMUCAL_BEFORE=PROGRAM` runs an older program on the same recordings and prints the ratio.
 
 use std::{
     env,
@@ -13,6 +13,9 @@ use std::{
 
 /// Effects, each with those before it, in usual sizes.
 const EFFECTS: [&str; 3] = ["acc.scale_quadratic=3", "mag.gimbal_hard_iron_outer=3", "gyr.temp_bias=3"];
+/// Machines, and the effect that their recordings have.
+const ROBOTS: [&str; 3] = ["legged", "wheeled", "flying"];
+const ROBOT_EFFECT: &str = "gyr.g_sensitivity=3";
 /// Length of a usual recording, s, and of longer ones.
 const USUAL: u32 = 650;
 const LONGER: [u32; 2] = [3600, 14_400];
@@ -44,6 +47,10 @@ fn main() -> ExitCode {
         println!("        {:.1} times as long as {USUAL} s", seconds / usual);
         within &= mebibytes <= LARGEST && (length > LONGER[0] || seconds <= HOUR * usual);
     }
+    println!("with a simulator's stream at 100 Hz");
+    for robot in ROBOTS {
+        within &= measured_with_stream(folder.path(), robot, before.as_deref()) <= LIMITS.0;
+    }
     if within { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
@@ -51,10 +58,37 @@ fn main() -> ExitCode {
 fn measured(folder: &Path, length: u32, effects: usize, before: Option<&OsStr>) -> (f64, f64) {
     let recording = folder.join(format!("{length}-{effects}.csv.gz"));
     simulate(&recording, length, &EFFECTS[..effects]);
-    let (seconds, mebibytes) = diagnose(&this(), &recording);
-    print!("{length:>6} s, {effects} effects  {seconds:.1} s  {mebibytes:.0} MiB");
+    print!("{length:>6} s, {effects} effects  ");
+    compared(&[&recording], before)
+}
+
+/// Seconds of a robot's recording of the usual length with its simulator's stream, which are printed.
+fn measured_with_stream(folder: &Path, robot: &str, before: Option<&OsStr>) -> f64 {
+    let [recording, stream] = ["real", "sim"].map(|part| folder.join(format!("{robot}-{part}.csv.gz")));
+    let mut command = imucal(&this());
+    command.args([
+        "simulate",
+        "--robot",
+        robot,
+        "--rate",
+        "100",
+        "--sim-rate",
+        "100",
+        "--effect",
+        ROBOT_EFFECT,
+    ]);
+    command.arg("--duration").arg(USUAL.to_string()).arg("--out").arg(folder.join(format!("{robot}.csv.gz")));
+    assert!(command.status().expect("it runs").success(), "{robot}");
+    print!("{USUAL:>6} s, {robot}  ");
+    compared(&[&recording, Path::new("--sim"), &stream], before).0
+}
+
+/// Seconds and mebibytes of a diagnosis, and those of an older program, which are printed.
+fn compared(arguments: &[&Path], before: Option<&OsStr>) -> (f64, f64) {
+    let (seconds, mebibytes) = diagnose(&this(), arguments);
+    print!("{seconds:.1} s  {mebibytes:.0} MiB");
     if let Some(before) = before {
-        let (other, held) = diagnose(before, &recording);
+        let (other, held) = diagnose(before, arguments);
         print!("  before: {other:.1} s  {held:.0} MiB, ratio {:.2}", seconds / other);
     }
     println!();
@@ -82,9 +116,9 @@ fn simulate(recording: &Path, length: u32, effects: &[&str]) {
 }
 
 /// Seconds and mebibytes.
-fn diagnose(program: &OsStr, recording: &Path) -> (f64, f64) {
+fn diagnose(program: &OsStr, arguments: &[&Path]) -> (f64, f64) {
     let start = Instant::now();
-    let mut child = imucal(program).arg("diagnose").arg(recording).spawn().expect("it runs");
+    let mut child = imucal(program).arg("diagnose").args(arguments).spawn().expect("it runs");
     let mut most = 0.0;
     loop {
         most = held(&child).unwrap_or(most);

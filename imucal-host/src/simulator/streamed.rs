@@ -1,7 +1,6 @@
 //! A simulator's stream: what it says ideal sensors would have read, as a source of truth.
 //!
-//! Between two samples each component is a cubic with the slopes of its neighbours; the angular acceleration is the slope
-//! of the rate. A row of the recording shows the stream at
+//! Between two samples each component is a cubic ([`Cubic`]); the angular acceleration is the slope of the rate. A row of the recording shows the stream at
 //!
 //! ```text
 //! s = (t + offset) / (1 + error)
@@ -21,6 +20,7 @@ use imucal_core::rotation::exp;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::{
+    cubic::{Cubic, sample_before},
     place::Place,
     recent::Recent,
     replay::{nearest, readings_noise},
@@ -62,18 +62,11 @@ impl StreamClock {
     }
 }
 
-/// One sensor's stream with the slope of each sample.
-#[derive(Clone, Debug)]
-struct Channel {
-    values: Vec<Vector3<f64>>,
-    slopes: Vec<Vector3<f64>>,
-}
-
 /// The movement of a simulator's stream, at the rows of a recording.
 #[derive(Clone, Debug)]
 pub struct Streamed {
     time: Vec<f64>,
-    channels: [Option<Channel>; 3],
+    channels: [Option<Cubic>; 3],
     attitudes: Vec<Matrix3<f64>>,
     clock: StreamClock,
     duration: f64,
@@ -100,7 +93,7 @@ impl Streamed {
         }
         let time = stream.time.clone();
         let sampled = |kind: SensorKind| stream.values.sensor(kind);
-        let channels = SensorKind::ALL.map(|kind| Some(Channel::new(&time, sampled(kind)?)));
+        let channels = SensorKind::ALL.map(|kind| Some(Cubic::new(&time, sampled(kind)?)));
         let attitudes = attitudes(&time, &channels);
         let mut streamed = Self {
             channels,
@@ -168,14 +161,14 @@ impl Streamed {
     /// Whether it turns or sways at each row.
     fn movement(&self) -> Vec<bool> {
         let [acc, gyr, _] = &self.channels;
-        let trembles = |own: fn(&Channel) -> &[Vector3<f64>], channel: &Option<Channel>| {
+        let trembles = |own: fn(&Cubic) -> &[Vector3<f64>], channel: &Option<Cubic>| {
             channel.as_ref().map_or(0.0, |channel| NOISES * own_noise(own(channel)))
         };
         let (turning, swaying) = (trembles(|c| &c.values, gyr), trembles(|c| &c.slopes, acc) * WINDOW);
         let samples: Vec<bool> = (0..self.time.len())
             .map(|k| {
-                let turns = |c: &Channel| c.values[k].norm() > TURNS + turning;
-                let sways = |c: &Channel| c.slopes[k].norm() * WINDOW > SWAYS + swaying;
+                let turns = |c: &Cubic| c.values[k].norm() > TURNS + turning;
+                let sways = |c: &Cubic| c.slopes[k].norm() * WINDOW > SWAYS + swaying;
                 gyr.as_ref().is_some_and(turns) || acc.as_ref().is_some_and(sways)
             })
             .collect();
@@ -201,7 +194,7 @@ impl Motion for Streamed {
     /// No rig acts: the stream is in the sensor's own axes.
     fn truth_among(&self, time: f64, _: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
         let s = self.clock.stream_time(time);
-        let k = self.time.partition_point(|t| *t <= s).clamp(1, self.time.len() - 1) - 1;
+        let k = sample_before(&self.time, s);
         let of = |kind: SensorKind| self.channels[kind as usize].as_ref().map(|c| c.at(&self.time, k, s));
         let still = (Vector3::zeros(), Vector3::zeros());
         let (w, dw) = of(SensorKind::Gyr).unwrap_or(still);
@@ -249,62 +242,12 @@ impl Recorded for Streamed {
     }
 }
 
-impl Channel {
-    /// Missing samples lie on the line between their neighbours.
-    fn new(time: &[f64], values: &[Vector3<f64>]) -> Self {
-        let values = bridged(time, values);
-        let slope = |k: usize| {
-            let (before, after) = (k.saturating_sub(1), (k + 1).min(values.len() - 1));
-            let over = |a: usize, b: usize| (values[b] - values[a]) / (time[b] - time[a]);
-            if before == k || after == k {
-                return over(before, after);
-            }
-            // The slope of the parabola through three samples.
-            let (left, right) = (time[k] - time[before], time[after] - time[k]);
-            (over(before, k) * right + over(k, after) * left) / (left + right)
-        };
-        Self { slopes: (0..values.len()).map(slope).collect(), values }
-    }
-
-    /// Value and slope at a time between two samples; beyond the ends those of the end.
-    fn at(&self, time: &[f64], k: usize, s: f64) -> (Vector3<f64>, Vector3<f64>) {
-        let span = time[k + 1] - time[k];
-        let x = ((s - time[k]) / span).clamp(0.0, 1.0);
-        let (from, to) = (self.values[k], self.values[k + 1]);
-        let (leaves, arrives) = (self.slopes[k] * span, self.slopes[k + 1] * span);
-        let (square, cube) = (to - from, leaves + arrives - (to - from) * 2.0);
-        let bend = square - leaves - cube;
-        let value = from + (leaves + (bend + cube * x) * x) * x;
-        let slope = (leaves + (bend * 2.0 + cube * (3.0 * x)) * x) / span;
-        (value, slope)
-    }
-}
-
 /// Noise of a sample in the stillest tenth of a stream, the largest of the axes'; none of an ideal stream: noise is there
 /// all the time, a movement that is too fast for the samples is not.
 pub fn own_noise(values: &[Vector3<f64>]) -> f64 {
     let mut noises: Vec<f64> = values.chunks(STRETCH).map(readings_noise).collect();
     noises.sort_by(f64::total_cmp);
     noises.get(noises.len() / 10).copied().unwrap_or(0.0)
-}
-
-/// Samples with missing ones put on the line between their neighbours.
-fn bridged(time: &[f64], values: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-    let given: Vec<usize> =
-        (0..values.len()).filter(|k| values[*k].iter().all(|value| value.is_finite())).collect();
-    let mut bridged = values.to_vec();
-    let (Some(first), Some(last)) = (given.first().copied(), given.last().copied()) else {
-        return vec![Vector3::zeros(); values.len()];
-    };
-    bridged[..first].fill(values[first]);
-    bridged[last..].fill(values[last]);
-    for pair in given.windows(2) {
-        for k in pair[0] + 1..pair[1] {
-            let share = (time[k] - time[pair[0]]) / (time[pair[1]] - time[pair[0]]);
-            bridged[k] = values[pair[0]] + (values[pair[1]] - values[pair[0]]) * share;
-        }
-    }
-    bridged
 }
 
 /// Samples at which every sensor of the stream has a value, and no gap lies before.
@@ -326,7 +269,7 @@ fn measured(stream: &Stream) -> Vec<bool> {
 const GAP: f64 = 3.5;
 
 /// Attitude at each sample, table to a base with its third axis down and the heading of the first sample.
-fn attitudes(time: &[f64], [acc, gyr, _]: &[Option<Channel>; 3]) -> Vec<Matrix3<f64>> {
+fn attitudes(time: &[f64], [acc, gyr, _]: &[Option<Cubic>; 3]) -> Vec<Matrix3<f64>> {
     let mut attitudes = vec![Matrix3::identity(); time.len()];
     if let Some(gyr) = gyr {
         for k in 1..time.len() {

@@ -12,6 +12,9 @@
 //! | [`rest_to_rest`] | a movement reconstructed from the sensor's own rests and turns (this runs a whole calibration) |
 //! | [`stream`] | the movement of a simulator's stream |
 //! | [`impact`] | rows near an impact that the samples of a stream do not resolve |
+//! | [`strikes`] | impacts in a row that the recording or the stream lacks |
+//! | [`absence`] | impacts in a row that one side does not show at all |
+//! | [`unforeseen`] | what a sample's neighbours do not foretell of it |
 //! | [`stream_clock`] | its clock against that of the sensor, roughly |
 //! | [`revisits`] | whether attitudes are held more than once, without which repeatability cannot be estimated |
 //!
@@ -19,6 +22,7 @@
 //!
 //! Not done here: a reference attitude holds no linear acceleration; its clock is put right in `screening`.
 
+pub mod absence;
 pub mod impact;
 pub mod model;
 pub mod movement;
@@ -27,3 +31,5 @@ pub mod rest_to_rest;
 pub mod revisits;
 pub mod stream;
 pub mod stream_clock;
+pub mod strikes;
+pub mod unforeseen;

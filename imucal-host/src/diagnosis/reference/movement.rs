@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::{impact::Unmatched, model::Model, pose::Pose, rest_to_rest::RestToRest, stream};
+use super::{model::Model, pose::Pose, rest_to_rest::RestToRest, stream, strikes::Unmatched};
 use crate::{
     observe::motion::Attitudes,
     recording::{

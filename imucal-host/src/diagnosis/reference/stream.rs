@@ -1,8 +1,9 @@
 //! The movement of a simulator's stream.
 
 use super::{
-    impact::{self, Impacts, Unmatched},
+    impact::{self, Impacts},
     stream_clock,
+    strikes::Unmatched,
 };
 use crate::{
     recording::{Recording, Stream, check::integrity::Integrity},

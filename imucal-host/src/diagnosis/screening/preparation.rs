@@ -14,8 +14,8 @@ use crate::{
     diagnosis::{
         error::DiagnosisError,
         reference::{
-            impact::Unmatched, model::Model, movement, movement::Reference, rest_to_rest::RestToRest,
-            revisits, stream,
+            model::Model, movement, movement::Reference, rest_to_rest::RestToRest, revisits, stream,
+            strikes::Unmatched,
         },
         settings::Settings,
     },

@@ -17,7 +17,7 @@ use crate::{
         error::DiagnosisError,
         finding::Amount,
         library::candidates::Candidates,
-        reference::impact::Unmatched,
+        reference::strikes::Unmatched,
         residual::{block::Block, forward_model::ForwardModel, vibration},
         screening::conventions::Finding,
     },
