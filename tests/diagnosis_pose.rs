@@ -99,8 +99,9 @@ fn part(recording: &Recording, rows: std::ops::Range<usize>) -> Recording {
     part
 }
 
+/// Half a recording is sure of its arm by up to twice too much: errors of the cameras last longer than the parts of a jackknife.
 #[test]
-fn the_arms_of_both_halves_agree_within_their_errors() {
+fn the_arms_of_both_halves_agree_within_twice_their_errors() {
     let (mut square, mut count) = (0.0, 0.0);
     for name in PLACED {
         let Some(recording) = read(name) else { return };
@@ -114,7 +115,7 @@ fn the_arms_of_both_halves_agree_within_their_errors() {
         println!("{name} {halves:.5?}");
     }
     println!("{square:.1} of {count}");
-    assert!(square < 2.0 * count, "{square} of {count}");
+    assert!(square < 4.0 * count, "{square} of {count}");
 }
 
 #[test]
