@@ -165,7 +165,7 @@ pub struct VerdictSettings {
     /// A cause explains more than what the residual of its sensors still follows: where the source has errors that the
     /// catalogue does not hold, a smaller effect may stand for a part of them.
     pub outweighs_remainder: bool,
-    /// A cause closes at least this share of the whole gap.
+    /// A cause closes at least this share of the whole gap, and, where it is not zero, surely a part of it.
     pub least_of_all: f64,
     /// What the source is off by, by sensor, m/s², rad/s and µT: a smaller cause of one sensor alone is not asserted. Zero where
     /// a rig or a simulator is exact. The field of a room changes by as much from place to place.

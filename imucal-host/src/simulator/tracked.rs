@@ -97,6 +97,11 @@ impl Tracked {
             .collect();
         Some(Self { time: time.to_vec(), states, moving, known, temperature, place })
     }
+
+    /// Attitude at a row, table to base.
+    pub(super) fn attitude(&self, row: usize) -> Matrix3<f64> {
+        self.states[row].c_t_p
+    }
 }
 
 impl Motion for Tracked {

@@ -1,5 +1,6 @@
 //! What is true at a time: attitude, rate, specific force and field of a moving table. Knows no sensor.
 
+use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
@@ -63,6 +64,17 @@ pub trait Recorded: Motion {
 
     /// Speed at each row, m/s; `None` where it is not known.
     fn speeds(&self) -> Option<&[f64]> {
+        None
+    }
+
+    /// Samples of an accelerometer, one a row, those in use, without what is too brisk for the specific force to hold it, as
+    /// `triad` takes them into the table's axes; `None` where it holds all of a movement.
+    fn as_sharp(
+        &self,
+        _samples: &[Vector3<f64>],
+        _usable: &[bool],
+        _triad: &Triad<f64>,
+    ) -> Option<Vec<Vector3<f64>>> {
         None
     }
 

@@ -94,8 +94,9 @@ pub fn reference(
             };
             let Pose { attitudes, positions } = pose.moved(&recording.time, clock.offset);
             let tracked = tracked(&attitudes)?;
-            let posed = positions
-                .and_then(|positions| Posed::new(tracked.clone(), &recording.time, &positions, bandwidth));
+            let posed = positions.and_then(|positions| {
+                Posed::new(tracked.clone(), &recording.time, &attitudes, &positions, bandwidth)
+            });
             match posed {
                 Some(posed) => Box::new(posed),
                 None => Box::new(tracked),

@@ -44,6 +44,7 @@ pub struct ForwardModel<'a> {
     /// Variance of a sample in each block, by sensor, against the usual one; none where all are alike.
     pub vibration: [Option<Vec<f64>>; 3],
     motion: &'a dyn Recorded,
+    acc_as_sharp: Option<Vec<Vector3<f64>>>,
     /// Rows of each sensor that are used, by [`SensorKind::ALL`].
     pub usable: [Vec<bool>; 3],
     /// The triads that the simulator starts from, by [`SensorKind::ALL`].
@@ -87,9 +88,15 @@ impl<'a> ForwardModel<'a> {
         let is_known = |row: usize| by.points_in_gaps || motion.known()[row];
         let fine = SamplePoints::choose(&recording.time, &blocks, fine, is_known);
         let coarse = SamplePoints::choose(&recording.time, &blocks, |_| 1, |_| true);
+        let of_acc = SensorKind::Acc as usize;
+        let acc_as_sharp = recording
+            .acc
+            .as_ref()
+            .and_then(|acc| motion.as_sharp(&acc.values, &usable[of_acc], &triads[of_acc]));
         Self {
             settings,
             recording,
+            acc_as_sharp,
             cuts: blocks.clone(),
             view: None,
             blocks,
@@ -257,7 +264,8 @@ impl<'a> ForwardModel<'a> {
     }
 
     fn difference(&self, kind: SensorKind, output: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
-        let samples = &self.recording.sensor(kind)?.values;
+        let sharp = self.acc_as_sharp.as_ref().filter(|_| kind == SensorKind::Acc);
+        let samples = sharp.unwrap_or(&self.recording.sensor(kind)?.values);
         let usable = &self.usable[kind as usize];
         let mean = |block: &Block| {
             let mut sum = Vector3::zeros();

@@ -121,17 +121,19 @@ impl Asserted {
         self.remarks.extend(self.causes.extract_if(.., is_within).map(remark));
     }
 
-    /// Takes out the causes that close less than a share of the gap once the clock's terms are a part of it. Terms that were
-    /// taken out of the baseline stay: every sensor has them.
+    /// Takes out the causes that close less than a share of the gap once the clock's terms are a part of it, or perhaps nothing:
+    /// errors of a reference go with the attitude, too. Terms that were taken out of the baseline stay: every sensor has them.
     fn take_out_smallest(&mut self, least: f64, candidates: &Candidates) {
         let was_taken_out = |id: &str| candidates.taken_out.iter().any(|term| term.id == id);
         let is_small = |cause: &mut Cause| {
-            cause.gap_closed.is_some_and(|share| share < least) && !was_taken_out(&cause.effect)
+            let may_be_nothing = least > 0.0 && cause.gap_closed_ci95.is_some_and(|[from, _]| from <= 0.0);
+            (may_be_nothing || cause.gap_closed.is_some_and(|share| share < least))
+                && !was_taken_out(&cause.effect)
         };
         let credible_set = &mut self.credible_set;
         let remark = |cause: Cause| {
             credible_set.retain(|id| *id != cause.effect && !cause.equivalents.contains(id));
-            small(&cause.effect, cause.gap_closed.unwrap_or(0.0))
+            small(&cause.effect, cause.gap_closed.unwrap_or(0.0), cause.gap_closed_ci95)
         };
         self.remarks.extend(self.causes.extract_if(.., is_small).map(remark));
     }
@@ -250,8 +252,12 @@ fn refuted(
     Ok(remarks)
 }
 
-fn small(effect: &str, share: f64) -> String {
-    format!("not asserted: {effect} closes {:.1} % of the gap", 100.0 * share)
+fn small(effect: &str, share: f64, interval: Option<[f64; 2]>) -> String {
+    let perhaps = match interval {
+        Some([from, _]) if from <= 0.0 => ", and perhaps nothing of it",
+        _ => "",
+    };
+    format!("not asserted: {effect} closes {:.1} % of the gap{perhaps}", 100.0 * share)
 }
 
 /// Takes out the causes that explain less of a sensor than what its residual still follows, or next to nothing of the gap, unless
@@ -265,7 +271,7 @@ fn outweighed(causes: &mut Vec<Cause>, explained: &Solution<'_>, tested: &Tested
             return None;
         }
         if share < settings.verdict.least_of_all {
-            return Some(small(&cause.effect, share));
+            return Some(small(&cause.effect, share, None));
         }
         let own = share * tested.closed.explainable;
         let reach = explained.linear.scene.reach(explained.best.set[at]);

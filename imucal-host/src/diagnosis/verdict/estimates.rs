@@ -92,7 +92,8 @@ pub fn amounts_of(
 }
 
 /// Variances of all columns' amounts by a jackknife over parts of the recording, each left out in turn: they hold what the
-/// model of the noise does not, as the errors of a reference. Source: Efron and Stein, Ann. Stat. 9 (1981).
+/// model of the noise does not, as the errors of a reference. They are those of Student's t, ν/(ν − 2) as large, since few parts
+/// show how far the amounts scatter. Source: Efron and Stein, Ann. Stat. 9 (1981).
 fn jackknife(
     linear: &Linearisation<'_>,
     design: &Design,
@@ -120,7 +121,9 @@ fn jackknife(
     let n = amounts.len() as f64;
     let mean = amounts.iter().fold(DVector::zeros(design.size), |sum, own| sum + own) / n.max(1.0);
     let squares = amounts.iter().map(|own| (own - &mean).map(|off| off * off));
-    squares.fold(DVector::zeros(design.size), |sum, own| sum + own) * ((n - 1.0).max(0.0) / n.max(1.0))
+    let freedom = n - 1.0;
+    let few = if freedom > 2.0 { freedom / (freedom - 2.0) } else { 1.0 };
+    squares.fold(DVector::zeros(design.size), |sum, own| sum + own) * (few * freedom.max(0.0) / n.max(1.0))
 }
 
 /// An effect is large enough to matter: one of its amplitudes is.
