@@ -52,8 +52,10 @@ const REMAINS: f64 = 3.0;
 /// A block is a jolt from so many times the usual on, where so many blocks before and behind it are not beyond it.
 const JOLTS: f64 = 12.0;
 const APART_JOLTS: usize = 5;
-/// ln of the odds of a turn of the sensor against a fault of one sensor, at least.
+/// ln of the odds of a turn of the sensor against a fault of one sensor, at least; the accelerometer, which feels what moves
+/// the machine as well as what shakes it, adds no more than so much to them.
 const CONFIRMS: f64 = 8.0;
+const BY_FORCE: f64 = 4.0;
 /// So many blocks before and behind a stretch are looked at with it, and no more than so many in all.
 const ABOUT: usize = 10;
 const LONGEST: usize = 400;
@@ -184,7 +186,19 @@ impl Residuals<'_, '_> {
         let [_, Some(gyr), Some(mag)] = &self.fit.residual else { return true };
         let about = run.start.saturating_sub(ABOUT)..(run.end + ABOUT).min(self.scene.blocks.len());
         let seen: Vec<Seen> = about.take(LONGEST).map(|at| self.seen(at, &gyr[at], &mag[at])).collect();
-        turn_likelihood::log_odds(&seen) > CONFIRMS
+        turn_likelihood::log_odds(&seen) + self.log_odds_of_force(run).min(BY_FORCE) > CONFIRMS
+    }
+
+    /// ln of the likelihood of more noise in the accelerometer than the usual, against that of the usual.
+    fn log_odds_of_force(&self, run: &Range<usize>) -> f64 {
+        let acc = SensorKind::Acc as usize;
+        let ratio = |at: usize| {
+            Some(self.energies[acc].get(at).copied()?? / self.usual.get(at)?[acc].unwrap_or(1.0).max(1.0))
+        };
+        let ratios: Vec<f64> = run.clone().filter_map(ratio).collect();
+        let mean = ratios.iter().sum::<f64>() / ratios.len().max(1) as f64;
+        // Three axes a block, normal, of the likeliest variance.
+        if mean > 1.0 { 1.5 * ratios.len() as f64 * (mean - 1.0 - mean.ln()) } else { 0.0 }
     }
 
     fn seen(&self, at: usize, gyr: &Vector3<f64>, mag: &Vector3<f64>) -> Seen {
