@@ -109,7 +109,8 @@ fn questions(problem: &Problem<'_, '_>, best: &Judged) -> Result<[Question; 4], 
             axes[axis].iter().map(scaled).collect::<Vec<f64>>()
         });
         let polynomials = scaled.each_ref().map(|values| legendre(values, DEGREES));
-        bends.extend((2..=DEGREES).map(|degree| joined([0, 1, 2].map(|axis| &polynomials[axis][degree][..]))));
+        bends
+            .extend((2..=DEGREES).map(|degree| joined([0, 1, 2].map(|axis| &polynomials[axis][degree][..]))));
         for tau in LAGS {
             let lagged = scaled.each_ref().map(|values| History::Lag.of(&times, values, tau));
             fades.push(joined(lagged.each_ref().map(Vec::as_slice)));
