@@ -14,6 +14,7 @@ use tempfile::TempDir;
 
 mod bad_recordings;
 mod contract;
+mod formulas;
 mod printing;
 mod user_effects;
 

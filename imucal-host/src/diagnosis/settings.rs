@@ -204,7 +204,8 @@ pub struct VerdictSettings {
 pub struct ProposalSettings {
     /// ln of the evidence that a formula must add beyond the number of those that were tried. Larger: fewer proposals.
     pub least_gain: f64,
-    /// Share of what is left of its sensor's gap that it closes at least, on stretches that no fit has seen.
+    /// Share of what is left of its sensor's gap that it closes at least, on stretches that no fit has seen, by the lower end
+    /// of the share's interval.
     pub least_share: f64,
     /// Standard errors from zero of its largest amplitude, at least.
     pub amplitude_errors: f64,
@@ -212,6 +213,9 @@ pub struct ProposalSettings {
     pub kept_errors: f64,
     /// What the sensor still follows beside it is at most this share of what it explains. Larger: more wrong formulas.
     pub remainder: f64,
+    /// What changes its amplitude matters from this share of what it explains on: a fiftieth leaves it a correlation of 0.99
+    /// with what is there. Larger: more wrong formulas; smaller: strong ones are refused for what a derivative misses.
+    pub inconstancy: f64,
 }
 
 impl Default for ResidualSettings {
@@ -299,7 +303,14 @@ impl Default for LocationSettings {
 impl Default for ProposalSettings {
     /// That of any source.
     fn default() -> Self {
-        Self { least_gain: 8.0, least_share: 0.5, amplitude_errors: 4.0, kept_errors: 2.0, remainder: 0.1 }
+        Self {
+            least_gain: 8.0,
+            least_share: 0.5,
+            amplitude_errors: 4.0,
+            kept_errors: 2.0,
+            remainder: 0.1,
+            inconstancy: 0.02,
+        }
     }
 }
 

@@ -258,7 +258,7 @@ fn sensed(given: &[Vec<Vector3<f64>>; 3], kind: SensorKind, axis: usize) -> Vec<
 }
 
 /// Legendre's polynomials of degree 0 to `most`.
-fn legendre(x: &[f64], most: usize) -> Vec<Vec<f64>> {
+pub fn legendre(x: &[f64], most: usize) -> Vec<Vec<f64>> {
     let mut degrees = vec![vec![1.0; x.len()], x.to_vec()];
     for degree in 1..most {
         let n = degree as f64;

@@ -160,7 +160,7 @@ fn with_driver(
 
 /// Signatures of a driver on a sensor, of the size of white noise in a sample.
 fn signatures(kind: SensorKind, driver: &Covariate, noise: &Noise) -> Vec<Signature> {
-    let usual = noise.sensors[kind as usize].white.iter().sum::<f64>() / 3.0;
+    let usual = noise.usual(kind);
     let columns = driver.columns(kind).into_iter();
     columns.map(|(function, axis)| on(kind, axis, &driver.functions[function].values, usual)).collect()
 }

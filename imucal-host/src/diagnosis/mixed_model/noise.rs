@@ -93,6 +93,11 @@ impl Noise {
         Precision::new(Arc::clone(effects), scatter, &drifts)
     }
 
+    /// White noise of a sensor in a sample, the mean of its axes.
+    pub fn usual(&self, kind: SensorKind) -> f64 {
+        self.sensors[kind as usize].white.iter().sum::<f64>() / 3.0
+    }
+
     /// −ln of the prior of all that are as likely, but for a constant.
     pub fn neg_log_prior(&self) -> f64 {
         self.sensors.iter().map(SensorNoise::neg_log_prior).sum()

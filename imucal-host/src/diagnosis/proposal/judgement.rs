@@ -53,7 +53,7 @@ pub fn judged(
     start: &Noise,
 ) -> Result<Option<Judged>, DiagnosisError> {
     let Some(columns) = problem.columns(formula, start) else { return Ok(None) };
-    let weighed = problem.weighed(residual, &columns.signatures, start)?;
+    let weighed = problem.weighed(residual, &[&columns.signatures], start)?;
     let projected = problem.projected(&weighed.normal)?;
     let places: Vec<usize> = (0..columns.sizes.len()).collect();
     let Some((amplitudes, covariance)) = projected.estimate(&places) else { return Ok(None) };

@@ -16,6 +16,7 @@
 //! | [`null_threshold`] | what the best of all gains in noise alone |
 //! | [`entry`] | the text of a user's file |
 //! | [`trial`] | what a formula closes on held-out stretches, and what is still followed |
+//! | [`constancy`] | whether its amplitude is the same at any time and after any past |
 //! | [`proposer`] | sensor by sensor: the proposal, or why there is none |
 //! | [`confirmation`] | a formula of another recording, with its amplitudes as they were found there |
 //!
@@ -25,6 +26,7 @@
 //! Not done here: sums of several formulas on one sensor, functions of three drivers, and what remembers more than a lag does.
 
 pub mod confirmation;
+pub mod constancy;
 pub mod entry;
 pub mod equivalents;
 pub mod finalists;

@@ -48,7 +48,7 @@ pub struct Weighed {
     pub noise: Noise,
     /// ln of the probability of the data, but for a constant.
     pub log_evidence: f64,
-    /// The normal equations: what is fitted in any case, then the formula.
+    /// The normal equations: what is fitted in any case, then the further columns.
     pub normal: Normal,
 }
 
@@ -80,24 +80,22 @@ impl<'p, 's> Problem<'p, 's> {
 
     /// A formula's columns; `None` where it has no value in this recording.
     pub fn columns(&self, formula: &Formulated, noise: &Noise) -> Option<FormulaColumns> {
-        let usual = noise.sensors[self.kind as usize].white.iter().sum::<f64>() / 3.0;
+        let usual = noise.usual(self.kind);
         let mut columns = FormulaColumns { signatures: Vec::new(), sizes: Vec::new() };
         for term in formula.parsed().ok()? {
             let factors = self.factors(&term, &formula.shapes()).ok()?;
             for axis in 0..3 {
-                let (values, size) = self.standardised(&factors, axis, usual);
-                let mut means: Means = Default::default();
-                means[self.kind as usize] = Some(values);
-                columns.signatures.push(means.into());
+                let (signature, size) = self.column(&factors, axis, usual);
+                columns.signatures.push(signature);
                 columns.sizes.push(size);
             }
         }
         Some(columns)
     }
 
-    /// One axis of what a formula multiplies, about its mean and of a usual size, and the amplitude that this takes; zero
-    /// where it does not vary.
-    fn standardised(&self, factors: &[Vector3<f64>], axis: usize, usual: f64) -> (Vec<Vector3<f64>>, f64) {
+    /// One axis of what a formula multiplies as a column, about its mean and of a usual size, and the amplitude that this
+    /// takes; zero where it does not vary.
+    pub fn column(&self, factors: &[Vector3<f64>], axis: usize, usual: f64) -> (Signature, f64) {
         let blocks = &self.linear.scene.blocks;
         let held = || factors.iter().zip(blocks).filter(|(_, block)| !block.rows.is_empty());
         let count = held().count().max(1) as f64;
@@ -112,7 +110,9 @@ impl<'p, 's> Problem<'p, 's> {
         let value = |(factor, block): (&Vector3<f64>, &crate::diagnosis::residual::block::Block)| {
             if block.rows.is_empty() { along(0.0) } else { along(size * (factor[axis] - mean)) }
         };
-        (factors.iter().zip(blocks).map(value).collect(), size)
+        let mut means: Means = Default::default();
+        means[self.kind as usize] = Some(factors.iter().zip(blocks).map(value).collect());
+        (means.into(), size)
     }
 
     /// With another residual of the sensor.
@@ -123,7 +123,7 @@ impl<'p, 's> Problem<'p, 's> {
         self.design.clone().leaving(&means)
     }
 
-    /// Fits what is fitted in any case, and a formula, to a residual, with the sensor's noise estimated again.
+    /// Fits what is fitted in any case, and groups of further columns, to a residual, with the sensor's noise estimated again.
     ///
     /// # Errors
     ///
@@ -131,12 +131,12 @@ impl<'p, 's> Problem<'p, 's> {
     pub fn weighed(
         &self,
         residual: &Design,
-        formula: &[Signature],
+        further: &[&[Signature]],
         start: &Noise,
     ) -> Result<Weighed, DiagnosisError> {
         let first = self.fitted.len();
         let kept: Vec<usize> = (0..first).collect();
-        let design = residual.extended(&kept, Vec::new(), formula);
+        let design = residual.extended(&kept, Vec::new(), &further.concat());
         let every: Vec<usize> = (0..design.size).collect();
         let linear = self.linear;
         // The other sensors do not show it, but what they have in common with this one.
@@ -145,7 +145,12 @@ impl<'p, 's> Problem<'p, 's> {
         let mut noise = start.clone();
         noise.sensors[self.kind as usize] = linear.weighing.fit(&products, self.kind, &every, start, &NEAR);
         let normal = noise.normal(&products, design.size);
-        let groups = if formula.is_empty() { Vec::new() } else { vec![every[first..].to_vec()] };
+        let mut from = first;
+        let places = |group: &&[Signature]| {
+            from += group.len();
+            every[from - group.len()..from].to_vec()
+        };
+        let groups: Vec<Vec<usize>> = further.iter().map(places).collect();
         let log_evidence = log_evidence(&normal, &noise, first, &groups)?;
         Ok(Weighed { noise, log_evidence, normal })
     }

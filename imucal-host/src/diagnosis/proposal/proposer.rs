@@ -2,7 +2,7 @@
 //! there is none.
 
 use super::{
-    entry,
+    constancy, entry,
     finalists::{self, Finalist},
     grammar::{self, Held},
     null_threshold,
@@ -172,7 +172,7 @@ impl<'s> Setting<'_, 's> {
         if let Some(left) = tried.left.as_ref().filter(|left| left.size > by.remainder * best.explained) {
             return Ok(follows(&left.driver));
         }
-        if tried.share.value < by.least_share || tried.share.interval[0] <= 0.0 {
+        if tried.share.interval[0] < by.least_share {
             return Ok(follows(&best.formula.name.replace('_', " ")));
         }
         let every: Vec<usize> = start.problem.fitted.clone();
@@ -185,6 +185,10 @@ impl<'s> Setting<'_, 's> {
         });
         if is_needed {
             return Ok(follows("more than one formula says"));
+        }
+        if let Some(missing) = constancy::missing(&start.problem, best, &axes, by.inconstancy)? {
+            let name = best.formula.name.replace('_', " ");
+            return Ok(Err(format!("the {kind} follows {name} and {missing}, no formula found")));
         }
         Ok(Ok(self.proposal(start, found, &axes, &tried, &text(&tried.amounts), log_odds)))
     }

@@ -21,7 +21,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use self::entry::Entry;
-pub(in crate::effect) use self::history::History;
+pub(crate) use self::history::History;
 pub use self::{
     entry::Fitted,
     fault::{EntryFault, FormulaFault, UserEffectError},
