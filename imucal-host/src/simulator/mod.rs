@@ -8,7 +8,7 @@ pub mod climate;
 pub mod conditions;
 mod converter;
 pub mod course;
-pub(crate) mod cubic;
+pub mod cubic;
 pub mod dose;
 mod error;
 pub mod gimbal;

@@ -1,6 +1,7 @@
 //! A simulator's stream: what it says ideal sensors would have read, as a source of truth.
 //!
-//! Between two samples each component is a cubic ([`Cubic`]); the angular acceleration is the slope of the rate. A row of the recording shows the stream at
+//! Between two samples each component is a cubic ([`Cubic`]); the angular acceleration is the slope of the rate. A row of the
+//! recording shows the stream at
 //!
 //! ```text
 //! s = (t + offset) / (1 + error)
