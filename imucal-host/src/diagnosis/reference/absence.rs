@@ -8,12 +8,11 @@
 //! | symbol | meaning |
 //! | --- | --- |
 //! | P | share of impacts that are absent within such a stretch |
-//! | q | share of impacts that are absent outside of it: those that lie between two samples |
+//! | q | share of all impacts that are absent, such as lie between two samples |
 //!
-//! Impacts that are in step with the samples are absent in a row as well: where one that is absent is followed by another
-//! more often than q says, q is that share. The stretch with the largest s is found as the one with the largest sum, q is
-//! estimated again without it, and so on. Source of the statistic: Kulldorff, A spatial scan statistic (1997), for a share
-//! P that is given.
+//! Impacts that are in step with the samples are absent in a row as well: where, outside of the stretches that would be
+//! asserted, one that is absent is followed by another more often than q says, q is that share. Source: Kulldorff, A spatial scan statistic
+//! (1997), for a share P that is given.
 
 use std::ops::Range;
 
@@ -22,71 +21,62 @@ const WITHIN: f64 = 0.8;
 /// A share that few impacts show is drawn to q, or to this one, as by so many impacts.
 const PRIOR: f64 = 4.0;
 const USUAL: f64 = 0.02;
-/// A stretch is asserted from this s on, over what the number of impacts costs.
-const ASSERTED: f64 = 8.0;
-/// Rounds of finding stretches and estimating q without them, and most stretches in one.
-const ROUNDS: usize = 4;
-const MOST: usize = 16;
+/// Of fewer impacts that can be seen it is not known what is usual.
+const FEWEST: usize = 20;
+/// A stretch is asserted from this s on, less what the number of impacts costs.
+const ASSERTED: f64 = 6.5;
 
 /// Stretches of impacts that are absent, with their s: from whether each is absent, `None` where that cannot be seen.
 pub fn absent_stretches(absent: &[Option<bool>]) -> Vec<(Range<usize>, f64)> {
     let known: Vec<usize> = (0..absent.len()).filter(|at| absent[*at].is_some()).collect();
-    let is_absent: Vec<bool> = known.iter().map(|at| absent[*at] == Some(true)).collect();
-    let cost = (known.len().max(1) as f64).ln();
-    let mut found: Vec<(Range<usize>, f64)> = Vec::new();
-    for round in 0..ROUNDS {
-        let mut usual = share_outside(&is_absent, &found);
-        if round > 0 {
-            usual = usual.max(share_that_follows(&is_absent, &found, usual));
-        }
-        found = largest_sums(&is_absent, usual, cost);
+    if known.len() < FEWEST {
+        return Vec::new();
     }
+    let is_absent: Vec<bool> = known.iter().map(|at| absent[*at] == Some(true)).collect();
+    let share = share_of_all(&is_absent);
+    let least = (known.len() as f64).ln() + ASSERTED;
+    let stretches = largest_sums(scores(&is_absent, share), least);
+    let usual = share.max(share_that_follows(&is_absent, &stretches, share));
     let of = |(stretch, sum): (Range<usize>, f64)| {
         let last = stretch.end.checked_sub(1)?;
         Some((*known.get(stretch.start)?..known.get(last)? + 1, sum))
     };
-    found.into_iter().filter(|(_, sum)| *sum > cost + ASSERTED).filter_map(of).collect()
+    largest_sums(scores(&is_absent, usual), least).into_iter().filter_map(of).collect()
 }
 
-/// Impacts outside of these stretches.
-fn outside(count: usize, stretches: &[(Range<usize>, f64)]) -> impl Iterator<Item = usize> {
-    (0..count).filter(|at| !stretches.iter().any(|(stretch, _)| stretch.contains(at)))
+/// Share of impacts that are absent.
+fn share_of_all(is_absent: &[bool]) -> f64 {
+    let absent = is_absent.iter().filter(|absent| **absent).count() as f64;
+    (absent + PRIOR * USUAL) / (is_absent.len() as f64 + PRIOR)
 }
 
-/// Share of impacts that are absent, without these stretches.
-fn share_outside(is_absent: &[bool], stretches: &[(Range<usize>, f64)]) -> f64 {
-    let all = outside(is_absent.len(), stretches);
-    let (count, absent) = all.fold((0.0, 0.0), |(count, absent), at| {
-        (count + 1.0, absent + if is_absent[at] { 1.0 } else { 0.0 })
-    });
-    (absent + PRIOR * USUAL) / (count + PRIOR)
-}
-
-/// Share of impacts that are absent after one that is, without these stretches; `share` of them all are absent.
+/// Share of impacts that are absent after one that is, outside of these stretches; `share` of all are absent.
 fn share_that_follows(is_absent: &[bool], stretches: &[(Range<usize>, f64)], share: f64) -> f64 {
-    let absent: Vec<usize> = outside(is_absent.len(), stretches).filter(|at| is_absent[*at]).collect();
+    let is_outside = |at: &usize| !stretches.iter().any(|(stretch, _)| stretch.contains(at));
+    let absent: Vec<usize> = (0..is_absent.len()).filter(|at| is_absent[*at]).filter(is_outside).collect();
     let followed = absent.windows(2).filter(|pair| pair[1] == pair[0] + 1).count();
     (followed as f64 + PRIOR * share) / (absent.len() as f64 + PRIOR)
 }
 
-/// Stretches whose sums are larger than `least`, the largest first; they do not overlap.
-fn largest_sums(is_absent: &[bool], usual: f64, least: f64) -> Vec<(Range<usize>, f64)> {
-    if usual >= WITHIN {
-        return Vec::new();
-    }
+/// What each impact adds to s; nothing where as many are absent as in a stretch.
+fn scores(is_absent: &[bool], usual: f64) -> Vec<f64> {
+    let usual = usual.min(WITHIN);
     let score =
-        |absent: bool| if absent { (WITHIN / usual).ln() } else { ((1.0 - WITHIN) / (1.0 - usual)).ln() };
-    let mut scores: Vec<f64> = is_absent.iter().map(|absent| score(*absent)).collect();
+        |absent: &bool| if *absent { (WITHIN / usual).ln() } else { ((1.0 - WITHIN) / (1.0 - usual)).ln() };
+    is_absent.iter().map(score).collect()
+}
+
+/// Stretches whose sums are larger than `least`, the largest first; they do not overlap.
+fn largest_sums(mut scores: Vec<f64>, least: f64) -> Vec<(Range<usize>, f64)> {
     let mut found = Vec::new();
-    while found.len() < MOST {
+    loop {
         let (stretch, sum) = largest_sum(&scores);
         if sum <= least {
-            break;
+            return found;
         }
         scores[stretch.clone()].fill(f64::NEG_INFINITY);
         found.push((stretch, sum));
     }
-    found
 }
 
 /// The stretch with the largest sum (Kadane).
@@ -117,12 +107,12 @@ mod tests {
     }
 
     #[test]
-    fn six_absent_ones_in_a_row_are_a_stretch_where_hardly_any_is_absent() {
+    fn seven_absent_ones_in_a_row_are_a_stretch_where_hardly_any_is_absent() {
         let mut absent = impacts(200, 0.03, 1, 3);
-        absent[60..66].fill(Some(true));
+        absent[60..67].fill(Some(true));
         let found = absent_stretches(&absent);
         assert_eq!(found.len(), 1, "{found:?}");
-        assert!(found[0].0.start <= 60 && found[0].0.end >= 66 && found[0].0.len() < 9, "{found:?}");
+        assert!(found[0].0.start <= 60 && found[0].0.end >= 67 && found[0].0.len() < 9, "{found:?}");
     }
 
     #[test]
@@ -131,6 +121,9 @@ mod tests {
         for seed in 0..200 {
             for (share, alike) in [(0.03, 1), (0.2, 1), (0.5, 1), (0.15, 3)] {
                 stretches += absent_stretches(&impacts(300, share, alike, seed)).len();
+                if alike == 1 {
+                    stretches += absent_stretches(&impacts(80, share, alike, seed)).len();
+                }
             }
         }
         assert_eq!(stretches, 0);
@@ -141,5 +134,6 @@ mod tests {
         assert_eq!(absent_stretches(&[]), []);
         assert_eq!(absent_stretches(&[None; 40]), []);
         assert_eq!(absent_stretches(&[Some(true); 40]), []);
+        assert_eq!(absent_stretches(&[Some(true); 5]), []);
     }
 }

@@ -234,7 +234,9 @@ impl<'a> Pairs<'a> {
             let products = self.products(span, shift(clock, span));
             let sizes = [products.own, products.given];
             let noise = own.noise_near(&(span.start - NEAR..span.end + NEAR));
-            [products.is_absent(sizes, noise), products.is_absent([sizes[1], sizes[0]], noise)]
+            let [own, given] = [sizes, [sizes[1], sizes[0]]].map(|sizes| products.is_absent(sizes, noise));
+            // What one side shows is not absent there, though it were on the other: between two samples, in turn.
+            [own.or(given.map(|_| false)), given.or(own.map(|_| false))]
         };
         spans.iter().map(of).collect()
     }
