@@ -9,7 +9,7 @@ use imucal_host::{
     observe::motion,
     recording::Recording,
 };
-use imucal_tests::{data, golden};
+use imucal_tests::{data, golden, part::part};
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde_json::Value;
 
@@ -84,19 +84,6 @@ fn the_arms_are_those_of_an_independent_fit_within_their_errors() {
             assert!((value - theirs).abs() < 3.0 * all, "{name} {axis}: {value} for {theirs}, {all}");
         }
     }
-}
-
-/// Some rows of a recording, its time from zero.
-fn part(recording: &Recording, rows: std::ops::Range<usize>) -> Recording {
-    let mut part = recording.clone();
-    let start = recording.time[rows.start];
-    part.time = recording.time[rows.clone()].iter().map(|time| time - start).collect();
-    for triple in [&mut part.acc, &mut part.gyr, &mut part.mag].into_iter().flatten() {
-        triple.values = triple.values[rows.clone()].to_vec();
-    }
-    part.reference = recording.reference.as_ref().map(|reference| reference[rows.clone()].to_vec());
-    part.position = recording.position.as_ref().map(|position| position[rows].to_vec());
-    part
 }
 
 /// Half a recording is sure of its arm by up to twice too much: errors of the cameras last longer than the parts of a jackknife.

@@ -8,7 +8,7 @@ use imucal_host::{
     recording::{Recording, SensorKind},
     store::StoredCalibration,
 };
-use imucal_tests::data;
+use imucal_tests::{data, part::part};
 use nalgebra::{Matrix3, Vector3};
 
 /// Recordings in a hand.
@@ -166,22 +166,6 @@ fn too_few_rests_in_a_hand_are_not_diagnosed() {
         "{:?}",
         diagnosis.remarks
     );
-}
-
-/// Some rows of a recording, its time from zero.
-fn part(recording: &Recording, rows: std::ops::Range<usize>) -> Recording {
-    let mut part = recording.clone();
-    let start = recording.time[rows.start];
-    part.time = recording.time[rows.clone()].iter().map(|time| time - start).collect();
-    for triple in [&mut part.acc, &mut part.gyr, &mut part.mag].into_iter().flatten() {
-        triple.values = triple.values[rows.clone()].to_vec();
-    }
-    for rows_of in [&mut part.temperature].into_iter().flatten() {
-        *rows_of = rows_of[rows.clone()].to_vec();
-    }
-    part.reference = recording.reference.as_ref().map(|reference| reference[rows.clone()].to_vec());
-    part.extra.clear();
-    part
 }
 
 /// A recording in which every other rest is not seen by the accelerometer.

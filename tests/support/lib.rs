@@ -7,6 +7,7 @@ pub mod data;
 pub mod firmware;
 pub mod footprint;
 pub mod golden;
+pub mod part;
 pub mod program;
 pub mod rig;
 pub mod simulated;

@@ -18,7 +18,7 @@ const STANDS_OUT: f64 = 6.0;
 const STRETCH: f64 = 0.5;
 const ABOUT: usize = 2;
 /// Median of the squared length of three normal numbers.
-const MEDIAN_SQUARE: f64 = 2.366;
+const MEDIAN_OF_THREE_SQUARES: f64 = 2.366;
 
 /// e of samples that have four neighbours, by time, s.
 pub struct Unforeseen {
@@ -116,7 +116,8 @@ impl Unforeseen {
 
 /// Mean of |e|² by its median, which a few impacts do not move.
 fn noise(samples: &[(f64, Vector3<f64>)]) -> f64 {
-    3.0 / MEDIAN_SQUARE * median(samples.iter().map(|(_, e)| e.norm_squared()).collect()).unwrap_or(0.0)
+    3.0 / MEDIAN_OF_THREE_SQUARES
+        * median(samples.iter().map(|(_, e)| e.norm_squared()).collect()).unwrap_or(0.0)
 }
 
 /// e of the third of five samples.
