@@ -11,10 +11,11 @@
 //! | q | share of all impacts that are absent, such as lie between two samples |
 //!
 //! Impacts that are in step with the samples are absent in a row as well: where, outside of the stretches that would be
-//! asserted, one that is absent is followed by another more often than q says, q is that share. Source: Kulldorff, A spatial scan statistic
-//! (1997), for a share P that is given.
+//! asserted, one that is absent is followed by another more often than q says, q is that share. P is given.
 
 use std::ops::Range;
+
+use super::scan::Events;
 
 /// P.
 const WITHIN: f64 = 0.8;
@@ -23,25 +24,20 @@ const PRIOR: f64 = 4.0;
 const USUAL: f64 = 0.02;
 /// Of fewer impacts that can be seen it is not known what is usual.
 const FEWEST: usize = 20;
-/// A stretch is asserted from this s on, less what the number of impacts costs.
-const ASSERTED: f64 = 6.5;
 
-/// Stretches of impacts that are absent, with their s: from whether each is absent, `None` where that cannot be seen.
-pub fn absent_stretches(absent: &[Option<bool>]) -> Vec<(Range<usize>, f64)> {
+/// Stretches of impacts that are absent, with their s: from whether each is absent, `None` where that cannot be seen, and from
+/// whether no stretch reaches to it from the one before.
+pub fn absent_stretches(absent: &[Option<bool>], begins: &[bool]) -> Vec<(Range<usize>, f64)> {
     let known: Vec<usize> = (0..absent.len()).filter(|at| absent[*at].is_some()).collect();
     if known.len() < FEWEST {
         return Vec::new();
     }
     let is_absent: Vec<bool> = known.iter().map(|at| absent[*at] == Some(true)).collect();
     let share = share_of_all(&is_absent);
-    let least = (known.len() as f64).ln() + ASSERTED;
-    let stretches = largest_sums(scores(&is_absent, share), least);
+    let events = Events { known: &known, begins };
+    let stretches = events.largest(scores(&is_absent, share));
     let usual = share.max(share_that_follows(&is_absent, &stretches, share));
-    let of = |(stretch, sum): (Range<usize>, f64)| {
-        let last = stretch.end.checked_sub(1)?;
-        Some((*known.get(stretch.start)?..known.get(last)? + 1, sum))
-    };
-    largest_sums(scores(&is_absent, usual), least).into_iter().filter_map(of).collect()
+    events.asserted(scores(&is_absent, usual))
 }
 
 /// Share of impacts that are absent.
@@ -66,38 +62,14 @@ fn scores(is_absent: &[bool], usual: f64) -> Vec<f64> {
     is_absent.iter().map(score).collect()
 }
 
-/// Stretches whose sums are larger than `least`, the largest first; they do not overlap.
-fn largest_sums(mut scores: Vec<f64>, least: f64) -> Vec<(Range<usize>, f64)> {
-    let mut found = Vec::new();
-    loop {
-        let (stretch, sum) = largest_sum(&scores);
-        if sum <= least {
-            return found;
-        }
-        scores[stretch.clone()].fill(f64::NEG_INFINITY);
-        found.push((stretch, sum));
-    }
-}
-
-/// The stretch with the largest sum (Kadane).
-fn largest_sum(scores: &[f64]) -> (Range<usize>, f64) {
-    let (mut best, mut largest) = (0..0, 0.0);
-    let (mut from, mut sum) = (0, 0.0);
-    for (at, score) in scores.iter().enumerate() {
-        sum += score;
-        if sum <= 0.0 {
-            (from, sum) = (at + 1, 0.0);
-        } else if sum > largest {
-            (best, largest) = (from..at + 1, sum);
-        }
-    }
-    (best, largest)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::simulator::random::{Purpose, Random};
+
+    fn found(absent: &[Option<bool>]) -> Vec<(Range<usize>, f64)> {
+        absent_stretches(absent, &vec![false; absent.len()])
+    }
 
     /// Impacts of which this share is absent, each group of `alike` as a whole.
     fn impacts(count: usize, share: f64, alike: usize, seed: u64) -> Vec<Option<bool>> {
@@ -110,7 +82,7 @@ mod tests {
     fn seven_absent_ones_in_a_row_are_a_stretch_where_hardly_any_is_absent() {
         let mut absent = impacts(200, 0.03, 1, 3);
         absent[60..67].fill(Some(true));
-        let found = absent_stretches(&absent);
+        let found = found(&absent);
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(found[0].0.start <= 60 && found[0].0.end >= 67 && found[0].0.len() < 9, "{found:?}");
     }
@@ -120,9 +92,9 @@ mod tests {
         let mut stretches = 0;
         for seed in 0..200 {
             for (share, alike) in [(0.03, 1), (0.2, 1), (0.5, 1), (0.15, 3)] {
-                stretches += absent_stretches(&impacts(300, share, alike, seed)).len();
+                stretches += found(&impacts(300, share, alike, seed)).len();
                 if alike == 1 {
-                    stretches += absent_stretches(&impacts(80, share, alike, seed)).len();
+                    stretches += found(&impacts(80, share, alike, seed)).len();
                 }
             }
         }
@@ -131,9 +103,9 @@ mod tests {
 
     #[test]
     fn nothing_is_found_among_impacts_that_cannot_be_seen() {
-        assert_eq!(absent_stretches(&[]), []);
-        assert_eq!(absent_stretches(&[None; 40]), []);
-        assert_eq!(absent_stretches(&[Some(true); 40]), []);
-        assert_eq!(absent_stretches(&[Some(true); 5]), []);
+        assert_eq!(found(&[]), []);
+        assert_eq!(found(&[None; 40]), []);
+        assert_eq!(found(&[Some(true); 40]), []);
+        assert_eq!(found(&[Some(true); 5]), []);
     }
 }

@@ -13,7 +13,10 @@
 //! | [`stream`] | the movement of a simulator's stream |
 //! | [`impact`] | rows near an impact that the samples of a stream do not resolve |
 //! | [`strikes`] | impacts in a row that the recording or the stream lacks |
+//! | [`common_instants`] | impacts of both at the same instants |
 //! | [`absence`] | impacts in a row that one side does not show at all |
+//! | [`gain`] | impacts in a row that one side has fainter or stronger, where the faster side resolves them |
+//! | [`scan`] | stretches of a row over which a sum of logarithms of odds is largest |
 //! | [`unforeseen`] | what a sample's neighbours do not foretell of it |
 //! | [`stream_clock`] | its clock against that of the sensor, roughly |
 //! | [`revisits`] | whether attitudes are held more than once, without which repeatability cannot be estimated |
@@ -23,12 +26,15 @@
 //! Not done here: a reference attitude holds no linear acceleration; its clock is put right in `screening`.
 
 pub mod absence;
+pub mod common_instants;
+pub mod gain;
 pub mod impact;
 pub mod model;
 pub mod movement;
 pub mod pose;
 pub mod rest_to_rest;
 pub mod revisits;
+pub mod scan;
 pub mod stream;
 pub mod stream_clock;
 pub mod strikes;
