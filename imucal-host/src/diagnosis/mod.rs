@@ -30,7 +30,7 @@ use self::{
         stepwise,
     },
     settings::{Settings, Source},
-    verdict::answer::{answer, untestable},
+    verdict::answer::{Answer, answer, untestable},
 };
 use crate::{
     effect::Effect,
@@ -110,10 +110,10 @@ pub fn try_diagnose(
         if let Some(stretch) = motion_mismatch::turned_for_a_while(&explained) {
             return Ok(Explained::Otherwise(stretch));
         }
-        let mut diagnosis = answer(recording, preparation, &explained, progress)?;
+        let Answer { mut diagnosis, following } = answer(recording, preparation, &explained, progress)?;
         let (proposals, remarks) = match &options.frozen {
             Some(toml) => confirmation::confirmed(&explained, &diagnosis, &options.effects, toml)?,
-            None => proposer::proposed(&explained, &diagnosis, progress)?,
+            None => proposer::proposed(&explained, &diagnosis, &following, progress)?,
         };
         diagnosis.proposals = proposals;
         diagnosis.remarks.extend(remarks);

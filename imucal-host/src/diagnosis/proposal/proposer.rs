@@ -42,7 +42,7 @@ struct Start<'a, 's> {
 }
 
 /// Proposes formulas where a diagnosis leaves a gap unexplained, at most one a sensor; and remarks on sensors for which there
-/// is none.
+/// is none. `following` are the sensors whose residual follows something.
 ///
 /// # Errors
 ///
@@ -50,6 +50,7 @@ struct Start<'a, 's> {
 pub fn proposed(
     explained: &Solution<'_>,
     diagnosis: &Diagnosis,
+    following: &[SensorKind],
     progress: &dyn Fn(&str),
 ) -> Result<(Vec<Proposal>, Vec<String>), DiagnosisError> {
     let scene = explained.linear.scene;
@@ -75,7 +76,8 @@ pub fn proposed(
     };
     let asserted = asserted(explained, diagnosis);
     let (mut proposals, mut remarks) = (Vec::new(), Vec::new());
-    for kind in scene.kinds.iter().copied().filter(|kind| is_open(*kind, explained, diagnosis)) {
+    let is_open = |kind: &SensorKind| following.contains(kind) || has_effect(*kind, explained);
+    for kind in scene.kinds.iter().copied().filter(is_open) {
         match setting.of_sensor(kind, &asserted)? {
             Ok(proposal) => proposals.push(proposal),
             Err(remark) => remarks.push(remark),
@@ -91,11 +93,9 @@ pub fn asserted(explained: &Solution<'_>, diagnosis: &Diagnosis) -> Vec<&'static
     explained.best.set.iter().filter(is_cause).copied().collect()
 }
 
-/// A sensor follows something, or the search has had an effect on it.
-fn is_open(kind: SensorKind, explained: &Solution<'_>, diagnosis: &Diagnosis) -> bool {
-    let reaches = |effect: &&'static Effect| explained.linear.scene.reach(effect) == [kind];
-    diagnosis.places.iter().any(|place| place.sensor == kind.prefix())
-        || explained.best.set.iter().any(reaches)
+/// The search has found an effect of this sensor alone.
+fn has_effect(kind: SensorKind, explained: &Solution<'_>) -> bool {
+    explained.best.set.iter().any(|effect| explained.linear.scene.reach(effect) == [kind])
 }
 
 impl<'s> Setting<'_, 's> {

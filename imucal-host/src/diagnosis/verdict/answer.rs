@@ -22,7 +22,7 @@ use crate::{
         settings::{LocationSettings, VerdictSettings},
     },
     effect::Effect,
-    recording::Recording,
+    recording::{Recording, SensorKind},
 };
 
 /// A diagnosis that could not be made, and why.
@@ -78,6 +78,15 @@ impl Tested {
 
     fn left(&self, by: &LocationSettings) -> Option<&Following> {
         most_followed(&self.after, by)
+    }
+
+    /// Sensors whose residual follows something.
+    fn following(&self, by: &LocationSettings) -> Vec<SensorKind> {
+        let follows = |kind: &SensorKind| {
+            let mut of_sensor = self.after.iter().filter(|following| following.kind == *kind);
+            of_sensor.any(|following| is_followed(following, self.after.len(), by))
+        };
+        SensorKind::ALL.into_iter().filter(follows).collect()
     }
 }
 
@@ -153,6 +162,14 @@ impl Asserted {
     }
 }
 
+/// A diagnosis, and what it leaves.
+pub struct Answer {
+    /// The diagnosis.
+    pub diagnosis: Diagnosis,
+    /// Sensors whose residual still follows something.
+    pub following: Vec<SensorKind>,
+}
+
 /// The diagnosis of a recording.
 ///
 /// # Errors
@@ -163,7 +180,7 @@ pub fn answer(
     preparation: &Preparation,
     explained: &Solution<'_>,
     progress: &dyn Fn(&str),
-) -> Result<Diagnosis, DiagnosisError> {
+) -> Result<Answer, DiagnosisError> {
     let tested = Tested::of(explained, progress)?;
     let settings = explained.linear.scene.settings;
     let left = tested.left(&settings.location);
@@ -184,6 +201,7 @@ pub fn answer(
         causes: &found,
         clock: clock.as_ref().map_or(&[], |clock| &clock.causes),
         closed: if found.is_empty() { closed } else { &tested.closed },
+        explainable: tested.closed.explainable,
         left,
         refuted: asserted.refuted,
         within_model: !found.is_empty() && asserted.causes.is_empty() && clock.is_none(),
@@ -203,7 +221,7 @@ pub fn answer(
     let (linear, best) = (&explained.linear, &explained.best);
     let testable = detectability::testable(linear, &best.set, &best.noise);
     let (absent, not_testable) = asserted.part("what is absent or not testable", testable);
-    Ok(Diagnosis {
+    let diagnosis = Diagnosis {
         verdict: evidence.verdict(&settings.verdict),
         remarks: asserted.remarks,
         gap,
@@ -217,7 +235,8 @@ pub fn answer(
         not_testable,
         next_experiment: next_experiment(recording, explained, &tested).unwrap_or_default(),
         ..untestable(recording, String::new())
-    })
+    };
+    Ok(Answer { diagnosis, following: tested.following(&settings.location) })
 }
 
 /// The effects of the best set with their estimates and what each closes of the gap.
