@@ -14,6 +14,7 @@
 //! | [`equivalents`] | formulas that the recording cannot distinguish: the simplest stands for them |
 //! | [`finalists`] | the best formula, by these |
 //! | [`null_threshold`] | what the best of all gains in noise alone |
+//! | [`refitted`] | the problem about a fit that has a formula among its effects |
 //! | [`entry`] | the text of a user's file |
 //! | [`trial`] | what a formula closes on held-out stretches, and what is still followed |
 //! | [`constancy`] | whether its amplitude is the same at any time and after any past |
@@ -35,6 +36,7 @@ pub mod judgement;
 pub mod null_threshold;
 pub mod problem;
 pub mod proposer;
+pub mod refitted;
 pub mod screening;
 pub mod term;
 pub mod trial;

@@ -7,7 +7,8 @@ use super::{
     grammar::{self, Held},
     null_threshold,
     problem::{Problem, Weighed},
-    term::{Driver, Formulated},
+    refitted,
+    term::{Driver, Formulated, Shape},
     trial::{Joined, Tried},
 };
 use crate::{
@@ -17,16 +18,21 @@ use crate::{
         location::{covariate::Covariate, covariates},
         mixed_model::noise::NEAR,
         residual::base_run::Reference,
-        search::stepwise::Solution,
+        search::{linearisation::Linearisation, refit::Fit, stepwise::Solution},
         settings::ProposalSettings,
     },
     effect::{Effect, XYZ},
     recording::SensorKind,
 };
 
-/// What all sensors have in common.
+/// Fits with a formula among the effects, at most, until the best formula is that of the fit.
+const ROUNDS: usize = 3;
+
+/// A problem about a fit, and what all sensors have in common.
 struct Setting<'a, 's> {
     explained: &'a Solution<'s>,
+    linear: &'a Linearisation<'s>,
+    fit: &'a Fit,
     reference: Reference<'a>,
     drivers: Vec<Covariate>,
     held: Held,
@@ -35,10 +41,9 @@ struct Setting<'a, 's> {
 
 /// What a formula is added to: a set of effects, and the fit of one sensor with it.
 struct Start<'a, 's> {
+    set: Vec<&'static Effect>,
     problem: Problem<'a, 's>,
     before: Weighed,
-    /// ln of the probability of the data with the set, its prior included.
-    value: f64,
 }
 
 /// Proposes formulas where a diagnosis leaves a gap unexplained, at most one a sensor; and remarks on sensors for which there
@@ -63,17 +68,12 @@ pub fn proposed(
         let known = || rows.iter().filter(|value| value.is_finite());
         known().sum::<f64>() / known().count().max(1) as f64
     });
-    let setting = Setting {
-        explained,
-        reference: Reference::new(scene, explained.fit.doses.clone(), &scene.fine)?,
-        drivers: covariates::drivers(scene, &explained.linear.weighing.given),
-        held: Held {
-            gimbals: scene.swings.is_some(),
-            temperature,
-            field: scene.settings.source.gives_field() && scene.kinds.contains(&SensorKind::Mag),
-        },
-        origin: &diagnosis.recording,
+    let held = Held {
+        gimbals: scene.swings.is_some(),
+        temperature,
+        field: scene.settings.source.gives_field() && scene.kinds.contains(&SensorKind::Mag),
     };
+    let setting = Setting::new(explained, (&explained.linear, &explained.fit), held, &diagnosis.recording)?;
     let asserted = asserted(explained, diagnosis);
     let (mut proposals, mut remarks) = (Vec::new(), Vec::new());
     let is_open = |kind: &SensorKind| following.contains(kind) || has_effect(*kind, explained);
@@ -98,9 +98,20 @@ fn has_effect(kind: SensorKind, explained: &Solution<'_>) -> bool {
     explained.best.set.iter().any(|effect| explained.linear.scene.reach(effect) == [kind])
 }
 
-impl<'s> Setting<'_, 's> {
+impl<'a, 's> Setting<'a, 's> {
+    fn new(
+        explained: &'a Solution<'s>,
+        (linear, fit): (&'a Linearisation<'s>, &'a Fit),
+        held: Held,
+        origin: &'a str,
+    ) -> Result<Self, DiagnosisError> {
+        let reference = Reference::new(linear.scene, fit.doses.clone(), &linear.scene.fine)?;
+        let drivers = covariates::drivers(linear.scene, &linear.weighing.given);
+        Ok(Self { explained, linear, fit, reference, drivers, held, origin })
+    }
+
     fn settings(&self) -> &ProposalSettings {
-        &self.explained.linear.scene.settings.proposal
+        &self.linear.scene.settings.proposal
     }
 
     /// The proposal for a sensor, or a sentence on why there is none.
@@ -110,40 +121,72 @@ impl<'s> Setting<'_, 's> {
         asserted: &[&'static Effect],
     ) -> Result<Result<Proposal, String>, DiagnosisError> {
         let mut starts = vec![self.start(kind, Vec::new())?];
-        if asserted.iter().any(|effect| self.explained.linear.scene.reach(effect).contains(&kind)) {
+        if asserted.iter().any(|effect| self.linear.scene.reach(effect).contains(&kind)) {
             starts.push(self.start(kind, asserted.to_vec())?);
         }
-        let largest = |driver: &Driver| largest(&starts[0].problem, driver);
-        let formulas = grammar::formulas(kind, self.held, &largest);
-        let cost = (formulas.len() as f64).ln();
+        let formulas = formulas(&starts[0].problem, self.held);
         let mut best: Option<(f64, &Start<'_, '_>, Finalist)> = None;
         for start in &starts {
             let found = finalists::best(&start.problem, &self.reference, &start.before, &formulas)?;
             let Some(found) = found else { continue };
-            let value = start.value + found.best.gain;
+            let noise = &self.explained.best.noise;
+            let value = self.linear.screen(&start.set, noise, &[kind], &NEAR)?.value + found.best.gain;
             if best.as_ref().is_none_or(|(most, ..)| value > *most) {
                 best = Some((value, start, found));
             }
         }
-        let none = || Err(format!("the {kind} follows something for which no formula was found"));
-        let Some((_, start, found)) = best else { return Ok(none()) };
-        let gain = found.best.gain - cost;
-        if gain <= self.settings().least_gain {
-            return Ok(none());
+        let Some((_, start, found)) = best else { return Ok(none(kind)) };
+        if self.gain(&found, &formulas) <= self.settings().least_gain {
+            return Ok(none(kind));
         }
         let threshold = null_threshold::threshold(&start.problem, &formulas, &start.before.noise)?;
         if found.best.gain <= threshold {
-            return Ok(none());
+            return Ok(none(kind));
         }
-        self.accepted(start, &found, &formulas, gain)
+        self.settled(kind, &start.set, found)
+    }
+
+    /// The formula that is best about the fit that has it among its effects, judged there.
+    fn settled(
+        &self,
+        kind: SensorKind,
+        set: &[&'static Effect],
+        mut found: Finalist,
+    ) -> Result<Result<Proposal, String>, DiagnosisError> {
+        for round in 1..=ROUNDS {
+            let fit = refitted::without(self.explained, set, kind, &found.best)?;
+            let linear = Linearisation::fitted_alone(self.linear.scene, self.linear.candidates, &fit)?;
+            let setting = Setting::new(self.explained, (&linear, &fit), self.held, self.origin)?;
+            let start = setting.start(kind, set.to_vec())?;
+            let (formulas, Some(again)) = setting.found(&start)? else { break };
+            let gain = setting.gain(&again, &formulas);
+            if gain <= self.settings().least_gain {
+                break;
+            }
+            if round == ROUNDS || again.best.formula.name == found.best.formula.name {
+                return setting.accepted(&start, &again, &formulas, gain);
+            }
+            found = again;
+        }
+        Ok(none(kind))
+    }
+
+    /// The formulas that are tried, and the best of them.
+    fn found(&self, start: &Start<'_, '_>) -> Result<(Vec<Formulated>, Option<Finalist>), DiagnosisError> {
+        let formulas = formulas(&start.problem, self.held);
+        let found = finalists::best(&start.problem, &self.reference, &start.before, &formulas)?;
+        Ok((formulas, found))
+    }
+
+    /// ln of the odds that a formula adds, the number of those that are tried counted.
+    fn gain(&self, found: &Finalist, formulas: &[Formulated]) -> f64 {
+        found.best.gain - (formulas.len() as f64).ln()
     }
 
     fn start(&self, kind: SensorKind, set: Vec<&'static Effect>) -> Result<Start<'_, 's>, DiagnosisError> {
-        let (linear, noise) = (&self.explained.linear, &self.explained.best.noise);
-        let problem = Problem::new(linear, &self.reference, kind, linear.fitted(&set))?;
-        let before = problem.weighed(&problem.design, &[], noise)?;
-        let value = linear.screen(&set, noise, &[kind], &NEAR)?.value;
-        Ok(Start { problem, before, value })
+        let problem = Problem::new(self.linear, &self.reference, kind, self.linear.fitted(&set))?;
+        let before = problem.weighed(&problem.design, &[], &self.explained.best.noise)?;
+        Ok(Start { set, problem, before })
     }
 
     /// The formula as a proposal, if held-out stretches bear it out and nothing is followed beside it.
@@ -161,22 +204,29 @@ impl<'s> Setting<'_, 's> {
                 "the {kind} follows something, and no formula's amplitudes differ from zero"
             )));
         }
+        let name = || best.formula.name.replace('_', " ");
+        if best.formula.shape.as_ref().is_some_and(Shape::is_at_end) {
+            let name = name();
+            return Ok(Err(format!(
+                "the {kind} follows {name} beyond the shapes that are tried, no formula found"
+            )));
+        }
         let text = |amounts: &[(f64, f64)]| entry::toml(kind, &best.formula, &axes, amounts, self.origin);
         let of_axes: Vec<(f64, f64)> =
             best.amounts.chunks(3).flat_map(|term| axes.iter().map(|axis| term[*axis])).collect();
         let effects = entry::effects(&text(&of_axes));
-        let joined = Joined::new(self.explained.linear.candidates, &self.reference, effects)?;
-        let linear = joined.problem(&self.explained.linear, &self.explained.fit, &start.problem.fitted);
+        let joined = Joined::new(self.linear.candidates, &self.reference, effects)?;
+        let linear = joined.problem(self.linear, self.fit, &start.problem.fitted);
         let tried = joined.tried(&linear, kind, &best.weighed.noise, &self.drivers)?;
         let follows = |what: &str| Err(format!("the {kind} follows {what}, no formula found"));
         if let Some(left) = tried.left.as_ref().filter(|left| left.size > by.remainder * best.explained) {
             return Ok(follows(&left.driver));
         }
         if tried.share.interval[0] < by.least_share {
-            return Ok(follows(&best.formula.name.replace('_', " ")));
+            return Ok(follows(&name()));
         }
         let every: Vec<usize> = start.problem.fitted.clone();
-        let own = (self.explained.linear.design.columns.len()..linear.design.size).collect::<Vec<_>>();
+        let own = (self.linear.design.columns.len()..linear.design.size).collect::<Vec<_>>();
         let beside = Problem::new(&linear, &self.reference, kind, [every, own].concat())?;
         let second = finalists::next(&beside, formulas, &best.weighed.noise)?;
         let cost = (formulas.len() as f64).ln();
@@ -187,8 +237,7 @@ impl<'s> Setting<'_, 's> {
             return Ok(follows("more than one formula says"));
         }
         if let Some(missing) = constancy::missing(&start.problem, best, &axes, by.inconstancy)? {
-            let name = best.formula.name.replace('_', " ");
-            return Ok(Err(format!("the {kind} follows {name} and {missing}, no formula found")));
+            return Ok(Err(format!("the {kind} follows {} and {missing}, no formula found", name())));
         }
         Ok(Ok(self.proposal(start, found, &axes, &tried, &text(&tried.amounts), log_odds)))
     }
@@ -229,6 +278,16 @@ impl<'s> Setting<'_, 's> {
             toml: toml.to_owned(),
         }
     }
+}
+
+/// The formulas that are tried on a problem.
+fn formulas(problem: &Problem<'_, '_>, held: Held) -> Vec<Formulated> {
+    grammar::formulas(problem.kind, held, &|driver| largest(problem, driver))
+}
+
+/// No formula is likely enough.
+fn none<T>(kind: SensorKind) -> Result<T, String> {
+    Err(format!("the {kind} follows something for which no formula was found"))
 }
 
 /// The largest size of a driver in the recording, but for a few blocks.

@@ -128,6 +128,12 @@ impl Shape {
         let (name, unit) = ("tau".to_owned(), "s".to_owned());
         Self { name, unit, value, std_error: None, range: (0.1, 400.0) }
     }
+
+    /// It is no further than its error from an end of its range: a likelier value may lie beyond.
+    pub fn is_at_end(&self) -> bool {
+        let error = self.std_error.unwrap_or(0.0);
+        self.value - self.range.0 <= error || self.range.1 - self.value <= error
+    }
 }
 
 impl Formulated {
@@ -261,5 +267,13 @@ mod tests {
         assert_eq!(own.texts(0, &[0, 1, 2]), ["a * y_y", "a * y_z", "a * y_x"]);
         let sinusoid = Formulated::sinusoid("inner", 2.5);
         assert_eq!(sinusoid.spelt(&[0]), "k * cos(2.5 * inner) + l * sin(2.5 * inner)");
+    }
+
+    #[test]
+    fn a_shape_within_its_error_of_an_end_is_at_the_end() {
+        let shape = |value: f64, std_error: Option<f64>| Shape { std_error, ..Shape::time(value) };
+        assert!(shape(0.1, Some(0.01)).is_at_end() && shape(399.0, Some(2.0)).is_at_end());
+        assert!(shape(0.1, None).is_at_end() && shape(0.11, Some(0.02)).is_at_end());
+        assert!(!shape(0.2, Some(0.05)).is_at_end() && !shape(12.0, Some(1.0)).is_at_end());
     }
 }
