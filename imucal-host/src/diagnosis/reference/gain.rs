@@ -5,7 +5,7 @@
 //! σ² = v + τ² + k ρ                             its variance where both sides had the same impact
 //! p₀ = t₂((g − g₀) / σ) / σ                     then
 //! p₁ = half at nothing and half between nothing and g₀, or between g₀ and 3 g₀, each with the errors σ
-//! s  = Σ over a stretch of ln (p₁ / p₀)         no impact counts more than [`MOST`]
+//! s  = Σ over a stretch of ln (p₁ / p₀)         no impact counts more than a limit
 //! ```
 //!
 //! | symbol | meaning |

@@ -1,7 +1,7 @@
 //! Stretches of a row of events over which a sum of logarithms of odds is largest.
 //!
-//! A stretch that is asserted must gain more than what it costs to have looked at all of them: ln N for N events, and
-//! [`ASSERTED`] besides. Source: Kulldorff, A spatial scan statistic (1997); the largest sum by Kadane's algorithm.
+//! A stretch that is asserted must gain more than what it costs to have looked at all of them, ln N for N events, and as much
+//! again as would be asked of a single one. Source: Kulldorff, A spatial scan statistic (1997); the largest sum by Kadane's algorithm.
 
 use std::ops::Range;
 
