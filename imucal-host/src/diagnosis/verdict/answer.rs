@@ -201,7 +201,12 @@ pub fn answer(
         causes: &found,
         clock: clock.as_ref().map_or(&[], |clock| &clock.causes),
         closed: if found.is_empty() { closed } else { &tested.closed },
-        explainable: tested.closed.explainable,
+        // Along a stream, which holds what is sensed itself, the clock's share hides the rest; a reference on the body has errors
+        // of its own, which are small against it.
+        explainable: match settings.source.followed || !found.is_empty() {
+            true => tested.closed.explainable,
+            false => closed.explainable,
+        },
         left,
         refuted: asserted.refuted,
         within_model: !found.is_empty() && asserted.causes.is_empty() && clock.is_none(),

@@ -16,8 +16,8 @@ pub struct Evidence<'a> {
     pub clock: &'a [Cause],
     /// Shares of the gap that the causes close.
     pub closed: &'a Closed,
-    /// Whitened square of what can be explained of the gap without the reference's clock: beside an offset of the clock any
-    /// other cause is small.
+    /// Whitened square of what can be explained of the gap that a remainder is held against: along a stream without its clock,
+    /// since any other cause is small against an offset of the clock.
     pub explainable: f64,
     /// The covariate that the residual still depends on most clearly.
     pub left: Option<&'a Following>,
