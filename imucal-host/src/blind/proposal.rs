@@ -17,7 +17,7 @@ use crate::{
         finding::{Proposal, ProposalStatus},
         proposal::entry,
     },
-    effect::{Act, Effect},
+    effect::Effect,
     recording::{Recording, Stream},
     simulator::{Dose, Simulation, SimulationError, robot::RobotScene},
 };
@@ -119,7 +119,7 @@ fn correlation(
     signal: &dyn Fn(&[Dose]) -> Result<Signal, SimulationError>,
     square: &dyn Fn(&Signal) -> f64,
 ) -> Result<Option<f64>, SimulationError> {
-    let fitted: Vec<Dose> = effects.iter().filter_map(|effect| fitted(effect)).collect();
+    let fitted: Vec<Dose> = effects.iter().filter_map(|effect| entry::fitted(effect)).collect();
     let unit = |doses: &[Dose]| -> Result<Option<Signal>, SimulationError> {
         let signal = signal(doses)?;
         let size = libm::sqrt(square(&signal));
@@ -128,13 +128,6 @@ fn correlation(
     let (Some(truth), Some(formula)) = (unit(truth)?, unit(&fitted)?) else { return Ok(None) };
     let opposite = formula.each_ref().map(|values| values.iter().map(|v| -v).collect());
     Ok(Some(0.25 * (square(&difference(&truth, &opposite)) - square(&difference(&truth, &formula)))))
-}
-
-/// An effect with the values that its file gives.
-fn fitted(effect: &'static Effect) -> Option<Dose> {
-    let Act::Formula(_, formula) = effect.act else { return None };
-    let values = formula.fitted().iter().map(|fitted| fitted.map(|fitted| fitted.value));
-    Some(Dose { effect, values: values.collect::<Option<Vec<f64>>>()? })
 }
 
 #[cfg(test)]

@@ -4,8 +4,9 @@ use std::{fmt::Write, path::Path};
 
 use super::term::Formulated;
 use crate::{
-    effect::{Effect, XYZ, user},
+    effect::{Act, Effect, XYZ, user},
     recording::SensorKind,
+    simulator::Dose,
 };
 
 /// Endings of the ids of a formula of two terms.
@@ -82,13 +83,17 @@ pub fn effects(text: &str) -> Vec<&'static Effect> {
     user::parse(text, Path::new("proposed.toml")).unwrap_or_default()
 }
 
+/// An effect with the values that its entry gives; `None` where one is missing.
+pub fn fitted(effect: &'static Effect) -> Option<Dose> {
+    let Act::Formula(_, formula) = effect.act else { return None };
+    let values = formula.fitted().iter().map(|fitted| fitted.map(|fitted| fitted.value));
+    Some(Dose { effect, values: values.collect::<Option<Vec<f64>>>()? })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        diagnosis::proposal::grammar::{Held, formulas},
-        effect::Act,
-    };
+    use crate::diagnosis::proposal::grammar::{Held, formulas};
 
     #[test]
     fn every_formula_reads_back_as_effects_with_its_fitted_values() {

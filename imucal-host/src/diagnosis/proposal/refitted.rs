@@ -7,10 +7,12 @@ use super::{entry, judgement::Judged};
 use crate::{
     diagnosis::{
         error::DiagnosisError,
-        search::refit::{Fit, refit},
-        search::stepwise::Solution,
+        search::{
+            refit::{Fit, refit},
+            stepwise::Solution,
+        },
     },
-    effect::{Act, Effect},
+    effect::Effect,
     recording::SensorKind,
     simulator::Dose,
 };
@@ -30,17 +32,10 @@ pub fn without(
     let is_kept = |dose: &&Dose| candidates.has_term(dose.effect) || set.contains(&dose.effect);
     let mut doses: Vec<Dose> = explained.fit.doses.iter().filter(is_kept).cloned().collect();
     let text = entry::toml(kind, &best.formula, &[0, 1, 2], &best.amounts, "");
-    let formula: Vec<Dose> = entry::effects(&text).into_iter().filter_map(dose).collect();
+    let formula: Vec<Dose> = entry::effects(&text).into_iter().filter_map(entry::fitted).collect();
     doses.extend(formula.iter().cloned());
     let mut fit = refit(scene, doses, Some(&best.weighed.noise))?;
     fit.doses.retain(|dose| formula.iter().all(|own| own.effect != dose.effect));
     fit.residual = scene.residual(&fit.doses)?;
     Ok(fit)
-}
-
-/// An effect with the values that its entry gives.
-fn dose(effect: &'static Effect) -> Option<Dose> {
-    let Act::Formula(_, formula) = effect.act else { return None };
-    let values = formula.fitted().iter().map(|fitted| fitted.map(|fitted| fitted.value));
-    Some(Dose { effect, values: values.collect::<Option<Vec<f64>>>()? })
 }
