@@ -48,6 +48,8 @@ pub struct ResidualSettings {
     pub moving_points: f64,
     /// Likewise at rest, s.
     pub resting_points: f64,
+    /// Most nodes of a block at which formulas are screened. Larger: more to compute, and brisk motion is seen better.
+    pub sparse_points: usize,
     /// Points lie in gaps of the source too, since it is bridged closely enough for a derivative.
     pub points_in_gaps: bool,
     /// Blocks in which something is brought near a sensor are left out: a rig's own movement brings nothing near.
@@ -227,6 +229,7 @@ impl Default for ResidualSettings {
             most_blocks: 40_000,
             longest_rest: 10.0,
             moving_points: 0.045,
+            sparse_points: 4,
             resting_points: 0.25,
             points_in_gaps: true,
             leaves_out_passages: false,

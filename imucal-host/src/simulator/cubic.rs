@@ -11,7 +11,7 @@
 //!
 //! Source: Catmull and Rom, A class of local interpolating splines (1974), for uneven samples.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Samples with the slope of each.
 #[derive(Clone, Debug)]
@@ -38,6 +38,13 @@ impl Cubic {
             (over(before, k) * right + over(k, after) * left) / (left + right)
         };
         Self { slopes: (0..values.len()).map(slope).collect(), values }
+    }
+
+    /// In other axes.
+    #[must_use]
+    pub fn turned(mut self, c: &Matrix3<f64>) -> Self {
+        self.values.iter_mut().chain(&mut self.slopes).for_each(|value| *value = c * *value);
+        self
     }
 
     /// Value and slope at a time between samples `k` and `k + 1` of these times; beyond them those of the nearer one.

@@ -238,6 +238,12 @@ impl Recorded for Streamed {
         self.speeds.as_deref()
     }
 
+    fn mounted(&self, c_t_q: &Matrix3<f64>) -> Option<Box<dyn Recorded>> {
+        let channels = self.channels.clone().map(|channel| channel.map(|channel| channel.turned(c_t_q)));
+        let attitudes = self.attitudes.iter().map(|c_t_n| c_t_n * c_t_q.transpose()).collect();
+        Some(Box::new(Self { channels, attitudes, ..self.clone() }))
+    }
+
     fn steady(&self) -> &dyn Motion {
         self
     }

@@ -78,6 +78,12 @@ pub trait Recorded: Motion {
         None
     }
 
+    /// The same movement in the axes of a unit that is mounted with a small turn, `c_t_q`, where it is given in those of a
+    /// simulated sensor; `None` where the table's axes are the unit's.
+    fn mounted(&self, _c_t_q: &Matrix3<f64>) -> Option<Box<dyn Recorded>> {
+        None
+    }
+
     /// The same movement estimated from more readings at a time, where they are noisy: less noise row by row, and bends cut.
     fn steady(&self) -> &dyn Motion;
 }

@@ -4,10 +4,18 @@
 //! s = fᵀ Σ⁻¹ r / fᵀ Σ⁻¹ f      f: what the formula predicts, r: the residual, both with the baseline projected out
 //! ```
 //!
+//! Both are those about the fit that has the formula among its effects, with amplitudes of its own: about another one, the baseline
+//! holds a part of a strong formula, and what the axes sense is wrong by as much.
+//!
 //! It is confirmed where the prediction, nothing of it fitted, closes at least half of what is left of its sensor's gap, with an
 //! interval above zero, and the factor s that would suit this recording best is near one.
 
-use super::{problem::Problem, proposer::asserted, trial::Joined};
+use super::{
+    problem::{Problem, Run},
+    proposer::asserted,
+    refitted,
+    trial::Joined,
+};
 use crate::{
     diagnosis::{
         error::DiagnosisError,
@@ -18,7 +26,6 @@ use crate::{
             design::Design,
             noise::{NEAR, Noise},
         },
-        residual::base_run::Reference,
         search::{linearisation::Linearisation, stepwise::Solution},
         verdict::shares,
     },
@@ -69,7 +76,6 @@ pub fn confirmed(
     toml: &str,
 ) -> Result<(Vec<Proposal>, Vec<String>), DiagnosisError> {
     let scene = explained.linear.scene;
-    let reference = Reference::new(scene, explained.fit.doses.clone(), &scene.fine)?;
     let drivers = covariates::drivers(scene, &explained.linear.weighing.given);
     let (mut proposals, mut remarks) = (Vec::new(), Vec::new());
     for kind in SensorKind::ALL {
@@ -84,21 +90,24 @@ pub fn confirmed(
             ));
             continue;
         }
-        let joined = Joined::new(explained.linear.candidates, &reference, frozen.effects.clone());
-        let joined = match joined {
-            Err(DiagnosisError::Formula(cause)) => {
-                remarks.push(format!("the formula for the {kind} cannot be tested: {}", cause.without_row()));
-                continue;
-            }
-            joined => joined?,
-        };
         let mut best: Option<Predicted> = None;
+        let mut untestable = None;
         for set in [Vec::new(), asserted(explained, diagnosis)] {
-            let predicted = frozen.beside(&set, explained, &joined, &reference, &drivers, toml)?;
+            let predicted = match frozen.beside(&set, explained, &drivers, toml) {
+                Err(DiagnosisError::Formula(cause)) => {
+                    untestable = Some(cause.without_row());
+                    break;
+                }
+                predicted => predicted?,
+            };
             let Some(predicted) = predicted else { continue };
             if best.as_ref().is_none_or(|best| predicted.value > best.value) {
                 best = Some(predicted);
             }
+        }
+        if let Some(why) = untestable {
+            remarks.push(format!("the formula for the {kind} cannot be tested: {why}"));
+            continue;
         }
         match best {
             Some(best) => proposals.push(best.proposal),
@@ -116,12 +125,14 @@ impl Frozen {
         &self,
         set: &[&'static Effect],
         explained: &Solution<'_>,
-        joined: &Joined,
-        reference: &Reference<'_>,
         drivers: &[Covariate],
         toml: &str,
     ) -> Result<Option<Predicted>, DiagnosisError> {
-        let Solution { linear, best, fit, .. } = explained;
+        let (best, scene) = (&explained.best, explained.linear.scene);
+        let fit = &refitted::without_effects(explained, set, &self.effects, &best.noise)?;
+        let linear = &Linearisation::fitted_alone(scene, explained.linear.candidates, fit)?;
+        let run = &Run::new(scene, &fit.doses)?;
+        let joined = Joined::new(linear.candidates, &run.fine, self.effects.clone())?;
         let fitted = linear.fitted(set);
         let (with, mut without) =
             (joined.problem(linear, fit, &fitted), joined.problem(linear, fit, &fitted));
@@ -136,7 +147,7 @@ impl Frozen {
             .collect();
         let taken: Vec<(usize, f64)> = own.iter().copied().zip(amplitudes.iter().map(|a| -a)).collect();
         without.design.restore(&taken);
-        let problem = Problem::new(linear, reference, self.kind, fitted.clone())?;
+        let problem = Problem::new(linear, run, self.kind, fitted.clone())?;
         let left = self.residual(&without.design, &fitted);
         let before = problem.weighed(&problem.design, &[], &best.noise)?;
         let after = problem.weighed(&left, &[], &best.noise)?;
@@ -153,7 +164,7 @@ impl Frozen {
         let holds = share.value >= by.least_share && share.interval[0] > 0.0 && (factor - 1.0).abs() <= near;
         let status = if holds { ProposalStatus::Confirmed } else { ProposalStatus::Refuted };
         let log_odds = after.log_evidence - before.log_evidence;
-        let set_value = linear.screen(set, &best.noise, &[self.kind], &NEAR)?.value;
+        let set_value = explained.linear.screen(set, &best.noise, &[self.kind], &NEAR)?.value;
         let proposal = Proposal {
             gap_closed: share.value,
             gap_closed_ci95: share.interval,

@@ -93,13 +93,13 @@ pub fn fitted(effect: &'static Effect) -> Option<Dose> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::proposal::grammar::{Held, formulas};
+    use crate::diagnosis::proposal::grammar::{Held, formulas, tests::taken};
 
     #[test]
     fn every_formula_reads_back_as_effects_with_its_fitted_values() {
         let held = Held { gimbals: true, temperature: Some(25.0), field: true };
         for kind in SensorKind::ALL {
-            for formula in formulas(kind, held, &|_| 3.0) {
+            for formula in formulas(kind, held, &taken) {
                 for axes in [&[1][..], &[0, 2], &[0, 1, 2]] {
                     let amounts = vec![(1.25e-3, 1e-5); axes.len() * formula.terms.len()];
                     let text = toml(kind, &formula, axes, &amounts, "walk \"one\".csv");

@@ -12,7 +12,7 @@ use crate::diagnosis::{error::DiagnosisError, mixed_model::noise::Noise, residua
 /// Formulas that are judged, of those that a noise favours.
 const JUDGED: usize = 5;
 /// Of the judged ones, those whose shapes are refined.
-const REFINED: usize = 3;
+const REFINED: usize = 5;
 
 /// The simplest of the best formulas, and those that are the same.
 #[derive(Clone, Debug)]
@@ -37,9 +37,8 @@ pub fn best(
     let noise = &before.noise;
     let mut chosen: Vec<usize> = Vec::new();
     // What hides in the drift shows in a quieter noise.
-    for noise in [noise.clone(), noise.quieter()] {
-        let gains = screening::screen(problem, formulas, &noise, &[])?.gains;
-        let own = first(formulas, &gains, JUDGED);
+    for screened in screening::screen(problem, formulas, &[noise, &noise.quieter()], &[])? {
+        let own = first(formulas, &screened.gains, JUDGED);
         let is_new = |at: &usize| !chosen.contains(at);
         let own: Vec<usize> = own.into_iter().filter(is_new).collect();
         chosen.extend(own);
@@ -74,10 +73,11 @@ pub fn next(
     formulas: &[Formulated],
     noise: &Noise,
 ) -> Result<Option<Judged>, DiagnosisError> {
-    let gains = screening::screen(problem, formulas, noise, &[])?.gains;
+    let screened = screening::screen(problem, formulas, &[noise], &[])?;
     let before = problem.weighed(&problem.design, &[], noise)?;
-    match first(formulas, &gains, 1)[..] {
-        [at] => judgement::judged(problem, &problem.design, &before, &formulas[at], noise),
+    let best = screened.first().map(|screened| first(formulas, &screened.gains, 1));
+    match best.as_deref() {
+        Some([at]) => judgement::judged(problem, &problem.design, &before, &formulas[*at], noise),
         _ => Ok(None),
     }
 }

@@ -17,10 +17,13 @@ use crate::{effect::si, recording::SensorKind};
 const PERIODS: std::ops::RangeInclusive<u32> = 2..=24;
 /// Time constants, s.
 const LAGS: [f64; 6] = [0.5, 2.0, 5.0, 12.0, 30.0, 80.0];
-/// Where a function bends, as shares of the largest value of its driver.
-const BENDS: [f64; 6] = [0.06, 0.12, 0.22, 0.35, 0.5, 0.7];
-/// Where a knee lies, likewise.
-const KNEES: [f64; 9] = [-0.7, -0.45, -0.25, -0.1, 0.0, 0.1, 0.25, 0.45, 0.7];
+/// Where a function bends: from this share of how far the axis that moves least does, to this one of the largest value, each
+/// further by no more than this factor, and so many at most.
+const BENDS: (f64, f64, f64, usize) = (0.06, 0.7, 1.8, 12);
+/// Bends that a fit may reach, as shares of the least and the largest of those that are tried.
+const BEYOND: (f64, f64) = (0.3, 1.4);
+/// A knee goes no further than this share of the largest value.
+const KNEE: f64 = 0.9;
 
 /// What a recording holds besides its sensors.
 #[derive(Clone, Copy, Debug)]
@@ -33,12 +36,23 @@ pub struct Held {
     pub field: bool,
 }
 
-/// The formulas for a sensor. `largest` gives the largest size of a driver in the recording.
-pub fn formulas(kind: SensorKind, held: Held, largest: &dyn Fn(&Driver) -> f64) -> Vec<Formulated> {
+/// Values that a driver takes in a recording.
+#[derive(Clone, Debug)]
+pub struct Taken {
+    /// The largest size on any axis.
+    pub largest: f64,
+    /// How far the values of the axis that moves least are from their middle.
+    pub least: f64,
+    /// Values that the axes are below for some shares of the time, in rising order.
+    pub quantiles: Vec<f64>,
+}
+
+/// The formulas for a sensor. `taken` gives the values of a driver in the recording.
+pub fn formulas(kind: SensorKind, held: Held, taken: &dyn Fn(&Driver) -> Taken) -> Vec<Formulated> {
     let vectors = vectors(kind, held);
     let mut all = Vec::new();
     for driver in &vectors {
-        of_vector(driver, largest(driver), &mut all);
+        of_vector(driver, &taken(driver), &mut all);
     }
     for (at, one) in vectors.iter().enumerate() {
         all.extend(vectors[at + 1..].iter().map(|other| one.times(other).itself(2)));
@@ -53,7 +67,7 @@ pub fn formulas(kind: SensorKind, held: Held, largest: &dyn Fn(&Driver) -> f64) 
     }
     if held.gimbals {
         for gimbal in ["outer", "middle", "inner"] {
-            of_gimbal(gimbal, largest, &mut all);
+            of_gimbal(gimbal, taken, &mut all);
         }
     }
     all
@@ -71,20 +85,22 @@ fn vectors(kind: SensorKind, held: Held) -> Vec<Driver> {
     each.collect()
 }
 
-fn of_vector(driver: &Driver, largest: f64, all: &mut Vec<Formulated>) {
+fn of_vector(driver: &Driver, taken: &Taken, all: &mut Vec<Formulated>) {
     if !driver.is_of_axis("y") {
         all.push(driver.itself(1));
     }
     all.push(driver.function("square", "$^2", 2, None));
     all.push(driver.function("cube", "$^3", 2, None));
     all.push(driver.function("size", "abs($)", 2, None));
-    for share in BENDS {
-        let bend = |name| Shape::about(name, driver, share * largest, (0.02 * largest, largest));
+    let (bends, range) = bends(taken);
+    for value in bends {
+        let bend = |name| Shape::about(name, driver, value, range);
         all.push(driver.function("soft_limit", "tanh($ / s)", 3, Some(bend("s"))));
         all.push(driver.function("dead_zone", "$ - max(min($, d), -d)", 4, Some(bend("d"))));
     }
-    for share in KNEES {
-        let knee = Shape::about("k0", driver, share * largest, (-0.9 * largest, 0.9 * largest));
+    let most = KNEE * taken.largest;
+    for value in taken.quantiles.iter().copied().filter(|value| value.abs() < most) {
+        let knee = Shape::about("k0", driver, value, (-most, most));
         all.push(driver.function("knee", "max($ - k0, 0)", 3, Some(knee)));
     }
     for tau in LAGS {
@@ -117,14 +133,23 @@ fn of_temperature(mean: f64, vectors: &[Driver], all: &mut Vec<Formulated>) {
     }
 }
 
-fn of_gimbal(gimbal: &str, largest: &dyn Fn(&Driver) -> f64, all: &mut Vec<Formulated>) {
+/// Where a function bends, and what a fit may reach.
+fn bends(taken: &Taken) -> (Vec<f64>, (f64, f64)) {
+    let (from, to, factor, most) = BENDS;
+    let (low, high) = (from * taken.least, to * taken.largest);
+    let steps = (libm::log(high / low) / libm::log(factor)).ceil().clamp(1.0, most as f64 - 1.0);
+    let each = (0..=steps as u32).map(|at| low * libm::pow(high / low, f64::from(at) / steps)).collect();
+    (each, (BEYOND.0 * low, BEYOND.1 * high))
+}
+
+fn of_gimbal(gimbal: &str, taken: &dyn Fn(&Driver) -> Taken, all: &mut Vec<Formulated>) {
     let rate = Driver::scalar(&format!("{gimbal}_rate"), &format!("{gimbal}_rate"), "rad/s");
     all.push(rate.itself(1));
     all.push(rate.function("size", "abs($)", 2, None));
     all.push(rate.function("square", "$^2", 2, None));
-    let most = largest(&rate);
-    for share in BENDS {
-        let bend = Shape::about("s", &rate, share * most, (0.02 * most, most));
+    let (bends, range) = bends(&taken(&rate));
+    for value in bends {
+        let bend = Shape::about("s", &rate, value, range);
         all.push(rate.function("soft_limit", "tanh($ / s)", 3, Some(bend)));
     }
     for half in PERIODS {
@@ -133,14 +158,19 @@ fn of_gimbal(gimbal: &str, largest: &dyn Fn(&Driver) -> f64, all: &mut Vec<Formu
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+
+    /// Values between minus and plus 3.
+    pub fn taken(_: &Driver) -> Taken {
+        Taken { largest: 3.0, least: 3.0, quantiles: vec![-2.0, -0.5, 0.0, 0.5, 2.0] }
+    }
 
     #[test]
     fn every_formula_can_be_read_and_none_is_there_twice() {
         let held = Held { gimbals: true, temperature: Some(25.0), field: true };
         for kind in SensorKind::ALL {
-            let all = formulas(kind, held, &|_| 3.0);
+            let all = formulas(kind, held, &taken);
             assert!((400..900).contains(&all.len()), "{}", all.len());
             let mut texts: Vec<String> = Vec::new();
             for formula in &all {
@@ -157,9 +187,28 @@ mod tests {
     #[test]
     fn without_gimbals_temperature_and_field_no_formula_asks_for_them() {
         let held = Held { gimbals: false, temperature: None, field: false };
-        for formula in formulas(SensorKind::Acc, held, &|_| 3.0) {
+        for formula in formulas(SensorKind::Acc, held, &taken) {
             let text = formula.terms.concat().concat();
             assert!(!text.contains("temp") && !text.contains("inner") && !text.contains("B_"), "{text}");
         }
+    }
+
+    #[test]
+    fn bends_are_tried_from_what_the_least_axis_moves_to_what_the_largest_reaches() {
+        // A machine's axis across its way moves by 0.3 m/s², the one along gravity shows 11 m/s².
+        let (bends, range) = bends(&Taken { largest: 11.0, least: 0.3, quantiles: Vec::new() });
+        assert!((bends[0] - 0.018).abs() < 1e-9 && (bends[bends.len() - 1] - 7.7).abs() < 1e-9, "{bends:?}");
+        assert!(bends.windows(2).all(|pair| pair[1] / pair[0] < 1.8 && pair[1] > pair[0]), "{bends:?}");
+        assert!(range.0 < bends[0] && range.1 > 7.7, "{range:?}");
+    }
+
+    #[test]
+    fn knees_are_tried_where_the_axes_are_and_not_at_their_ends() {
+        let mut all = Vec::new();
+        let quantiles = vec![-10.9, -9.8, 0.0, 0.2];
+        of_vector(&Driver::vector("y", 0, "uT"), &Taken { largest: 11.0, least: 0.3, quantiles }, &mut all);
+        let knees = all.iter().filter(|formula| formula.name.starts_with("knee"));
+        let places: Vec<f64> = knees.flat_map(Formulated::shapes).collect();
+        assert_eq!(places, [-9.8, 0.0, 0.2]);
     }
 }

@@ -113,4 +113,9 @@ impl Judged {
         };
         (0..3).filter(is_far).collect()
     }
+
+    /// Amplitudes and their standard errors on some axes, term by term.
+    pub fn of_axes(&self, axes: &[usize]) -> Vec<(f64, f64)> {
+        self.amounts.chunks(3).flat_map(|term| axes.iter().map(|axis| term[*axis])).collect()
+    }
 }

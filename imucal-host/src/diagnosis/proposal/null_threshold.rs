@@ -44,8 +44,9 @@ pub fn threshold(
     let weighing = &problem.linear.weighing;
     let drawn: Vec<_> = (0..DRAWS).map(|_| weighing.drawn(problem.kind, noise, &mut random)).collect();
     let mut most = vec![f64::NEG_INFINITY; DRAWS];
-    let screened = screening::screen(problem, formulas, noise, &drawn)?;
-    for (at, (gains, residual)) in screened.of_further.iter().zip(&drawn).enumerate() {
+    let screened = screening::screen(problem, formulas, &[noise], &drawn)?;
+    let of_drawn = screened.iter().flat_map(|screened| &screened.of_further);
+    for (at, (gains, residual)) in of_drawn.zip(&drawn).enumerate() {
         let best = gains.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
         let Some((best, _)) = best else { continue };
         let residual = problem.leaving(residual);

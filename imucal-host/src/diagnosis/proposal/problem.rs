@@ -11,12 +11,38 @@ use crate::{
             design::{Design, Normal, Signature},
             noise::{NEAR, Noise},
         },
-        residual::{base_run::Reference, block::Means},
+        residual::{
+            base_run::Reference, block::Means, forward_model::ForwardModel, sample_points::SamplePoints,
+        },
         search::linearisation::Linearisation,
     },
     effect::user::Formula,
     recording::SensorKind,
+    simulator::Dose,
 };
+
+/// The run of a fit.
+pub struct Run<'s> {
+    /// At all nodes.
+    pub fine: Reference<'s>,
+    /// At a few: many formulas are screened there.
+    pub sparse: Reference<'s>,
+}
+
+impl<'s> Run<'s> {
+    /// With these effects.
+    ///
+    /// # Errors
+    ///
+    /// [`DiagnosisError::Simulation`], where a triad is singular.
+    pub fn new(scene: &'s ForwardModel<'s>, doses: &[Dose]) -> Result<Self, DiagnosisError> {
+        let at = |points: &'s SamplePoints| Reference::new(scene, doses.to_vec(), points);
+        Ok(Self { fine: at(&scene.fine)?, sparse: at(&scene.sparse)? })
+    }
+}
+
+/// What a formula's amplitudes multiply, term by term, on each axis, block by block.
+pub type Factors = Vec<Vec<Vector3<f64>>>;
 
 /// The residual of one sensor, and what is fitted in any case.
 pub struct Problem<'p, 's> {
@@ -28,8 +54,9 @@ pub struct Problem<'p, 's> {
     pub fitted: Vec<usize>,
     /// Those columns alone, in that order, of the sensor's channels.
     pub design: Design,
-    reference: &'p Reference<'p>,
+    run: &'p Run<'p>,
     sensed: Vec<Vector3<f64>>,
+    sensed_sparse: Vec<Vector3<f64>>,
 }
 
 /// The columns of a formula, an axis and a term, of the size of white noise in a sample.
@@ -60,13 +87,14 @@ impl<'p, 's> Problem<'p, 's> {
     /// [`DiagnosisError::Simulation`], where the sensor's triad is singular.
     pub fn new(
         linear: &'p Linearisation<'s>,
-        reference: &'p Reference<'p>,
+        run: &'p Run<'p>,
         kind: SensorKind,
         fitted: Vec<usize>,
     ) -> Result<Self, DiagnosisError> {
         let mut design = linear.design.extended(&fitted, Vec::new(), &[]);
         design.channels.retain(|channel| channel.kind == kind);
-        Ok(Self { linear, kind, fitted, design, reference, sensed: reference.sensed(kind)? })
+        let (sensed, sensed_sparse) = (run.fine.sensed(kind)?, run.sparse.sensed(kind)?);
+        Ok(Self { linear, kind, fitted, design, run, sensed, sensed_sparse })
     }
 
     /// What a formula multiplies on each axis, block by block.
@@ -75,22 +103,34 @@ impl<'p, 's> Problem<'p, 's> {
     ///
     /// [`DiagnosisError::Formula`], where it has no value.
     pub fn factors(&self, formula: &Formula, shapes: &[f64]) -> Result<Vec<Vector3<f64>>, DiagnosisError> {
-        self.reference.factors(formula, &self.sensed, shapes)
+        self.run.fine.factors(formula, &self.sensed, shapes)
     }
 
     /// A formula's columns; `None` where it has no value in this recording.
     pub fn columns(&self, formula: &Formulated, noise: &Noise) -> Option<FormulaColumns> {
+        let of_term = |term: &Formula| self.factors(term, &formula.shapes()).ok();
+        Some(self.scaled(&formula.parsed().ok()?.iter().map(of_term).collect::<Option<Factors>>()?, noise))
+    }
+
+    /// What a formula multiplies, from a few nodes a block; `None` where it has no value there.
+    pub fn sparse_factors(&self, formula: &Formulated) -> Option<Factors> {
+        let (run, shapes) = (&self.run.sparse, formula.shapes());
+        let of_term = |term: &Formula| run.factors(term, &self.sensed_sparse, &shapes).ok();
+        formula.parsed().ok()?.iter().map(of_term).collect()
+    }
+
+    /// Columns of what a formula multiplies.
+    pub fn scaled(&self, factors: &Factors, noise: &Noise) -> FormulaColumns {
         let usual = noise.usual(self.kind);
         let mut columns = FormulaColumns { signatures: Vec::new(), sizes: Vec::new() };
-        for term in formula.parsed().ok()? {
-            let factors = self.factors(&term, &formula.shapes()).ok()?;
+        for factors in factors {
             for axis in 0..3 {
-                let (signature, size) = self.column(&factors, axis, usual);
+                let (signature, size) = self.column(factors, axis, usual);
                 columns.signatures.push(signature);
                 columns.sizes.push(size);
             }
         }
-        Some(columns)
+        columns
     }
 
     /// One axis of what a formula multiplies as a column, about its mean and of a usual size, and the amplitude that this

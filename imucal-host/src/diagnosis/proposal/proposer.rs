@@ -4,9 +4,9 @@
 use super::{
     constancy, entry,
     finalists::{self, Finalist},
-    grammar::{self, Held},
+    grammar::{self, Held, Taken},
     null_threshold,
-    problem::{Problem, Weighed},
+    problem::{Problem, Run, Weighed},
     refitted,
     term::{Driver, Formulated, Shape},
     trial::{Joined, Tried},
@@ -17,7 +17,6 @@ use crate::{
         finding::{Amount, Diagnosis, Proposal, ProposalStatus, Verdict},
         location::{covariate::Covariate, covariates},
         mixed_model::noise::NEAR,
-        residual::base_run::Reference,
         search::{linearisation::Linearisation, refit::Fit, stepwise::Solution},
         settings::ProposalSettings,
     },
@@ -27,13 +26,22 @@ use crate::{
 
 /// Fits with a formula among the effects, at most, until the best formula is that of the fit.
 const ROUNDS: usize = 3;
+/// Share of a driver's values at either end that does not count as reached.
+const ENDS: f64 = 0.01;
+/// Shares of the time for which an axis is below the knees that are tried.
+const QUANTILES: [f64; 7] = [0.03, 0.1, 0.25, 0.5, 0.75, 0.9, 0.97];
+/// Knees are further apart than this share of the largest value.
+const APART: f64 = 0.02;
+/// The least size of a driver that counts, and the least share of it that an axis must move to count.
+const LEAST: f64 = 1e-6;
+const LEAST_SHARE: f64 = 0.01;
 
 /// A problem about a fit, and what all sensors have in common.
 struct Setting<'a, 's> {
     explained: &'a Solution<'s>,
     linear: &'a Linearisation<'s>,
     fit: &'a Fit,
-    reference: Reference<'a>,
+    run: Run<'a>,
     drivers: Vec<Covariate>,
     held: Held,
     origin: &'a str,
@@ -105,9 +113,9 @@ impl<'a, 's> Setting<'a, 's> {
         held: Held,
         origin: &'a str,
     ) -> Result<Self, DiagnosisError> {
-        let reference = Reference::new(linear.scene, fit.doses.clone(), &linear.scene.fine)?;
+        let run = Run::new(linear.scene, &fit.doses)?;
         let drivers = covariates::drivers(linear.scene, &linear.weighing.given);
-        Ok(Self { explained, linear, fit, reference, drivers, held, origin })
+        Ok(Self { explained, linear, fit, run, drivers, held, origin })
     }
 
     fn settings(&self) -> &ProposalSettings {
@@ -127,7 +135,7 @@ impl<'a, 's> Setting<'a, 's> {
         let formulas = formulas(&starts[0].problem, self.held);
         let mut best: Option<(f64, &Start<'_, '_>, Finalist)> = None;
         for start in &starts {
-            let found = finalists::best(&start.problem, &self.reference, &start.before, &formulas)?;
+            let found = finalists::best(&start.problem, &self.run.fine, &start.before, &formulas)?;
             let Some(found) = found else { continue };
             let noise = &self.explained.best.noise;
             let value = self.linear.screen(&start.set, noise, &[kind], &NEAR)?.value + found.best.gain;
@@ -174,7 +182,7 @@ impl<'a, 's> Setting<'a, 's> {
     /// The formulas that are tried, and the best of them.
     fn found(&self, start: &Start<'_, '_>) -> Result<(Vec<Formulated>, Option<Finalist>), DiagnosisError> {
         let formulas = formulas(&start.problem, self.held);
-        let found = finalists::best(&start.problem, &self.reference, &start.before, &formulas)?;
+        let found = finalists::best(&start.problem, &self.run.fine, &start.before, &formulas)?;
         Ok((formulas, found))
     }
 
@@ -184,7 +192,7 @@ impl<'a, 's> Setting<'a, 's> {
     }
 
     fn start(&self, kind: SensorKind, set: Vec<&'static Effect>) -> Result<Start<'_, 's>, DiagnosisError> {
-        let problem = Problem::new(self.linear, &self.reference, kind, self.linear.fitted(&set))?;
+        let problem = Problem::new(self.linear, &self.run, kind, self.linear.fitted(&set))?;
         let before = problem.weighed(&problem.design, &[], &self.explained.best.noise)?;
         Ok(Start { set, problem, before })
     }
@@ -212,10 +220,8 @@ impl<'a, 's> Setting<'a, 's> {
             )));
         }
         let text = |amounts: &[(f64, f64)]| entry::toml(kind, &best.formula, &axes, amounts, self.origin);
-        let of_axes: Vec<(f64, f64)> =
-            best.amounts.chunks(3).flat_map(|term| axes.iter().map(|axis| term[*axis])).collect();
-        let effects = entry::effects(&text(&of_axes));
-        let joined = Joined::new(self.linear.candidates, &self.reference, effects)?;
+        let effects = entry::effects(&text(&best.of_axes(&axes)));
+        let joined = Joined::new(self.linear.candidates, &self.run.fine, effects)?;
         let linear = joined.problem(self.linear, self.fit, &start.problem.fitted);
         let tried = joined.tried(&linear, kind, &best.weighed.noise, &self.drivers)?;
         let follows = |what: &str| Err(format!("the {kind} follows {what}, no formula found"));
@@ -227,7 +233,7 @@ impl<'a, 's> Setting<'a, 's> {
         }
         let every: Vec<usize> = start.problem.fitted.clone();
         let own = (self.linear.design.columns.len()..linear.design.size).collect::<Vec<_>>();
-        let beside = Problem::new(&linear, &self.reference, kind, [every, own].concat())?;
+        let beside = Problem::new(&linear, &self.run, kind, [every, own].concat())?;
         let second = finalists::next(&beside, formulas, &best.weighed.noise)?;
         let cost = (formulas.len() as f64).ln();
         let is_needed = second.is_some_and(|second| {
@@ -282,7 +288,7 @@ impl<'a, 's> Setting<'a, 's> {
 
 /// The formulas that are tried on a problem.
 fn formulas(problem: &Problem<'_, '_>, held: Held) -> Vec<Formulated> {
-    grammar::formulas(problem.kind, held, &|driver| largest(problem, driver))
+    grammar::formulas(problem.kind, held, &|driver| taken(problem, driver))
 }
 
 /// No formula is likely enough.
@@ -290,12 +296,26 @@ fn none<T>(kind: SensorKind) -> Result<T, String> {
     Err(format!("the {kind} follows something for which no formula was found"))
 }
 
-/// The largest size of a driver in the recording, but for a few blocks.
-fn largest(problem: &Problem<'_, '_>, driver: &Driver) -> f64 {
+/// The values of a driver in the recording, a few blocks at either end left out.
+fn taken(problem: &Problem<'_, '_>, driver: &Driver) -> Taken {
     let itself = driver.itself(1);
     let factors = itself.parsed().ok().and_then(|terms| problem.factors(terms.first()?, &[]).ok());
-    let mut sizes: Vec<f64> = factors.into_iter().flatten().map(|factor| factor.amax()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let most = sizes.get(sizes.len().saturating_sub(1 + sizes.len() / 50)).copied().unwrap_or(1.0);
-    most.max(1e-6)
+    let factors = factors.unwrap_or_default();
+    let (mut least, mut largest) = (f64::INFINITY, LEAST);
+    let mut quantiles = vec![0.0];
+    for axis in 0..3 {
+        let mut values: Vec<f64> = factors.iter().map(|factor| factor[axis]).collect();
+        values.sort_by(f64::total_cmp);
+        let below = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
+        if values.is_empty() {
+            continue;
+        }
+        let (low, high) = (below(ENDS), below(1.0 - ENDS));
+        largest = largest.max(low.abs()).max(high.abs());
+        least = least.min(0.5 * (high - low));
+        quantiles.extend(QUANTILES.map(below));
+    }
+    quantiles.sort_by(f64::total_cmp);
+    quantiles.dedup_by(|a, b| (*a - *b).abs() < APART * largest);
+    Taken { largest, least: least.clamp(LEAST_SHARE * largest, largest), quantiles }
 }

@@ -3,9 +3,10 @@
 use std::ops::Range;
 
 use nalgebra::{DVector, Vector3};
+use rayon::prelude::*;
 
 use super::{
-    problem::{FormulaColumns, Problem},
+    problem::{Factors, FormulaColumns, Problem},
     term::Formulated,
 };
 use crate::diagnosis::{
@@ -18,6 +19,7 @@ use crate::diagnosis::{
     },
     residual::block::Means,
 };
+use crate::noise::precision::Precision;
 
 /// Formulas that are multiplied out at once.
 const BATCH: usize = 10;
@@ -31,7 +33,8 @@ pub struct Screening {
     pub of_further: Vec<Vec<f64>>,
 }
 
-/// Screens formulas on a sensor's residual, and on further residuals that it might have had.
+/// Screens formulas on a sensor's residual, and on further residuals that it might have had, in each of some noises; by what the
+/// formulas multiply at a few nodes a block.
 ///
 /// # Errors
 ///
@@ -39,39 +42,49 @@ pub struct Screening {
 pub fn screen(
     problem: &Problem<'_, '_>,
     formulas: &[Formulated],
-    noise: &Noise,
+    noises: &[&Noise],
     further: &[Vec<Vector3<f64>>],
-) -> Result<Screening, DiagnosisError> {
+) -> Result<Vec<Screening>, DiagnosisError> {
     let first = problem.fitted.len();
     let kept: Vec<usize> = (0..first).collect();
     // A further residual is one column more: its scores are its products with the formulas.
     let residuals: Vec<Signature> = further.iter().map(|residual| signature(problem, residual)).collect();
     let design = problem.design.extended(&kept, Vec::new(), &residuals);
-    let precisions = problem.linear.weighing.precisions(&design, noise);
     let every: Vec<usize> = (0..design.size).collect();
-    let augmented = AugmentedNormal::new(&design, &precisions, &every);
-    let mut screening = Screening { gains: Vec::new(), of_further: vec![Vec::new(); further.len()] };
+    let precisions: Vec<Vec<Precision>> =
+        noises.iter().map(|noise| problem.linear.weighing.precisions(&design, noise)).collect();
+    let augmented: Vec<AugmentedNormal<'_>> =
+        precisions.iter().map(|precisions| AugmentedNormal::new(&design, precisions, &every)).collect();
+    let none = Screening { gains: Vec::new(), of_further: vec![Vec::new(); further.len()] };
+    let mut screenings = vec![none; noises.len()];
     for batch in formulas.chunks(BATCH) {
-        let columns: Vec<Option<FormulaColumns>> =
-            batch.iter().map(|formula| problem.columns(formula, noise)).collect();
-        let signatures: Vec<Signature> =
-            columns.iter().flatten().flat_map(|columns| columns.signatures.iter().cloned()).collect();
-        let normal = augmented.with(&signatures);
-        let mut from = 0;
-        let places: Vec<Option<Range<usize>>> = columns
-            .iter()
-            .map(|columns| {
-                let count = columns.as_ref()?.signatures.len();
-                from += count;
-                Some(from - count..from)
-            })
-            .collect();
-        screening.gains.extend(gains(problem, &without(&normal, first, further.len(), None), &places)?);
-        for (at, own) in screening.of_further.iter_mut().enumerate() {
-            own.extend(gains(problem, &without(&normal, first, further.len(), Some(at)), &places)?);
+        let factors: Vec<Option<Factors>> =
+            batch.par_iter().map(|formula| problem.sparse_factors(formula)).collect();
+        for ((noise, augmented), screening) in noises.iter().zip(&augmented).zip(&mut screenings) {
+            let columns: Vec<Option<FormulaColumns>> =
+                factors.iter().map(|factors| Some(problem.scaled(factors.as_ref()?, noise))).collect();
+            let signatures: Vec<Signature> =
+                columns.iter().flatten().flat_map(|columns| columns.signatures.iter().cloned()).collect();
+            let (normal, places) = (augmented.with(&signatures), places(&columns));
+            screening.gains.extend(gains(problem, &without(&normal, first, further.len(), None), &places)?);
+            for (at, own) in screening.of_further.iter_mut().enumerate() {
+                let normal = without(&normal, first, further.len(), Some(at));
+                own.extend(gains(problem, &normal, &places)?);
+            }
         }
     }
-    Ok(screening)
+    Ok(screenings)
+}
+
+/// Places of each formula's columns among those of a batch.
+fn places(columns: &[Option<FormulaColumns>]) -> Vec<Option<Range<usize>>> {
+    let mut from = 0;
+    let of = |columns: &Option<FormulaColumns>| {
+        let count = columns.as_ref()?.signatures.len();
+        from += count;
+        Some(from - count..from)
+    };
+    columns.iter().map(of).collect()
 }
 
 fn signature(problem: &Problem<'_, '_>, residual: &[Vector3<f64>]) -> Signature {

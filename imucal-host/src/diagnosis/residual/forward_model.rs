@@ -51,6 +51,8 @@ pub struct ForwardModel<'a> {
     pub triads: [Triad<f64>; 3],
     /// Nodes for signatures.
     pub fine: SamplePoints,
+    /// A few nodes a block: to look which of many formulas a residual may follow.
+    pub sparse: SamplePoints,
     /// One node a block: to look where in time an effect without memory lies.
     pub coarse: SamplePoints,
     /// Computed by `gimbal_derivatives` when it is first asked for.
@@ -80,13 +82,15 @@ impl<'a> ForwardModel<'a> {
             |kind: SensorKind| by.keeps_sensors_without_rows || usable[kind as usize].contains(&true);
         let is_there = |kind: &SensorKind| recording.sensor(*kind).is_some() && is_used(*kind);
         let kinds = SensorKind::ALL.into_iter().filter(is_there).collect();
-        let fine = |block: &Block| {
+        let fine_count = |block: &Block| {
             let apart = if block.rest.is_some() { by.resting_points } else { by.moving_points };
             let stride = ((apart / interval).round() as usize).max(1);
             block.rows.len().div_ceil(stride)
         };
         let is_known = |row: usize| by.points_in_gaps || motion.known()[row];
-        let fine = SamplePoints::choose(&recording.time, &blocks, fine, is_known);
+        let fine = SamplePoints::choose(&recording.time, &blocks, fine_count, is_known);
+        let few = |block: &Block| fine_count(block).min(by.sparse_points);
+        let sparse = SamplePoints::choose(&recording.time, &blocks, few, is_known);
         let coarse = SamplePoints::choose(&recording.time, &blocks, |_| 1, |_| true);
         let of_acc = SensorKind::Acc as usize;
         let acc_as_sharp = recording
@@ -108,6 +112,7 @@ impl<'a> ForwardModel<'a> {
             usable,
             triads,
             fine,
+            sparse,
             coarse,
             gimbal_derivatives: OnceLock::new(),
         }

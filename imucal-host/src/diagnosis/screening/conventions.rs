@@ -16,7 +16,7 @@ mod axis_swap;
 mod carried_about;
 mod gimbal_order;
 mod noise_burst;
-mod pairs;
+pub(super) mod pairs;
 mod saturation;
 mod stuck_samples;
 #[cfg(test)]

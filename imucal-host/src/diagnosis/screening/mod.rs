@@ -8,6 +8,7 @@
 //! | --- | --- |
 //! | [`bandwidth`] | how fast a movement recorded positions can be believed to follow |
 //! | [`conventions`] | axis order and signs, units, gimbal order, clipping, repeated samples, noise bursts |
+//! | [`mounting`] | the small turn of a unit against the sensor that a simulator's stream is of |
 //! | [`held_values`] | rows that repeat the one before until a new value comes |
 //! | [`pose_conventions`] | what a reference's attitudes and positions hold instead of what they should: order, frame, rate, jumps, steps, unit |
 //! | [`stream_conventions`] | what a simulator's stream holds instead of what it should: unit, gravity, axes, noise, steps, too few samples |
@@ -22,6 +23,7 @@
 pub mod bandwidth;
 pub mod conventions;
 pub mod held_values;
+pub mod mounting;
 pub mod pose_conventions;
 pub mod preparation;
 pub mod reference_offset;

@@ -2,12 +2,13 @@
 //!
 //! Faults of the recording itself are undone or left out here, so that the search sees none of them.
 
-use imucal_core::triad::Triad;
+use imucal_core::{rotation::exp, triad::Triad};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
     bandwidth, conventions,
     conventions::{Conventions, Finding},
+    mounting::mounting,
     pose_conventions, reference_offset, stream_conventions,
 };
 use crate::{
@@ -110,7 +111,7 @@ impl Preparation {
         if settings.source.placed {
             as_read = bandwidth::best(recording, &integrity, as_read, &|width| of_bandwidth(clock, width))?;
         }
-        let Reference { movement, held, unmatched, remarks: of_reference } = as_read;
+        let Reference { mut movement, held, unmatched, remarks: of_reference } = as_read;
         let lacks =
             stream.and_then(|given| stream_conventions::gravity::missing(recording, given, &*movement));
         if let Some(lacks) = lacks {
@@ -149,6 +150,10 @@ impl Preparation {
         }
         for finding in &conventions.findings {
             undo(finding, recording, &mut usable, &mut triads);
+        }
+        let turn = stream.and_then(|_| mounting(recording, &integrity, &*movement, &triads, &usable));
+        if let Some(mounted) = turn.and_then(|turn| movement.mounted(&exp(&-turn))) {
+            movement = mounted;
         }
         if !usable.iter().flatten().any(|row| *row) {
             let why = [vec!["no sensor has a usable row".to_owned()], of_stream.remarks].concat().join("; ");

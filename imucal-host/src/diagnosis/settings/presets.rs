@@ -121,6 +121,7 @@ impl Settings {
                 exact_attitude: true,
             },
             residual: ResidualSettings {
+                moving_block: 0.05,
                 moving_points: 0.0051,
                 resting_points: 0.05,
                 points_in_gaps: false,

@@ -100,3 +100,23 @@ fn a_stream_at_rest_does_not_move() {
     assert!(streamed.moving()[..900].iter().all(|moves| !moves));
     assert!(streamed.moving()[1050..1150].iter().all(|moves| *moves));
 }
+
+#[test]
+fn a_mounted_unit_is_given_the_same_movement_in_its_own_axes() {
+    let (_, streamed) = streamed(StreamClock { offset: 0.01, error: 1e-4 }, |_| ());
+    let c_t_q = exp(&Vector3::new(0.02, -0.05, 0.1));
+    let mounted = streamed.mounted(&c_t_q).unwrap();
+    for t in [10.0, 12.34, 25.1] {
+        let (here, there) = (mounted.truth(t, &|_| ()), streamed.truth(t, &|_| ()));
+        for (of_unit, of_table) in [
+            (here.f_t, there.f_t),
+            (here.w_it_t, there.w_it_t),
+            (here.dw_it_t, there.dw_it_t),
+            (here.b_t, there.b_t),
+        ] {
+            assert!((of_unit - c_t_q * of_table).norm() < 1e-9 * (1.0 + of_table.norm()), "{t}");
+        }
+        let to_n = |truth: &Truth| truth.c_p_n * truth.c_t_p * truth.f_t;
+        assert!((to_n(&here) - to_n(&there)).norm() < 1e-6, "{t}");
+    }
+}
