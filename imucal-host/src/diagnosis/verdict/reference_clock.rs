@@ -72,8 +72,8 @@ pub fn candidates(candidates: &Candidates, terms: &[Term]) -> Option<Candidates>
     (!named.is_empty()).then_some(with)
 }
 
-/// The named terms that held-out blocks bear out together with the `confirmed` causes; `remainder` is the whitened size of
-/// what a driver still follows. `None` where there is none.
+/// The named terms, along a reference attitude those that held-out blocks bear out, together with the `confirmed` causes;
+/// `remainder` is the whitened size of what a driver still follows. `None` where there is none.
 pub fn clock<'s>(
     explained: &'s Solution<'s>,
     candidates: &'s Candidates,
@@ -93,7 +93,10 @@ pub fn clock<'s>(
     };
     let linear = linear.with_effects(candidates, fit, terms.iter().map(shown).collect());
     let closed = shares::closed(&linear, &set, &best.noise, remainder)?;
-    let own = terms.iter().zip(&closed.each[others..]).filter(|(_, share)| share.interval[0] > 0.0);
+    // Along a stream an offset beyond its errors is there, however unsure a share is of which the other term takes a part.
+    let is_exact = explained.linear.scene.settings.source.followed;
+    let own = terms.iter().zip(&closed.each[others..]);
+    let own = own.filter(|(_, share)| is_exact || share.interval[0] > 0.0);
     let causes: Vec<Cause> = own
         .map(|(term, share)| Cause {
             effect: term.effect.id.clone(),
