@@ -55,21 +55,36 @@ const COS_REACH: f64 = 0.866_025_403_784_438_6;
 /// cos of [`APART`].
 const COS_APART: f64 = 0.965_925_826_289_068_3;
 
-/// By turning on from cell to cell: neither sine nor double precision is asked of a device.
-fn share<T: Scalar>(directions: impl Iterator<Item = Vector3<T>> + Clone) -> T {
+/// Centres of the cells, by turning on from cell to cell: neither sine nor double precision is asked of a device.
+fn centres<T: Scalar>() -> impl Iterator<Item = Vector3<T>> {
     let (cos, sin) = (T::of(GOLDEN.0), T::of(GOLDEN.1));
     let (mut x, mut y) = (T::one(), T::zero());
-    let mut reached = 0;
-    for index in 0..u32::from(CELLS) {
+    (0..u32::from(CELLS)).map(move |index| {
         let z = T::one() - T::whole(2 * index + 1) / T::whole(CELLS.into());
         let radius = (T::one() - z * z).root();
         let centre = Vector3::new(radius * x, radius * y, z);
-        if directions.clone().any(|u| u.dot(&centre) >= T::of(COS_REACH)) {
-            reached += 1;
-        }
         (x, y) = (cos * x - sin * y, sin * x + cos * y);
-    }
+        centre
+    })
+}
+
+fn share<T: Scalar>(directions: impl Iterator<Item = Vector3<T>> + Clone) -> T {
+    let is_reached = |centre: &Vector3<T>| directions.clone().any(|u| u.dot(centre) >= T::of(COS_REACH));
+    let reached = centres().filter(is_reached).fold(0u32, |count, _| count.saturating_add(1));
     T::whole(reached) / T::whole(CELLS.into())
+}
+
+/// The direction, a cell's centre, that is furthest from all that have been seen: the pose that is missing most. With it the
+/// cosine of the angle to the nearest one seen; −1 where none was.
+pub fn missing<T: Scalar>(directions: impl Iterator<Item = Vector3<T>> + Clone) -> (Vector3<T>, T) {
+    let nearest = |centre: &Vector3<T>| {
+        let cosines = directions.clone().map(|u| u.dot(centre));
+        cosines.fold(-T::one(), |most, cos| if cos > most { cos } else { most })
+    };
+    let none = (Vector3::z(), T::one() + T::one());
+    centres()
+        .map(|centre| (centre, nearest(&centre)))
+        .fold(none, |furthest, cell| if cell.1 < furthest.1 { cell } else { furthest })
 }
 
 fn flatness<T: Scalar>(directions: impl Iterator<Item = Vector3<T>>) -> T {
@@ -163,6 +178,16 @@ mod tests {
         });
         let c = Coverage::of(circle);
         assert!(c.flatness < 1e-12 && (c.share - 0.5).abs() < 0.05);
+    }
+
+    #[test]
+    fn the_pose_that_is_missing_most_is_furthest_from_all_that_were_seen() {
+        let faces = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z()];
+        let (direction, cos) = missing::<f64>(faces.into_iter());
+        assert!(direction.z < -0.98 && cos < 0.2, "{direction} {cos}");
+        assert_eq!(missing::<f32>(core::iter::empty()).1, -1.0);
+        // Where all is seen, no cell is further off than they are apart.
+        assert!(missing(cap(1.0, 500).into_iter()).1 > 0.97);
     }
 
     #[test]

@@ -37,6 +37,22 @@ impl<T: Scalar> Moments<T> {
         self.squares += before.component_mul(&(sample - self.mean));
     }
 
+    /// The moments of these samples and of others (Chan, Golub and LeVeque 1983).
+    #[must_use]
+    pub fn join(&self, other: &Self) -> Self {
+        let count = self.count.saturating_add(other.count);
+        if count == 0 {
+            return *self;
+        }
+        let (own, others, all) = (T::whole(self.count), T::whole(other.count), T::whole(count));
+        let apart = other.mean - self.mean;
+        Self {
+            count,
+            mean: self.mean + apart * (others / all),
+            squares: self.squares + other.squares + apart.component_mul(&apart) * (own * others / all),
+        }
+    }
+
     /// Samples taken in.
     pub fn count(&self) -> u32 {
         self.count
@@ -276,6 +292,23 @@ mod tests {
             samples.iter().map(|s| (s - mean).component_mul(&(s - mean))).sum::<Vector3<f64>>() / 49.0;
         assert!((m.mean() - mean).norm() < 1e-9);
         assert!((m.variance() - variance).norm() < 1e-6);
+    }
+
+    #[test]
+    fn moments_joined_are_those_of_all_samples() {
+        let sample =
+            |i: u32| Vector3::new(f64::from(i * i % 11), 9.8 + f64::from(i % 5) * 1e-3, -f64::from(i));
+        let of = |range: core::ops::Range<u32>| {
+            let mut moments = Moments::default();
+            range.for_each(|i| moments.push(&sample(i)));
+            moments
+        };
+        let (joined, all) = (of(0..13).join(&of(13..60)), of(0..60));
+        assert_eq!(joined.count(), all.count());
+        assert!((joined.mean() - all.mean()).norm() < 1e-13);
+        assert!((joined.variance() - all.variance()).norm() < 1e-12);
+        let none = Moments::<f64>::default();
+        assert_eq!((none.join(&none), none.join(&all).mean()), (none, all.mean()));
     }
 
     #[test]

@@ -19,6 +19,7 @@ mod arithmetic;
 mod link;
 mod model;
 mod observation;
+mod observer;
 mod record;
 mod solver;
 
@@ -26,6 +27,7 @@ mod solver;
 pub fn reach_all() {
     arithmetic::reach_all();
     observation::reach_all();
+    observer::reach_all();
     model::reach_all();
     solver::reach_all();
     record::reach_all();

@@ -13,6 +13,7 @@ pub(super) fn reach_all() {
     let sample = Vector3::new(1.0f32, 2.0, 3.0);
     let mut moments: Moments<f32> = reach!(observation::Moments::default());
     reach!(observation::Moments::push(&mut moments, &sample));
+    reach!(observation::Moments::join(&moments, &moments));
     reach!(observation::Moments::count(&moments));
     reach!(observation::Moments::mean(&moments));
     reach!(observation::Moments::variance(&moments));

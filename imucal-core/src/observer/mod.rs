@@ -1,0 +1,36 @@
+//! Observations while samples arrive: nothing of the past is kept but sums.
+//!
+//! | observer | gives |
+//! | --- | --- |
+//! | [`rest`] | a [`Rest`](crate::observation::Rest) when it has ended |
+//! | [`cloud`] | points of a magnetometer that are far apart, in a fixed number of slots |
+//!
+//! An observer is plain data of fixed size: it can be stopped after any sample, kept, and gone on with.
+
+pub mod cloud;
+pub mod rest;
+
+use nalgebra::Vector3;
+
+use crate::scalar::Scalar;
+
+/// What the sensors say at one time; nominal SI, sensor frame `s`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample<T: Scalar> {
+    /// Time on the IMU's clock, µs.
+    pub time: u64,
+    /// Specific force `f_s`, m/s². Not finite where it was missed, clipped or is stuck.
+    pub acc: Vector3<T>,
+    /// Rate `w_ns_s`, rad/s, likewise; `None` without a gyroscope.
+    pub gyr: Option<Vector3<T>>,
+    /// Temperature, °C, where this sample has one.
+    pub temperature: Option<T>,
+}
+
+impl<T: Scalar> Sample<T> {
+    /// Every sensor has a value.
+    pub fn is_whole(&self) -> bool {
+        let finite = |v: &Vector3<T>| v.iter().all(|component| component.finite());
+        finite(&self.acc) && self.gyr.as_ref().is_none_or(finite)
+    }
+}

@@ -1,0 +1,298 @@
+//! Rests: stretches in which the accelerometer shows its own noise and nothing else.
+//!
+//! Samples are gathered into quarters of a window of one second. The window's variance, the sum of the axes', is compared with
+//! a multiple of that of the quietest window so far:
+//!
+//! ```text
+//! σ² = Σ_axes Var(f over four quarters)      still: σ² ≤ m · max(σ²_min, σ²_0),  |w̄ − b| ≤ w_0
+//! b ← b + clamp(w̄ − b, ±s)
+//! ```
+//!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | m | [`RestSettings::multiple`] |
+//! | σ²_min | variance of the quietest window so far |
+//! | σ²_0 | [`RestSettings::least_variance`]: what an accelerometer of coarse steps may show of its noise |
+//! | w̄ | mean rate of the window |
+//! | b | median rate of the windows in which the accelerometer is still, followed by steps s (the first step reaches it) |
+//! | w_0 | [`RestSettings::turning`] |
+//!
+//! A rest holds the quarters between the middles of its first and its last still window, so that it ends half a window before a
+//! motion begins. It lasts a second at least. A rest that is noisier than the multiple of a quieter window which came later is
+//! none.
+//!
+//! Source: Tedaldi, Pretto and Menegatti 2014 (ICRA), section IV, for a recording; causal and of bounded memory here. Not done
+//! here: another multiple afterwards, and what a recording's first and last half window hold.
+
+use nalgebra::Vector3;
+
+use super::Sample;
+use crate::{
+    observation::{Moments, Rest},
+    scalar::Scalar,
+};
+
+/// A quarter of the window, µs.
+pub const QUARTER: u64 = 250_000;
+/// Quarters that a rest holds at least: one second.
+pub const SHORTEST: u8 = 4;
+/// Noisier than this nothing is at rest, however long it lasts, (m/s²)².
+pub const NOISIEST: f64 = 0.25;
+/// Time from one sample to the next that is so many times the usual one breaks a window.
+const GAP: u64 = 5;
+/// Steps by which the usual rate follows that of a window, rad/s: where they agree within [`RestSettings::turning`], and where
+/// they do not, so that a slow turn is not soon taken for rest.
+const STEPS: (f64, f64) = (1e-3, 2e-4);
+
+/// When something is still.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RestSettings<T> {
+    /// Variance of a window allowed, as a multiple of the quietest one's. Larger: a trembling hand is at rest, and a slow start
+    /// of a motion belongs to it.
+    pub multiple: T,
+    /// Least variance that the quietest window counts as, (m/s²)².
+    pub least_variance: T,
+    /// Mean rate allowed, against the usual one at rest, rad/s. Larger: a slow turn about the vertical is a rest.
+    pub turning: T,
+}
+
+impl<T: Scalar> Default for RestSettings<T> {
+    fn default() -> Self {
+        Self { multiple: T::of(6.0), least_variance: T::of(1e-5), turning: T::of(0.03) }
+    }
+}
+
+/// A rest that has ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObservedRest<T: Scalar> {
+    /// The rest.
+    pub rest: Rest<T>,
+    /// From when it lasted on the IMU's clock, µs.
+    pub start: u64,
+    /// Until when, µs.
+    pub end: u64,
+    /// Variance of its noisiest window, (m/s²)².
+    pub noise: T,
+}
+
+/// Samples of a quarter of a window, or of the quarters of a rest.
+#[derive(Clone, Copy, Debug)]
+struct Stretch<T: Scalar> {
+    acc: Moments<T>,
+    gyr: Moments<T>,
+    temperature: T,
+    temperatures: u32,
+    rows: u32,
+    start: u64,
+    end: u64,
+    /// A gap lies in it, or too few of its samples are whole.
+    broken: bool,
+}
+
+impl<T: Scalar> Stretch<T> {
+    fn new(start: u64) -> Self {
+        Self {
+            acc: Moments::default(),
+            gyr: Moments::default(),
+            temperature: T::zero(),
+            temperatures: 0,
+            rows: 0,
+            start,
+            end: start,
+            broken: false,
+        }
+    }
+
+    fn push(&mut self, sample: &Sample<T>) {
+        self.rows = self.rows.saturating_add(1);
+        if sample.is_whole() {
+            self.acc.push(&sample.acc);
+            sample.gyr.iter().for_each(|rate| self.gyr.push(rate));
+        }
+        if let Some(temperature) = sample.temperature.filter(|value| value.finite()) {
+            self.temperature += temperature;
+            self.temperatures = self.temperatures.saturating_add(1);
+        }
+    }
+
+    fn join(&mut self, next: &Self) {
+        self.acc = self.acc.join(&next.acc);
+        self.gyr = self.gyr.join(&next.gyr);
+        self.temperature += next.temperature;
+        self.temperatures = self.temperatures.saturating_add(next.temperatures);
+        self.rows = self.rows.saturating_add(next.rows);
+        self.end = next.end;
+        self.broken |= next.broken;
+    }
+
+    /// A gap lies in it, or more than a fifth of its samples are not whole.
+    fn is_broken(&self) -> bool {
+        let whole = u64::from(self.acc.count());
+        self.broken || whole < 2 || 5 * whole < 4 * u64::from(self.rows)
+    }
+
+    fn variance(&self) -> T {
+        self.acc.variance().sum()
+    }
+
+    fn rest(&self) -> Rest<T> {
+        let middle = self.start.midpoint(self.end) / 1000;
+        let time = T::whole(u32::try_from(middle).unwrap_or(u32::MAX)) / T::whole(1000);
+        // Zero by zero where none was measured.
+        let temperature = self.temperature / T::whole(self.temperatures);
+        Rest { time, acc: self.acc, gyr: self.gyr, temperature }
+    }
+}
+
+/// A rest that goes on.
+#[derive(Clone, Copy, Debug)]
+struct Lasting<T: Scalar> {
+    held: Option<Stretch<T>>,
+    quarters: u8,
+    noise: T,
+}
+
+/// Finds rests in samples as they arrive.
+#[derive(Clone, Copy, Debug)]
+pub struct RestObserver<T: Scalar> {
+    settings: RestSettings<T>,
+    /// The last three whole quarters, the oldest first; `None` before there were so many.
+    before: [Option<Stretch<T>>; 3],
+    now: Option<Stretch<T>>,
+    /// Time of the last sample and usual time between two, µs.
+    last: u64,
+    interval: u64,
+    /// Variance of the quietest window so far, (m/s²)².
+    quietest: Option<T>,
+    /// Usual rate of the windows in which the accelerometer is still, rad/s.
+    rate: Option<Vector3<T>>,
+    lasting: Option<Lasting<T>>,
+}
+
+impl<T: Scalar> Default for RestObserver<T> {
+    fn default() -> Self {
+        Self::new(RestSettings::default())
+    }
+}
+
+impl<T: Scalar> RestObserver<T> {
+    /// Before the first sample.
+    pub fn new(settings: RestSettings<T>) -> Self {
+        let before = [None; 3];
+        Self { settings, before, now: None, last: 0, interval: 0, quietest: None, rate: None, lasting: None }
+    }
+
+    /// Takes a sample in; a rest, when this sample shows that one has ended.
+    pub fn push(&mut self, sample: &Sample<T>) -> Option<ObservedRest<T>> {
+        let Some(now) = &mut self.now else {
+            self.begin(sample);
+            return None;
+        };
+        let Some(since) = sample.time.checked_sub(self.last) else {
+            // The clock was set back: nothing goes on over it.
+            let ended = self.finish();
+            self.begin(sample);
+            return ended;
+        };
+        now.broken |= self.interval > 0 && since > GAP.saturating_mul(self.interval);
+        self.last = sample.time;
+        if sample.time.saturating_sub(now.start) < QUARTER {
+            now.push(sample);
+            return None;
+        }
+        now.end = sample.time;
+        let whole = *now;
+        self.interval = (whole.end - whole.start) / u64::from(whole.rows.max(1));
+        let mut next = Stretch::new(sample.time);
+        next.push(sample);
+        self.now = Some(next);
+        self.quarter(whole)
+    }
+
+    /// The rest that goes on, when no more samples come; what was gathered is forgotten, but not the quietest window.
+    pub fn finish(&mut self) -> Option<ObservedRest<T>> {
+        self.before = [None; 3];
+        self.now = None;
+        self.interval = 0;
+        self.ended()
+    }
+
+    /// The last window was still.
+    pub fn is_still(&self) -> bool {
+        self.lasting.is_some()
+    }
+
+    /// Variance up to which a window is still, (m/s²)²; `None` before the first window.
+    pub fn threshold(&self) -> Option<T> {
+        let quietest = self.quietest?;
+        let least = self.settings.least_variance;
+        let allowed = self.settings.multiple * if quietest > least { quietest } else { least };
+        let most = T::of(NOISIEST);
+        Some(if allowed < most { allowed } else { most })
+    }
+
+    fn begin(&mut self, sample: &Sample<T>) {
+        let mut first = Stretch::new(sample.time);
+        first.push(sample);
+        self.now = Some(first);
+        self.last = sample.time;
+    }
+
+    /// Takes a whole quarter in.
+    fn quarter(&mut self, whole: Stretch<T>) -> Option<ObservedRest<T>> {
+        let [oldest, inner, newest] = self.before;
+        self.before = [inner, newest, Some(whole)];
+        let quarters = [oldest?, inner?, newest?, whole];
+        let Some(variance) = self.still(&quarters) else { return self.ended() };
+        let lasting = self.lasting.get_or_insert(Lasting { held: None, quarters: 0, noise: variance });
+        lasting.noise = if variance > lasting.noise { variance } else { lasting.noise };
+        // From the middle of the window before to that of this one.
+        if let Some(held) = &mut lasting.held {
+            held.join(&quarters[1]);
+        } else {
+            lasting.held = Some(Stretch::new(quarters[1].end));
+            return None;
+        }
+        lasting.quarters = lasting.quarters.saturating_add(1);
+        None
+    }
+
+    /// Variance of a window, if it is still.
+    fn still(&mut self, quarters: &[Stretch<T>; 4]) -> Option<T> {
+        if quarters.iter().any(Stretch::is_broken) {
+            return None;
+        }
+        let [mut window, rest @ ..] = *quarters;
+        rest.iter().for_each(|quarter| window.join(quarter));
+        let variance = window.variance();
+        if self.quietest.is_none_or(|quietest| variance < quietest) {
+            self.quietest = Some(variance);
+        }
+        (variance <= self.threshold()? && self.is_usual(window.gyr.mean())).then_some(variance)
+    }
+
+    /// The mean rate of a window in which the accelerometer is still is the usual one, which follows it.
+    fn is_usual(&mut self, rate: Vector3<T>) -> bool {
+        let usual = self.rate.get_or_insert(rate);
+        let off = rate - *usual;
+        let agrees = off.norm() <= self.settings.turning;
+        let step = T::of(if agrees { STEPS.0 } else { STEPS.1 });
+        let within = |component: T| match component {
+            off if off > step => step,
+            off if off < -step => -step,
+            off => off,
+        };
+        *usual += off.map(within);
+        agrees
+    }
+
+    /// The rest that has ended, if it was one.
+    fn ended(&mut self) -> Option<ObservedRest<T>> {
+        let Lasting { held, quarters, noise } = self.lasting.take()?;
+        let held = held.filter(|_| quarters >= SHORTEST && Some(noise) <= self.threshold())?;
+        Some(ObservedRest { rest: held.rest(), start: held.start, end: held.end, noise })
+    }
+}
+
+#[cfg(test)]
+mod tests;

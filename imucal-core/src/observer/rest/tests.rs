@@ -1,0 +1,144 @@
+use std::vec::Vec as List;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::*;
+
+const INTERVAL: u64 = 10_000;
+
+/// A unit that lies still and is moved by turns: `parts` are lengths, s, rates about the axis z, rad/s, and how much it is
+/// shaken, m/s².
+struct Session {
+    random: ChaCha8Rng,
+    samples: List<Sample<f64>>,
+}
+
+impl Session {
+    fn new(seed: u64, parts: &[(f64, f64, f64)]) -> Self {
+        let mut session = Self { random: ChaCha8Rng::seed_from_u64(seed), samples: List::new() };
+        parts.iter().for_each(|part| session.add(*part));
+        session
+    }
+
+    fn add(&mut self, (length, rate, shaken): (f64, f64, f64)) {
+        let from = self.samples.len() as u64;
+        for k in 0..(length * 1e6) as u64 / INTERVAL {
+            let mut noise = |size: f64| {
+                Vector3::from_fn(|_, _| {
+                    size * (0..12).map(|_| self.random.random::<f64>() - 0.5).sum::<f64>()
+                })
+            };
+            let acc = Vector3::new(0.3, -0.2, -9.79) + noise(0.02) + noise(shaken);
+            let gyr = Vector3::new(0.01, -0.004, 0.002 + rate) + noise(0.003);
+            let time = 5_000_000 + (from + k) * INTERVAL;
+            self.samples.push(Sample { time, acc, gyr: Some(gyr), temperature: Some(25.0) });
+        }
+    }
+
+    fn rests(&self) -> List<ObservedRest<f64>> {
+        let mut observer = RestObserver::default();
+        let mut rests: List<_> = self.samples.iter().filter_map(|sample| observer.push(sample)).collect();
+        rests.extend(observer.finish());
+        rests
+    }
+}
+
+fn seconds(rest: &ObservedRest<f64>) -> (f64, f64) {
+    (rest.start as f64 * 1e-6 - 5.0, rest.end as f64 * 1e-6 - 5.0)
+}
+
+#[test]
+fn rests_between_motions_are_found_and_hold_none_of_them() {
+    let parts = [(6.0, 0.0, 0.0), (2.0, 1.5, 2.0), (4.0, 0.0, 0.0), (2.0, -1.0, 2.0), (5.0, 0.0, 0.0)];
+    let rests = Session::new(1, &parts).rests();
+    assert_eq!(rests.len(), 3);
+    for (rest, (from, to)) in rests.iter().zip([(0.0, 6.0), (8.0, 12.0), (14.0, 19.0)]) {
+        let (start, end) = seconds(rest);
+        // Half a window at either end, and up to a quarter more.
+        assert!((from + 0.2..from + 0.8).contains(&start), "{start} {from}");
+        assert!((to - 0.8..to - 0.2).contains(&end), "{end} {to}");
+        let moments = &rest.rest.acc;
+        let error = moments.mean() - Vector3::new(0.3, -0.2, -9.79);
+        assert!(error.amax() < 5.0 * 0.02 / f64::from(moments.count()).sqrt(), "{error}");
+        assert_eq!(f64::from(moments.count()), ((end - start) * 100.0).round());
+        assert!((rest.rest.time - 5.0 - 0.5 * (start + end)).abs() < 2e-3);
+        assert!((rest.rest.temperature - 25.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn less_than_a_second_of_still_windows_is_no_rest() {
+    let parts = [(6.0, 0.0, 0.0), (2.0, 1.0, 2.0), (1.6, 0.0, 0.0), (2.0, 1.0, 2.0), (6.0, 0.0, 0.0)];
+    assert_eq!(Session::new(2, &parts).rests().len(), 2);
+}
+
+#[test]
+fn a_turn_that_the_accelerometer_does_not_feel_is_no_rest() {
+    let parts = [(6.0, 0.0, 0.0), (8.0, 0.1, 0.0), (6.0, 0.0, 0.0)];
+    let rests = Session::new(3, &parts).rests();
+    assert_eq!(rests.len(), 2);
+    assert!(seconds(&rests[0]).1 < 6.1 && seconds(&rests[1]).0 > 13.9, "{rests:?}");
+}
+
+#[test]
+fn what_seemed_a_rest_before_a_quieter_one_came_is_none() {
+    // Carried steadily at first: quiet as long as nothing quieter is known.
+    let parts = [(5.0, 0.0, 0.25), (2.0, 1.0, 2.0), (6.0, 0.0, 0.0), (2.0, 1.0, 2.0), (6.0, 0.0, 0.25)];
+    let rests = Session::new(4, &parts).rests();
+    // The first has ended before.
+    assert_eq!(rests.len(), 2);
+    let threshold = 6.0 * rests[1].noise;
+    assert!(rests[0].noise > threshold, "what is kept of it says so: {} {threshold}", rests[0].noise);
+}
+
+#[test]
+fn a_gap_and_samples_that_are_missing_end_a_rest() {
+    let mut session = Session::new(5, &[(20.0, 0.0, 0.0)]);
+    assert_eq!(session.rests().len(), 1);
+    session.samples.iter_mut().skip(600).for_each(|sample| sample.time += 3_000_000);
+    session.samples.iter_mut().skip(1200).take(20).for_each(|sample| sample.acc.x = f64::NAN);
+    let rests = session.rests();
+    assert_eq!(rests.len(), 3);
+    assert!(rests.iter().all(|rest| rest.rest.acc.mean().iter().all(|component| component.is_finite())));
+}
+
+#[test]
+fn a_clock_that_is_set_back_ends_a_rest_and_the_next_one_begins() {
+    let mut session = Session::new(6, &[(12.0, 0.0, 0.0)]);
+    session.samples.iter_mut().skip(600).for_each(|sample| sample.time -= 5_500_000);
+    let rests = session.rests();
+    assert_eq!(rests.len(), 2);
+    assert!(rests.iter().all(|rest| rest.start < rest.end));
+}
+
+#[test]
+fn an_accelerometer_of_coarse_steps_is_at_rest_though_a_window_shows_no_noise() {
+    let mut session = Session::new(7, &[(6.0, 0.0, 0.0), (2.0, 1.0, 2.0), (6.0, 0.0, 0.0)]);
+    let coarse = |value: f64| (value / 0.04).round() * 0.04;
+    session.samples.iter_mut().for_each(|sample| sample.acc = sample.acc.map(coarse));
+    session.samples.iter_mut().take(150).for_each(|sample| sample.acc = Vector3::new(0.28, -0.2, -9.8));
+    let mut observer =
+        RestObserver::new(RestSettings { least_variance: 3.0 * 0.02 * 0.02, ..Default::default() });
+    let mut rests: List<_> = session.samples.iter().filter_map(|sample| observer.push(sample)).collect();
+    rests.extend(observer.finish());
+    assert_eq!(rests.len(), 2);
+}
+
+#[test]
+fn an_observer_that_is_kept_and_gone_on_with_finds_the_same() {
+    let session = Session::new(8, &[(6.0, 0.0, 0.0), (2.0, 1.5, 2.0), (4.0, 0.0, 0.0)]);
+    let (mut kept, mut rests) = (RestObserver::default(), List::new());
+    for sample in &session.samples {
+        let mut again = kept;
+        rests.extend(again.push(sample));
+        kept = again;
+    }
+    rests.extend(kept.finish());
+    assert_eq!(rests, session.rests());
+}
+
+#[test]
+fn in_single_precision_it_takes_six_hundred_bytes() {
+    assert!(size_of::<RestObserver<f32>>() <= 600, "{}", size_of::<RestObserver<f32>>());
+}
