@@ -3,6 +3,7 @@
 //! | driver | functions |
 //! | --- | --- |
 //! | x: what this axis, the next and the one after sense, likewise the fields of the other sensors and angular acceleration | x, x², x³, \|x\|, tanh, dead zone, knee, lag of x and x² |
+//! | one component of these, the same on all axes | likewise |
 //! | products of two of these, and of one with temperature or its rate | as they are |
 //! | squares of rate and specific force, temperature, its rate | as they are, and lagged |
 //! | angles of gimbals | sinusoids of one to twelve periods a turn, by halves |
@@ -11,7 +12,10 @@
 //! An amplitude an axis. Left out: what the baseline always has, such as the axis' own input.
 
 use super::term::{Driver, Formulated, Shape};
-use crate::{effect::si, recording::SensorKind};
+use crate::{
+    effect::{XYZ, si},
+    recording::SensorKind,
+};
 
 /// Periods a turn of a sinusoid in an angle.
 const PERIODS: std::ops::RangeInclusive<u32> = 2..=24;
@@ -49,13 +53,16 @@ pub struct Taken {
 
 /// The formulas for a sensor. `taken` gives the values of a driver in the recording.
 pub fn formulas(kind: SensorKind, held: Held, taken: &dyn Fn(&Driver) -> Taken) -> Vec<Formulated> {
-    let vectors = vectors(kind, held);
+    let fields = fields(kind, held);
+    let (vectors, components) = (vectors(&fields), components(&fields));
     let mut all = Vec::new();
-    for driver in &vectors {
-        of_vector(driver, &taken(driver), &mut all);
-    }
-    for (at, one) in vectors.iter().enumerate() {
-        all.extend(vectors[at + 1..].iter().map(|other| one.times(other).itself(2)));
+    for drivers in [&vectors, &components] {
+        for driver in drivers {
+            of_vector(driver, &taken(driver), &mut all);
+        }
+        for (at, one) in drivers.iter().enumerate() {
+            all.extend(drivers[at + 1..].iter().map(|other| one.times(other).itself(2)));
+        }
     }
     for (driver, name) in [("w", "rate"), ("a", "force")] {
         let text = format!("({driver}_x^2 + {driver}_y^2 + {driver}_z^2)");
@@ -63,7 +70,7 @@ pub fn formulas(kind: SensorKind, held: Held, taken: &dyn Fn(&Driver) -> Taken) 
         of_scalar(&Driver::scalar(&format!("square_of_{name}"), &text, unit), &mut all);
     }
     if let Some(mean) = held.temperature {
-        of_temperature(mean, &vectors, &mut all);
+        of_temperature(mean, &[vectors, components].concat(), &mut all);
     }
     if held.gimbals {
         for gimbal in ["outer", "middle", "inner"] {
@@ -73,20 +80,35 @@ pub fn formulas(kind: SensorKind, held: Held, taken: &dyn Fn(&Driver) -> Taken) 
     all
 }
 
-/// Vectors that an axis may follow: of each, the component of the axis itself, of the next, and of the one after.
-fn vectors(kind: SensorKind, held: Held) -> Vec<Driver> {
+/// What a sensor's axes may follow: their own inputs, the fields of the other sensors, angular acceleration; each with its unit.
+fn fields(kind: SensorKind, held: Held) -> Vec<(&'static str, String)> {
     let others = [("a", SensorKind::Acc), ("w", SensorKind::Gyr), ("B", SensorKind::Mag)];
     let known = |(_, of): &(&str, SensorKind)| *of != kind && (*of != SensorKind::Mag || held.field);
     let mut fields = vec![("y", si(kind))];
     fields.extend(others.into_iter().filter(known).map(|(name, of)| (name, si(of))));
     fields.push(("wd", "rad/s^2".to_owned()));
-    let each =
-        fields.iter().flat_map(|(name, unit)| (0..3).map(move |next| Driver::vector(name, next, unit)));
-    each.collect()
+    fields
+}
+
+/// Of each field the component along the axis itself, along the next, and along the one after.
+fn vectors(fields: &[(&'static str, String)]) -> Vec<Driver> {
+    let of = |(name, unit): &(&'static str, String)| [0, 1, 2].map(|next| Driver::vector(name, next, unit));
+    fields.iter().flat_map(of).collect()
+}
+
+/// Of each field its components, each the same on all axes.
+fn components(fields: &[(&'static str, String)]) -> Vec<Driver> {
+    let of = |(name, unit): &(&'static str, String)| {
+        XYZ.map(|axis| {
+            let text = format!("{name}_{axis}");
+            Driver::scalar(&text.to_lowercase(), &text, unit)
+        })
+    };
+    fields.iter().flat_map(of).collect()
 }
 
 fn of_vector(driver: &Driver, taken: &Taken, all: &mut Vec<Formulated>) {
-    if !driver.is_of_axis("y") {
+    if !driver.is_in_baseline() {
         all.push(driver.itself(1));
     }
     all.push(driver.function("square", "$^2", 2, None));
@@ -171,7 +193,7 @@ pub(super) mod tests {
         let held = Held { gimbals: true, temperature: Some(25.0), field: true };
         for kind in SensorKind::ALL {
             let all = formulas(kind, held, &taken);
-            assert!((400..900).contains(&all.len()), "{}", all.len());
+            assert!((900..1500).contains(&all.len()), "{}", all.len());
             let mut texts: Vec<String> = Vec::new();
             for formula in &all {
                 assert!(formula.parsed().is_ok(), "{formula:?}");
@@ -191,6 +213,18 @@ pub(super) mod tests {
             let text = formula.terms.concat().concat();
             assert!(!text.contains("temp") && !text.contains("inner") && !text.contains("B_"), "{text}");
         }
+    }
+
+    #[test]
+    fn a_product_of_two_components_may_act_on_all_axes() {
+        let held = Held { gimbals: false, temperature: None, field: true };
+        let all = formulas(SensorKind::Gyr, held, &taken);
+        let of = |text: &str| {
+            all.iter().filter(|formula| formula.terms == [[0; 3].map(|_| text.to_owned())]).count()
+        };
+        assert_eq!((of("y_z * a_y"), of("a_x"), of("a_x^2"), of("abs(B_z)")), (1, 1, 1, 1));
+        // Misalignment holds it.
+        assert_eq!(of("y_x"), 0);
     }
 
     #[test]

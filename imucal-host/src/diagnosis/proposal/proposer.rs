@@ -276,7 +276,7 @@ impl<'a, 's> Setting<'a, 's> {
             axes: axes.iter().map(|axis| XYZ[*axis].to_owned()).collect(),
             formula: formula.spelt(axes),
             parameters: tried.amounts.iter().enumerate().map(amplitude).chain(shape).collect(),
-            equivalents: found.equivalents.iter().map(|other| other.formula.spelt(axes)).collect(),
+            equivalents: equivalents(found, axes),
             gap_closed: tried.share.value,
             gap_closed_ci95: tried.share.interval,
             log_odds,
@@ -284,6 +284,17 @@ impl<'a, 's> Setting<'a, 's> {
             toml: toml.to_owned(),
         }
     }
+}
+
+/// The formulas that cannot be distinguished from the one found, each once: on one axis a component is that of the axis, too.
+fn equivalents(found: &Finalist, axes: &[usize]) -> Vec<String> {
+    let mut texts = vec![found.best.formula.spelt(axes)];
+    for text in found.equivalents.iter().map(|other| other.formula.spelt(axes)) {
+        if !texts.contains(&text) {
+            texts.push(text);
+        }
+    }
+    texts.split_off(1)
 }
 
 /// The formulas that are tried on a problem.

@@ -69,9 +69,11 @@ impl Driver {
         }
     }
 
-    /// It is this vector along the axis itself.
-    pub fn is_of_axis(&self, vector: &str) -> bool {
-        self.texts.iter().all(|text| text == vector)
+    /// Gain and misalignment hold it: it is the axis' own input, or one component of that on all axes.
+    pub fn is_in_baseline(&self) -> bool {
+        let is_component = |text: &str| text.strip_prefix("y_").is_some_and(|axis| XYZ.contains(&axis));
+        self.texts.iter().all(|text| text == "y")
+            || self.texts.iter().all(|text| *text == self.texts[0] && is_component(text))
     }
 
     /// Its product with another.
