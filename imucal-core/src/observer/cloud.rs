@@ -49,8 +49,11 @@ pub struct CloudObserver<T: Scalar, const N: usize> {
 }
 
 impl<T: Scalar, const N: usize> CloudObserver<T, N> {
-    /// Without points; slots are `apart` at least, in the unit of the samples: a few times their noise.
+    /// Without points; slots, of which there is one at least, are `apart` at least, in the unit of the samples: a few times their
+    /// noise. What is no positive distance counts as the least.
     pub fn new(apart: T) -> Self {
+        const { assert!(N > 0) };
+        let apart = if apart > T::EPSILON { apart } else { T::EPSILON };
         Self { points: Vec::new(), apart, before: [None; 2], compared: None }
     }
 
@@ -72,8 +75,8 @@ impl<T: Scalar, const N: usize> CloudObserver<T, N> {
         if is_near(&self.points, &point, self.apart) {
             return Chosen::Near;
         }
-        // Each time fewer points keep their slots, until there is one for this.
-        while self.points.is_full() {
+        // Each time fewer points keep their slots, until there is one for this, or no distance is left that is finite.
+        while self.points.is_full() && self.apart.finite() {
             self.apart *= T::of(WIDER);
             self.thin_out();
             if is_near(&self.points, &point, self.apart) {
@@ -208,6 +211,22 @@ mod tests {
         walk(3, 500).iter().for_each(|sample| {
             observer.push(sample);
         });
+        assert_eq!(observer.points().len(), 1);
+    }
+
+    #[test]
+    fn no_distance_and_points_beyond_all_numbers_end_too() {
+        for apart in [0.0, -1.0, f32::NAN] {
+            let mut observer = CloudObserver::<f32, 4>::new(apart);
+            for k in 0..200u8 {
+                observer.push(&Vector3::new(f32::from(k), 0.0, 0.0));
+            }
+            assert!((1..=4).contains(&observer.points().len()));
+        }
+        let mut observer = CloudObserver::<f32, 1>::new(1.0);
+        for far in [f32::MAX, f32::MAX, f32::MAX, -f32::MAX, -f32::MAX, -f32::MAX] {
+            observer.push(&Vector3::new(far, far, far));
+        }
         assert_eq!(observer.points().len(), 1);
     }
 }

@@ -195,14 +195,19 @@ impl<T: Scalar> RestObserver<T> {
             return ended;
         };
         now.broken |= self.interval > 0 && since > GAP.saturating_mul(self.interval);
-        self.last = sample.time;
+        let last = core::mem::replace(&mut self.last, sample.time);
         if sample.time.saturating_sub(now.start) < QUARTER {
             now.push(sample);
             return None;
         }
         now.end = sample.time;
         let whole = *now;
-        self.interval = (whole.end - whole.start) / u64::from(whole.rows.max(1));
+        // A gap before this sample is none of the intervals of the quarter.
+        if let Some(interval) =
+            last.saturating_sub(whole.start).checked_div(u64::from(whole.rows).saturating_sub(1))
+        {
+            self.interval = interval;
+        }
         let mut next = Stretch::new(sample.time);
         next.push(sample);
         self.now = Some(next);

@@ -104,6 +104,17 @@ fn a_gap_and_samples_that_are_missing_end_a_rest() {
 }
 
 #[test]
+fn each_of_two_gaps_in_succession_ends_a_rest() {
+    let mut session = Session::new(9, &[(12.0, 0.0, 0.0)]);
+    // A tenth of a second of samples lies between them.
+    session.samples.iter_mut().skip(400).for_each(|sample| sample.time += 3_000_000);
+    session.samples.iter_mut().skip(410).for_each(|sample| sample.time += 400_000);
+    let rests = session.rests();
+    assert_eq!(rests.len(), 2);
+    assert!(rests[0].end < 5_000_000 + 4_010_000 && rests[1].start > 5_000_000 + 7_400_000, "{rests:?}");
+}
+
+#[test]
 fn a_clock_that_is_set_back_ends_a_rest_and_the_next_one_begins() {
     let mut session = Session::new(6, &[(12.0, 0.0, 0.0)]);
     session.samples.iter_mut().skip(600).for_each(|sample| sample.time -= 5_500_000);
