@@ -38,15 +38,6 @@ pub fn without(
     without_effects(explained, set, &entry::effects(&text), &best.weighed.noise)
 }
 
-/// Axes of which something is known. One whose amplitude is lost in its error counts, since it may act by way of another axis:
-/// a cube of z on y seems to be a misalignment, and is not where x is a cube of y. One that hardly varies, such as one along
-/// gravity behind a soft limit, may take any amplitude, and does not count.
-fn known(amounts: &[(f64, f64)], sure: &[usize]) -> Vec<usize> {
-    let of_axis = |axis: &usize| amounts.iter().skip(*axis).step_by(3);
-    let largest = sure.iter().flat_map(of_axis).fold(0.0f64, |most, (value, _)| most.max(value.abs()));
-    (0..3).filter(|axis| of_axis(axis).all(|(_, error)| *error <= LOOSE * largest)).collect()
-}
-
 /// Likewise, of a formula as effects with fitted values.
 ///
 /// # Errors
@@ -66,6 +57,15 @@ pub fn without_effects(
     fit.doses.retain(|dose| !formula.contains(&dose.effect));
     fit.residual = scene.residual(&fit.doses)?;
     Ok(fit)
+}
+
+/// Axes of which something is known. One whose amplitude is lost in its error counts, since it may act by way of another axis:
+/// a cube of z on y seems to be a misalignment, and is not where x is a cube of y. One that hardly varies, such as one along
+/// gravity behind a soft limit, may take any amplitude, and does not count.
+fn known(amounts: &[(f64, f64)], sure: &[usize]) -> Vec<usize> {
+    let of_axis = |axis: &usize| amounts.iter().skip(*axis).step_by(3);
+    let largest = sure.iter().flat_map(of_axis).fold(0.0f64, |most, (value, _)| most.max(value.abs()));
+    (0..3).filter(|axis| of_axis(axis).all(|(_, error)| *error <= LOOSE * largest)).collect()
 }
 
 #[cfg(test)]
