@@ -13,8 +13,8 @@
 //! | stage | module | what it holds |
 //! | --- | --- | --- |
 //! | what is given | [`observation`] | rests, blocks of gyroscope samples, turns, points of a cloud |
-//! | what of it is seen as samples arrive | [`observer`] | rests and points of a cloud, in fixed memory |
 //! | what is assumed | [`model`] | residual and Jacobian rows, streamed; [`triad`], [`rotation`], [`temperature`] below it |
+//! | what is seen as samples arrive | [`observer`] | rests, turns and points of a cloud, in fixed memory |
 //! | what is found | [`solver`] | Levenberg–Marquardt and particle swarm of fixed size, each with a report |
 //! | whether to believe it | [`coverage`], [`accept`] | typed refusals with their figures |
 //! | what is kept | [`record`] | bytes with a version and a CRC |
@@ -64,9 +64,9 @@ pub mod temperature;
 
 pub mod observation;
 
-pub mod observer;
-
 pub mod model;
+
+pub mod observer;
 
 pub mod solver;
 

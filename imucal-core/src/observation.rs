@@ -115,6 +115,12 @@ impl<T: Scalar> Block<T> {
             c: self.c + next.c + self.s0.cross(&next.s0),
         }
     }
+
+    /// This block, of a duration in s, had the sensor read less by a constant rate, rad/s.
+    #[must_use]
+    pub fn less(&self, rate: &Vector3<T>, duration: T) -> Self {
+        Self { s0: self.s0 - rate * duration, s1: self.s1, c: self.c - self.s1.cross(rate) }
+    }
 }
 
 /// How long each block of a turn lasts, s.

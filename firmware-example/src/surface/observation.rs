@@ -29,6 +29,7 @@ fn blocks(sample: &Vector3<f32>) {
     reach!(observation::BlockBuilder::count(&builder));
     let (block, duration): (Block<f32>, f32) = reach!(observation::BlockBuilder::finish(&mut builder));
     reach!(observation::Block::join(&block, duration, &block, duration));
+    reach!(observation::Block::less(&block, &Vector3::repeat(0.01), duration));
     reach!(observation::Durations::get(&Durations::Each(&[duration]), 7));
     reach!(observation::Compared::get(&Compared::Every(3), 7));
     reach!(observation::Compared::get(&Compared::After(&[1, 2]), 7));

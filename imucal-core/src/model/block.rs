@@ -85,7 +85,8 @@ pub(super) fn reduce<T: Scalar>(
     block: &Block<T>,
     duration: T,
 ) -> (Vector3<T>, Vector3<T>) {
-    (block.s0 - bias * duration, (block.c - block.s1.cross(bias)) * T::of(0.5))
+    let less = block.less(bias, duration);
+    (less.s0, less.c * T::of(0.5))
 }
 
 /// Sums over a run of blocks from which the derivative by all twelve entries follows at its end.

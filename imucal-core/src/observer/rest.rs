@@ -62,6 +62,17 @@ impl<T: Scalar> Default for RestSettings<T> {
     }
 }
 
+/// What the sensor does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// It moves, or nothing is known yet.
+    Moving,
+    /// Its last second was still.
+    Still,
+    /// It has been still for long enough to be at rest.
+    Resting,
+}
+
 /// A rest that has ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObservedRest<T: Scalar> {
@@ -162,6 +173,7 @@ pub struct RestObserver<T: Scalar> {
     /// Time of the last sample and usual time between two, µs.
     last: u64,
     interval: u64,
+    quarters: u32,
     /// Variance of the quietest window so far, (m/s²)².
     quietest: Option<T>,
     /// Usual rate of the windows in which the accelerometer is still, rad/s.
@@ -179,7 +191,17 @@ impl<T: Scalar> RestObserver<T> {
     /// Before the first sample.
     pub fn new(settings: RestSettings<T>) -> Self {
         let before = [None; 3];
-        Self { settings, before, now: None, last: 0, interval: 0, quietest: None, rate: None, lasting: None }
+        Self {
+            settings,
+            before,
+            now: None,
+            last: 0,
+            interval: 0,
+            quarters: 0,
+            quietest: None,
+            rate: None,
+            lasting: None,
+        }
     }
 
     /// Takes a sample in; a rest, when this sample shows that one has ended.
@@ -222,9 +244,28 @@ impl<T: Scalar> RestObserver<T> {
         self.ended()
     }
 
-    /// The last window was still.
-    pub fn is_still(&self) -> bool {
-        self.lasting.is_some()
+    /// What the sensor does, by the last window.
+    pub fn stage(&self) -> Stage {
+        match &self.lasting {
+            None => Stage::Moving,
+            Some(lasting) if lasting.quarters < SHORTEST => Stage::Still,
+            Some(_) => Stage::Resting,
+        }
+    }
+
+    /// Quarters of a second that have ended since the start; comes round after 34 years.
+    pub fn quarters(&self) -> u32 {
+        self.quarters
+    }
+
+    /// Usual time between two samples, µs; 0 before it is known.
+    pub fn interval(&self) -> u64 {
+        self.interval
+    }
+
+    /// Usual rate at rest, rad/s; zero before the first rest.
+    pub fn rate(&self) -> Vector3<T> {
+        self.rate.unwrap_or_else(Vector3::zeros)
     }
 
     /// Variance up to which a window is still, (m/s²)²; `None` before the first window.
@@ -245,6 +286,7 @@ impl<T: Scalar> RestObserver<T> {
 
     /// Takes a whole quarter in.
     fn quarter(&mut self, whole: Stretch<T>) -> Option<ObservedRest<T>> {
+        self.quarters = self.quarters.wrapping_add(1);
         let [oldest, inner, newest] = self.before;
         self.before = [inner, newest, Some(whole)];
         let quarters = [oldest?, inner?, newest?, whole];

@@ -1,0 +1,279 @@
+//! Turns: what the gyroscope saw from inside one rest to inside the next, in a fixed number of blocks.
+//!
+//! ```text
+//! C(A, b) ≈ C_B(A, b) E        E = C_B(A₀, b₀)ᵀ C(A₀, b₀)
+//! r       = Cᵀ u_before − u_after   →   C_Bᵀ u_before − E u_after     (of the same length)
+//! ```
+//!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | C | attitude after the turn, as the product over blocks of [`FINE`] samples |
+//! | C_B | the same over B blocks, into which those were joined |
+//! | A, b | gain and bias of the gyroscope |
+//! | A₀, b₀ | the best known gain, nominal at first, and the usual rate of the rest before |
+//! | E | [`ObservedTurn::remainder`]: what joining has lost at A₀, b₀ |
+//! | u | direction of the specific force at rest, calibrated axes |
+//!
+//! Joined blocks lose the third order of their angle. At A₀ and b₀ nothing is lost, since E is exact there; near to them the
+//! loss is a share, the error of A₀, of that of the B blocks. So a fit linearises a turn at any gain, in a tenth of the memory
+//! that the blocks of its samples take. A turn that is full joins the two neighbours that lose least.
+//!
+//! A rest ends before it is seen to have ended: while it lasts, the last three quarters of a second are kept, and a turn
+//! begins with them.
+//!
+//! Source: deferred correction (Stetter 1978, Numerische Mathematik 29), of the blocks of [`crate::observation::Block`]. The
+//! error is asserted by `few_blocks_have_the_residual_of_all_samples_at_any_gain`. Not done here: g-sensitivity, which would
+//! take the specific force along.
+
+use heapless::Vec;
+use nalgebra::{Matrix3, Vector3};
+
+use super::rest::Stage;
+use crate::{
+    model::turn::attitude,
+    observation::{Block, BlockBuilder, Durations, Turn},
+    rotation::{exp, log},
+    scalar::Scalar,
+    triad::Triad,
+};
+
+/// Samples of a block before blocks are joined.
+pub const FINE: u16 = 5;
+/// Quarters of a second that are kept while a rest lasts.
+const KEPT: usize = 3;
+
+/// A turn that has ended in a rest.
+#[derive(Clone, Debug)]
+pub struct ObservedTurn<T: Scalar, const B: usize> {
+    blocks: Vec<Block<T>, B>,
+    durations: Vec<T, B>,
+    /// Rotation vector of E, rad.
+    remainder: Vector3<T>,
+}
+
+impl<T: Scalar, const B: usize> ObservedTurn<T, B> {
+    /// The turn between two directions of the specific force, unit vectors in calibrated axes.
+    pub fn between(&self, before: Vector3<T>, after: Vector3<T>) -> Turn<'_, T> {
+        let after = exp(&self.remainder) * after;
+        Turn { blocks: &self.blocks, durations: Durations::Each(&self.durations), before, after }
+    }
+
+    /// Takes a bias, rad/s, out of the rates: what is fitted afterwards is the bias that is left.
+    pub fn take_out(&mut self, bias: &Vector3<T>) {
+        for (block, duration) in self.blocks.iter_mut().zip(&self.durations) {
+            *block = block.less(bias, *duration);
+        }
+    }
+
+    /// Rotation vector that joining its blocks has lost, rad: of E.
+    pub fn remainder(&self) -> Vector3<T> {
+        self.remainder
+    }
+
+    /// How long it took, s.
+    pub fn duration(&self) -> T {
+        self.durations.iter().fold(T::zero(), |sum, duration| sum + *duration)
+    }
+}
+
+/// Blocks in succession, and the attitude after them at nominal gain.
+#[derive(Clone, Debug)]
+struct Path<T: Scalar, const B: usize> {
+    blocks: Vec<Block<T>, B>,
+    durations: Vec<T, B>,
+    attitude: Matrix3<T>,
+}
+
+impl<T: Scalar, const B: usize> Path<T, B> {
+    fn new() -> Self {
+        const { assert!(B > 1) };
+        Self { blocks: Vec::new(), durations: Vec::new(), attitude: Matrix3::identity() }
+    }
+
+    /// Goes on by a block that was turned by `attitude`.
+    fn push(&mut self, block: &Block<T>, duration: T, attitude: &Matrix3<T>) {
+        self.attitude *= attitude;
+        if self.blocks.is_full() {
+            self.join_the_least();
+        }
+        // There is room: two have become one.
+        let _ = self.blocks.push(*block);
+        let _ = self.durations.push(duration);
+    }
+
+    /// Joins the two neighbours that lose least: the square of the third order, |a × b| (|a| + |b|), to a factor.
+    fn join_the_least(&mut self) {
+        let loss = |a: &Vector3<T>, b: &Vector3<T>| {
+            a.cross(b).norm_squared() * (a.norm_squared() + b.norm_squared())
+        };
+        let pairs = self.blocks.iter().zip(self.blocks.iter().skip(1)).map(|(a, b)| loss(&a.s0, &b.s0));
+        let none = (0, T::LARGEST);
+        let (least, _) =
+            pairs.enumerate().fold(none, |least, (at, sum)| if sum < least.1 { (at, sum) } else { least });
+        let next = least.saturating_add(1);
+        if next < self.blocks.len() {
+            let (block, duration) = (self.blocks.remove(next), self.durations.remove(next));
+            if let (Some(first), Some(lasted)) = (self.blocks.get_mut(least), self.durations.get_mut(least)) {
+                *first = first.join(*lasted, &block, duration);
+                *lasted += duration;
+            }
+        }
+    }
+
+    fn turn(&self, reference: &Triad<T>) -> ObservedTurn<T, B> {
+        let (blocks, durations) = (self.blocks.clone(), self.durations.clone());
+        let mut turn = ObservedTurn { blocks, durations, remainder: Vector3::zeros() };
+        let joined = attitude(reference, &turn.between(Vector3::z(), Vector3::z()));
+        turn.remainder = log(&joined.tr_mul(&self.attitude));
+        turn
+    }
+}
+
+/// A quarter of a second at rest.
+#[derive(Clone, Copy, Debug)]
+struct Quarter<T: Scalar> {
+    block: Block<T>,
+    duration: T,
+    attitude: Matrix3<T>,
+}
+
+impl<T: Scalar> Quarter<T> {
+    fn new() -> Self {
+        let none = Vector3::zeros();
+        Self {
+            block: Block { s0: none, s1: none, c: none },
+            duration: T::zero(),
+            attitude: Matrix3::identity(),
+        }
+    }
+
+    fn push(&mut self, block: &Block<T>, duration: T, attitude: &Matrix3<T>) {
+        self.block = self.block.join(self.duration, block, duration);
+        self.duration += duration;
+        self.attitude *= attitude;
+    }
+}
+
+/// Where samples go.
+#[derive(Clone, Debug)]
+enum Way<T: Scalar, const B: usize> {
+    /// Nowhere: since the last rest something is missing, or there was none.
+    Lost,
+    /// At rest: the last quarters, the oldest first, and the one that goes on.
+    Resting([Option<Quarter<T>>; KEPT], Quarter<T>),
+    /// From a rest; with the turn up to where the sensor was first seen to be still again.
+    Turning(Path<T, B>, Option<ObservedTurn<T, B>>),
+}
+
+/// Gathers turns as samples arrive; [`super::inertial`] says when a rest goes on.
+#[derive(Clone, Debug)]
+pub struct TurnObserver<T: Scalar, const B: usize> {
+    way: Way<T, B>,
+    builder: BlockBuilder<T>,
+    /// The last rate, and half the time since the one before it, s.
+    held: Option<(Vector3<T>, T)>,
+    /// A₀ and b₀ of the turn under way.
+    reference: Triad<T>,
+}
+
+impl<T: Scalar, const B: usize> Default for TurnObserver<T, B> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Scalar, const B: usize> TurnObserver<T, B> {
+    /// Before the first rest.
+    pub fn new() -> Self {
+        Self { way: Way::Lost, builder: BlockBuilder::default(), held: None, reference: Triad::identity() }
+    }
+
+    /// Takes a rate `w_ns_s` in, rad/s, that was measured `since` s after the one before. It is held from half-way after the one
+    /// before to half-way before the next.
+    pub fn push(&mut self, rate: &Vector3<T>, since: T) {
+        if matches!(self.way, Way::Lost) {
+            return;
+        }
+        let half = since * T::of(0.5);
+        if let Some((before, earlier)) = self.held.replace((*rate, half)) {
+            self.builder.push(&before, earlier + half);
+            if self.builder.count() >= FINE {
+                self.block();
+            }
+        }
+    }
+
+    /// Something is missing: the turn under way is none. True where there was one.
+    pub fn interrupt(&mut self) -> bool {
+        let turning = matches!(self.way, Way::Turning(..));
+        self.way = Way::Lost;
+        turning
+    }
+
+    /// A quarter of a second has ended, after which the sensor is at that stage. The best known triad has a gain of any quality,
+    /// and for bias the usual rate at rest, rad/s. Gives the turn, where a rest after one was now seen to be one.
+    pub fn quarter(&mut self, stage: Stage, best: &Triad<T>) -> Option<ObservedTurn<T, B>> {
+        if self.builder.count() > 0 {
+            self.block();
+        }
+        match (&mut self.way, stage) {
+            (Way::Lost, Stage::Resting) => {
+                self.rest(best);
+                None
+            }
+            (Way::Lost, _) => None,
+            (Way::Resting(kept, now), Stage::Resting) => {
+                kept.rotate_left(1);
+                let [.., newest] = kept;
+                *newest = Some(core::mem::replace(now, Quarter::new()));
+                None
+            }
+            (Way::Resting(kept, now), _) => {
+                let mut path = Path::new();
+                for quarter in kept.iter().flatten().chain([&*now]) {
+                    path.push(&quarter.block, quarter.duration, &quarter.attitude);
+                }
+                self.way = Way::Turning(path, None);
+                None
+            }
+            (Way::Turning(_, arrived), Stage::Moving) => {
+                *arrived = None;
+                None
+            }
+            (Way::Turning(path, arrived), Stage::Still) => {
+                arrived.get_or_insert_with(|| path.turn(&self.reference));
+                None
+            }
+            (Way::Turning(path, arrived), Stage::Resting) => {
+                let turn = arrived.take().unwrap_or_else(|| path.turn(&self.reference));
+                self.rest(best);
+                Some(turn)
+            }
+        }
+    }
+
+    fn rest(&mut self, best: &Triad<T>) {
+        self.reference = *best;
+        self.way = Way::Resting([None; KEPT], Quarter::new());
+    }
+
+    /// Ends a block.
+    fn block(&mut self) {
+        let (block, duration) = self.builder.finish();
+        let alone = Turn {
+            blocks: core::slice::from_ref(&block),
+            durations: Durations::Uniform(duration),
+            before: Vector3::z(),
+            after: Vector3::z(),
+        };
+        let step = attitude(&self.reference, &alone);
+        match &mut self.way {
+            Way::Lost => {}
+            Way::Resting(_, now) => now.push(&block, duration, &step),
+            Way::Turning(path, _) => path.push(&block, duration, &step),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
