@@ -19,6 +19,7 @@ use crate::{
     triad::Triad,
 };
 
+pub mod outlier;
 mod refusal;
 
 pub use refusal::{Quantity, Refusal};

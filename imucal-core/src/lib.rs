@@ -7,7 +7,8 @@
 //! # The flow
 //!
 //! ```text
-//! observation → model → solver → accept → record → corrector
+//! observation → model → observer → solver → accept → record → fit → session
+//!                                               record → corrector
 //! ```
 //!
 //! | stage | module | what it holds |
@@ -19,6 +20,7 @@
 //! | whether to believe it | [`coverage`], [`accept`] | typed refusals with their figures |
 //! | what is kept | [`record`] | bytes with a version and a CRC |
 //! | what a fit comes to | [`fit`] | its figures, all checks in order, its part of a record |
+//! | all of it, without a host | [`session`] | what to do next, and when it is enough |
 //! | what is applied | [`corrector`] | `calibrated = gain · (raw − bias)`, sample by sample |
 //! | what is said to a host | `link`, a feature | frames and messages between a device and its host |
 //!
@@ -77,6 +79,8 @@ pub mod accept;
 pub mod record;
 
 pub mod fit;
+
+pub mod session;
 
 pub mod corrector;
 

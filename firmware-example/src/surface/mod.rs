@@ -21,6 +21,7 @@ mod model;
 mod observation;
 mod observer;
 mod record;
+mod session;
 mod solver;
 
 /// Calls them all.
@@ -31,6 +32,7 @@ pub fn reach_all() {
     model::reach_all();
     solver::reach_all();
     record::reach_all();
+    session::reach_all();
     link::reach_all();
 }
 

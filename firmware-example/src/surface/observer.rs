@@ -32,6 +32,8 @@ pub(super) fn reach_all() {
     reach!(observer::rest::RestObserver::quarters(&rests));
     reach!(observer::rest::RestObserver::interval(&rests));
     reach!(observer::rest::RestObserver::rate(&rests));
+    reach!(observer::rest::RestObserver::lasted(&rests));
+    reach!(observer::rest::RestObserver::direction(&rests));
     reach!(observer::rest::RestObserver::threshold(&rests));
     reach!(observer::rest::RestObserver::finish(&mut rests));
     let mut points: CloudObserver<f32, 16> = reach!(observer::cloud::CloudObserver::new(1.0));
@@ -54,12 +56,13 @@ fn turns() {
         for _ in 0..25 {
             reach!(observer::turn::TurnObserver::push(&mut turns, &Vector3::new(0.1f32, 0.2, 0.3), 0.01));
         }
-        if let Some(mut turn) =
+        if let Some(turn) =
             reach!(observer::turn::TurnObserver::quarter(&mut turns, stage, &Triad::identity()))
         {
-            reach!(observer::turn::ObservedTurn::take_out(&mut turn, &Vector3::repeat(0.01)));
             reach!(observer::turn::ObservedTurn::remainder(&turn));
-            reach!(observer::turn::ObservedTurn::duration(&turn));
+            reach!(observer::turn::ObservedTurn::blocks(&turn)).for_each(|block| {
+                core::hint::black_box(block);
+            });
             reach!(observer::turn::ObservedTurn::between(&turn, Vector3::x(), Vector3::y()));
         }
     }

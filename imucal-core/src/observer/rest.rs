@@ -253,6 +253,18 @@ impl<T: Scalar> RestObserver<T> {
         }
     }
 
+    /// How long the rest that goes on has lasted so far, s; 0 while it moves.
+    pub fn lasted(&self) -> T {
+        let quarters = self.lasting.as_ref().map_or(0, |lasting| lasting.quarters);
+        T::whole(quarters.into()) * T::of(QUARTER as f64 * 1e-6)
+    }
+
+    /// Mean specific force `f_s` of the last quarter while the sensor is still, m/s².
+    pub fn direction(&self) -> Option<Vector3<T>> {
+        let [.., newest] = &self.before;
+        self.lasting.as_ref().and(newest.as_ref()).map(|quarter| quarter.acc.mean())
+    }
+
     /// Quarters of a second that have ended since the start; comes round after 34 years.
     pub fn quarters(&self) -> u32 {
         self.quarters

@@ -58,21 +58,14 @@ impl<T: Scalar, const B: usize> ObservedTurn<T, B> {
         Turn { blocks: &self.blocks, durations: Durations::Each(&self.durations), before, after }
     }
 
-    /// Takes a bias, rad/s, out of the rates: what is fitted afterwards is the bias that is left.
-    pub fn take_out(&mut self, bias: &Vector3<T>) {
-        for (block, duration) in self.blocks.iter_mut().zip(&self.durations) {
-            *block = block.less(bias, *duration);
-        }
+    /// Its blocks, of rates as measured, and how long each lasted, s.
+    pub fn blocks(&self) -> impl Iterator<Item = (&Block<T>, T)> {
+        self.blocks.iter().zip(self.durations.iter().copied())
     }
 
     /// Rotation vector that joining its blocks has lost, rad: of E.
     pub fn remainder(&self) -> Vector3<T> {
         self.remainder
-    }
-
-    /// How long it took, s.
-    pub fn duration(&self) -> T {
-        self.durations.iter().fold(T::zero(), |sum, duration| sum + *duration)
     }
 }
 
@@ -111,12 +104,14 @@ impl<T: Scalar, const B: usize> Path<T, B> {
         let (least, _) =
             pairs.enumerate().fold(none, |least, (at, sum)| if sum < least.1 { (at, sum) } else { least });
         let next = least.saturating_add(1);
-        if next < self.blocks.len() {
-            let (block, duration) = (self.blocks.remove(next), self.durations.remove(next));
-            if let (Some(first), Some(lasted)) = (self.blocks.get_mut(least), self.durations.get_mut(least)) {
-                *first = first.join(*lasted, &block, duration);
-                *lasted += duration;
-            }
+        let gone = self.blocks.get(next).copied().zip(self.durations.get(next).copied());
+        if let Some((block, duration)) = gone
+            && let (Some(first), Some(lasted)) = (self.blocks.get_mut(least), self.durations.get_mut(least))
+        {
+            *first = first.join(*lasted, &block, duration);
+            *lasted += duration;
+            close(&mut self.blocks, next);
+            close(&mut self.durations, next);
         }
     }
 
@@ -127,6 +122,17 @@ impl<T: Scalar, const B: usize> Path<T, B> {
         turn.remainder = log(&joined.tr_mul(&self.attitude));
         turn
     }
+}
+
+/// Takes a value out of a list, where there is one. (The list's own way panics where there is none.)
+fn close<V: Copy, const N: usize>(list: &mut Vec<V, N>, mut at: usize) {
+    while let Some(next) = list.get(at.saturating_add(1)).copied() {
+        if let Some(slot) = list.get_mut(at) {
+            *slot = next;
+        }
+        at = at.saturating_add(1);
+    }
+    list.pop();
 }
 
 /// A quarter of a second at rest.

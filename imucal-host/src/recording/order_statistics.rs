@@ -1,7 +1,7 @@
 //! Medians and means without the largest, which a few jolts or steps do not move, and what they are of normal numbers.
 
-/// Median of |x| of normal numbers, over σ: Φ⁻¹(3/4).
-pub const MEDIAN_SIZE: f64 = 0.674_489_750_196_081_7;
+pub use imucal_core::accept::outlier::MEDIAN_SIZE;
+
 /// Median of x², over σ².
 pub const MEDIAN_SQUARE: f64 = MEDIAN_SIZE * MEDIAN_SIZE;
 /// Mean of those x² that lie below their ninth decile, over σ².

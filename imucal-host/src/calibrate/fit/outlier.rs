@@ -1,17 +1,10 @@
 //! Gross outliers: left out by name, never down-weighted.
 //!
-//! An observation is left out where its residual exceeds [`GROSS`] times the robust spread (1.4826 · median of the
-//! absolute values). Ordinary noise does not reach that in a lifetime; a knock on the table or a magnet does. Where
-//! more than [`MOST`] would go, none goes: then the model is wrong, not the data.
+//! The rule is the core's ([`imucal_core::accept::outlier`]), here for many observations and in rounds.
+
+pub use imucal_core::accept::outlier::{GROSS, LEAST, MOST};
 
 use crate::recording::order_statistics::std_of_median;
-
-/// Robust standard deviations beyond which an observation is left out.
-pub const GROSS: f64 = 7.0;
-/// Largest share of observations left out.
-pub const MOST: f64 = 0.1;
-/// Fewer observations have no spread to speak of.
-const LEAST: usize = 12;
 
 /// A fit without its outliers.
 #[derive(Clone, Debug)]

@@ -7,6 +7,7 @@ use imucal_core::{
     coverage::Coverage,
     model::{parameterisation::FULL_GAIN, turn::TurnModel},
     observation::{Rest, Turn},
+    session::bias::{MeanRate, RestBias},
     solver::LevenbergMarquardt,
     triad::Triad,
 };
@@ -48,8 +49,6 @@ pub const MODEL: &str = "K9";
 const LEAST_TURNS: usize = 8;
 /// A turn counts once a direction moves by this much, rad (15°).
 const LEAST_ANGLE: f64 = 0.26;
-/// The bias wanders where the rests' means spread this many times wider than their own noise explains.
-const WANDER: f64 = 1.5;
 /// How far a swarm looks, each entry of the gain to either side of nominal: as far as a gain is plausible below it.
 const REACH: f64 = 0.5;
 
@@ -136,15 +135,21 @@ impl GyrInput<'_> {
 
 /// Mean rate at rest, and how it moved from rest to rest.
 fn wander(rests: &[Rest<f64>], means: &[Vector3<f64>]) -> (Vector3<f64>, BiasWander) {
-    let bias = rest_bias::mean(rests, means);
-    let count = rests.len().max(2) as f64;
-    let spread = means.iter().map(|m| (m - bias).map(|d| d * d)).sum::<Vector3<f64>>() / (count - 1.0);
-    let noise =
-        rests.iter().map(|r| r.gyr.variance() / f64::from(r.gyr.count().max(1))).sum::<Vector3<f64>>()
-            / count;
-    let (spread, expected) = (spread.map(f64::sqrt), noise.map(f64::sqrt));
-    let interpolated = (0..3).any(|axis| spread[axis] > WANDER * expected[axis]);
-    (bias, BiasWander { spread, expected, interpolated })
+    let rates = rests.iter().zip(means).map(|(rest, mean)| MeanRate {
+        mean: *mean,
+        variance: rest.gyr.variance() / f64::from(rest.gyr.count().max(1)),
+        count: rest.gyr.count(),
+    });
+
+    let unknown = Vector3::repeat(f64::NAN);
+    let bias = RestBias::of(rates).unwrap_or(RestBias {
+        mean: unknown,
+        spread: unknown,
+        expected: unknown,
+        rests: 0,
+    });
+    let (spread, expected) = (bias.spread, bias.expected);
+    (bias.mean, BiasWander { spread, expected, interpolated: bias.wanders() })
 }
 
 /// From the nominal gain; a swarm looks at the shortest turns.

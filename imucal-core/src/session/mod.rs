@@ -1,0 +1,235 @@
+//! A calibration session: raw samples in, a record out, with nobody else's help.
+//!
+//! ```text
+//! sample → observers → poses and points → fit → verdict → what to do next
+//! ```
+//!
+//! | file | what |
+//! | --- | --- |
+//! | [`poses`] | what is kept of rests and turns |
+//! | [`bias`] | the gyroscope's bias, and whether it wanders |
+//! | `evidence` | rows of the fits, from what is kept |
+//! | [`estimate`] | a sensor's triad, its errors and its verdict |
+//! | `fitting`, `judgement` | fits by slices, outliers; errors and verdicts |
+//! | [`design`] | which pose says most |
+//! | [`guide`] | what to do next, how sure each sensor is, what was thrown away |
+//! | [`store`] | whether a new record takes the place of the stored one |
+//!
+//! A session is plain data of fixed size. [`Session::push`] takes a sample and costs a few hundred instructions;
+//! [`Session::work`] does one slice of a fit, and is called whenever there is time. All is in `f32`, and to the same bits on a host.
+//!
+//! Not done here: the record's write to flash, the units of raw samples (nominal SI comes in), the rotation of the
+//! magnetometer's axes into the accelerometer's, and g-sensitivity.
+
+pub mod bias;
+pub mod design;
+pub mod estimate;
+mod evidence;
+mod fitting;
+pub mod guide;
+mod judgement;
+pub mod poses;
+pub mod store;
+
+use nalgebra::Vector3;
+
+use crate::{
+    observation::Moments,
+    observer::{
+        Sample,
+        cloud::{Chosen, CloudObserver},
+        inertial::{InertialObserver, Seen},
+        rest::{RestSettings, Stage},
+        turn::ObservedTurn,
+    },
+    record::Sensor,
+};
+use design::Scores;
+use estimate::Estimate;
+use fitting::Fit;
+use guide::Thrown;
+use poses::Poses;
+
+/// What a session is told before it begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SessionSettings {
+    /// Local gravity, m/s².
+    pub gravity: f32,
+    /// Length of the field, µT, where it is known.
+    pub field: Option<f32>,
+    /// Error of a calibrated vector at which a sensor is done, as a share of its length: accelerometer, gyroscope, magnetometer.
+    /// Zero: the sensor is not asked for.
+    pub target: [f32; 3],
+    /// Values beyond which a sensor clips, nominal SI, in the same order.
+    pub full_scale: [f32; 3],
+    /// How long a pose is to be held, s.
+    pub hold: f32,
+    /// Distance of the points of a cloud at first, µT: a few times the magnetometer's noise.
+    pub apart: f32,
+    /// When something is still.
+    pub rest: RestSettings<f32>,
+}
+
+impl Default for SessionSettings {
+    fn default() -> Self {
+        Self {
+            gravity: 9.80665,
+            field: None,
+            target: [1e-3, 3e-3, 1e-2],
+            full_scale: [f32::INFINITY; 3],
+            hold: 2.0,
+            apart: 2.0,
+            rest: RestSettings::default(),
+        }
+    }
+}
+
+/// A session under way: `N` poses, at most 64, their turns of `B` blocks, and `M` points of a cloud, at most 64.
+#[derive(Clone, Debug)]
+pub struct Session<const N: usize, const B: usize, const M: usize> {
+    settings: SessionSettings,
+    observer: InertialObserver<f32, B>,
+    cloud: CloudObserver<f32, M>,
+    /// The field while a rest goes on.
+    field: Moments<f32>,
+    poses: Poses<N, B>,
+    /// A turn to the rest that goes on.
+    pending: Option<ObservedTurn<f32, B>>,
+    fit: Option<Fit>,
+    /// Sensors whose observations have changed since their last fit.
+    due: [bool; 3],
+    /// Points since the cloud's last fit.
+    new_points: u8,
+    estimates: [Option<Estimate>; 3],
+    /// Scores of the poses that might be next, as of the last fits.
+    scores: [Scores; 2],
+    thrown: Thrown,
+}
+
+/// New points of a cloud after which it is fitted again.
+const POINTS_A_FIT: u8 = 8;
+
+impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
+    /// Before the first sample.
+    pub fn new(settings: SessionSettings) -> Self {
+        const { assert!(M <= 64) };
+        Self {
+            settings,
+            observer: InertialObserver::new(settings.rest),
+            cloud: CloudObserver::new(settings.apart),
+            field: Moments::default(),
+            poses: Poses::default(),
+            pending: None,
+            fit: None,
+            due: [false; 3],
+            new_points: 0,
+            estimates: [None; 3],
+            scores: [Scores::NONE; 2],
+            thrown: Thrown::default(),
+        }
+    }
+
+    /// Takes a sample in: nominal SI, sensor axes.
+    pub fn push(&mut self, sample: &Sample<f32>) {
+        let sample = self.within_range(sample);
+        match self.observer.push(&sample) {
+            Seen::Nothing => {}
+            Seen::Rest(rest) => self.keep(&rest),
+            Seen::NoRest => {
+                self.thrown.rests = self.thrown.rests.saturating_add(1);
+                // It was a rest for the turn that led to it.
+                if self.pending.take().is_some() {
+                    self.poses.break_off();
+                }
+                self.field = Moments::default();
+            }
+            Seen::Turn(turn) => self.pending = Some(turn),
+        }
+    }
+
+    /// Takes a sample of the magnetometer in, nominal, µT, whenever it has one.
+    pub fn push_field(&mut self, field: &Vector3<f32>) {
+        if !field.iter().all(|component| component.is_finite()) || beyond(field, self.settings.full_scale[2])
+        {
+            self.thrown.clipped = self.thrown.clipped.saturating_add(1);
+            return;
+        }
+        if self.observer.rests().stage() != Stage::Moving {
+            self.field.push(field);
+        }
+        if self.cloud.push(field) == Chosen::New {
+            self.new_points = self.new_points.saturating_add(1);
+            if self.new_points >= POINTS_A_FIT {
+                self.mark(Sensor::Magnetometer);
+            }
+        }
+    }
+
+    /// No more samples come: what goes on ends, and what has changed is fitted.
+    pub fn finish(&mut self) {
+        if let Some(rest) = self.observer.finish() {
+            self.keep(&rest);
+        }
+        if self.new_points > 0 {
+            self.mark(Sensor::Magnetometer);
+        }
+    }
+
+    /// What is known of a sensor so far.
+    pub fn estimate(&self, sensor: Sensor) -> Option<&Estimate> {
+        self.estimates.get(sensor as usize)?.as_ref()
+    }
+
+    /// Rests and turns so far.
+    pub fn poses(&self) -> &Poses<N, B> {
+        &self.poses
+    }
+
+    /// Points of the magnetometer's cloud so far.
+    pub fn points(&self) -> &[Vector3<f32>] {
+        self.cloud.points()
+    }
+
+    /// What is beyond a sensor's range is not what was measured.
+    fn within_range(&mut self, sample: &Sample<f32>) -> Sample<f32> {
+        let mut sample = *sample;
+        let [acc, gyr, _] = self.settings.full_scale;
+        let missing = Vector3::repeat(f32::NAN);
+        if beyond(&sample.acc, acc) {
+            sample.acc = missing;
+            self.thrown.clipped = self.thrown.clipped.saturating_add(1);
+        }
+        if sample.gyr.is_some_and(|rate| beyond(&rate, gyr)) {
+            sample.gyr = Some(missing);
+            self.thrown.clipped = self.thrown.clipped.saturating_add(1);
+            self.observer.interrupt();
+        }
+        sample
+    }
+
+    /// A rest has ended.
+    fn keep(&mut self, rest: &crate::observer::rest::ObservedRest<f32>) {
+        let field = core::mem::take(&mut self.field);
+        let field = (field.count() > 0).then(|| field.mean());
+        let turn = self.pending.take();
+        self.poses.push(rest, field, turn.as_ref());
+        let most = self.observer.rests().threshold().unwrap_or(f32::INFINITY);
+        let noisy = self.poses.retain_quieter(most);
+        self.thrown.rests = self.thrown.rests.saturating_add(u16::try_from(noisy).unwrap_or(u16::MAX));
+        self.mark(Sensor::Accelerometer);
+    }
+
+    fn mark(&mut self, sensor: Sensor) {
+        if let Some(due) = self.due.get_mut(sensor as usize) {
+            *due = true;
+        }
+    }
+}
+
+/// Any component reaches the end of the range.
+fn beyond(value: &Vector3<f32>, full_scale: f32) -> bool {
+    value.iter().any(|component| libm::fabsf(*component) >= full_scale)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,191 @@
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::*;
+use crate::{session::guide::Advice, triad::Triad};
+
+type Held = Session<38, 4, 64>;
+
+/// A hand that follows the guide: one sensor of known triads, at 100 Hz.
+struct Hand {
+    random: ChaCha8Rng,
+    truth: [Triad<f64>; 3],
+    /// From the sensor's axes to the local ones.
+    c_n_s: Rotation3<f64>,
+    time: u64,
+}
+
+const FORCE: Vector3<f64> = Vector3::new(0.0, 0.0, -9.80665);
+const FIELD: Vector3<f64> = Vector3::new(20.0, 2.0, 44.0);
+const STEP: f64 = 0.01;
+
+impl Hand {
+    fn new(seed: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = |size: f64| (random.random::<f64>() - 0.5) * 2.0 * size;
+        let mut upper = |bias: f64| Triad {
+            gain: Matrix3::new(
+                1.0 + draw(0.03),
+                draw(0.02),
+                draw(0.02),
+                0.0,
+                1.0 + draw(0.03),
+                draw(0.02),
+                0.0,
+                0.0,
+                1.0 + draw(0.03),
+            ),
+            bias: Vector3::new(draw(bias), draw(bias), draw(bias)),
+        };
+        let [acc, mut gyr, mag] = [0.3, 0.05, 20.0].map(&mut upper);
+        let turned = Rotation3::new(Vector3::new(draw(0.02), draw(0.02), draw(0.02)));
+        gyr.gain = turned.into_inner() * gyr.gain;
+        Self { random, truth: [acc, gyr, mag], c_n_s: Rotation3::identity(), time: 0 }
+    }
+
+    fn normals(&mut self, size: f64) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| {
+            let (a, b) = (self.random.random::<f64>(), self.random.random::<f64>());
+            size * (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+        })
+    }
+
+    fn sample(&mut self, session: &mut Held, rate: &Vector3<f64>) {
+        let noise = [0.01, 0.002, 0.3].map(|size| self.normals(size));
+        let at = self.c_n_s.inverse();
+        let true_values = [at * FORCE, *rate, at * FIELD];
+        let raw = |k: usize| (self.truth[k].predict(&true_values[k]).expect("regular") + noise[k]).cast();
+        session.push(&Sample { time: self.time, acc: raw(0), gyr: Some(raw(1)), temperature: None });
+        session.push_field(&raw(2));
+        self.time += 10_000;
+    }
+
+    fn rest(&mut self, session: &mut Held, seconds: f64) {
+        for _ in 0..(seconds / STEP) as usize {
+            self.sample(session, &Vector3::zeros());
+        }
+        while session.work() {}
+    }
+
+    /// Turns within two seconds, about an axis that wanders somewhat.
+    fn turn(&mut self, session: &mut Held, turn: &Vector3<f64>) {
+        let wobble = self.normals(0.15);
+        for k in 0..200 {
+            let share = f64::from(k) / 200.0;
+            let speed = 0.5 * (1.0 - (std::f64::consts::TAU * share).cos());
+            let rate = turn * speed + wobble * (2.0 * std::f64::consts::TAU * share).sin();
+            self.sample(session, &rate);
+            self.c_n_s *= Rotation3::new(rate * STEP);
+        }
+    }
+
+    /// Brings the specific force to a direction of the sensor's axes, and holds still.
+    fn pose(&mut self, session: &mut Held, to: &Vector3<f32>) {
+        let from = (self.c_n_s.inverse() * FORCE).normalize();
+        let by = Rotation3::rotation_between(&to.cast(), &from)
+            .unwrap_or_else(|| Rotation3::new(from.cross(&Vector3::new(0.3, 0.5, 0.8)).normalize() * 3.1));
+        self.turn(session, &by.scaled_axis());
+        self.rest(session, 3.0);
+    }
+
+    /// Does as the guide says; the poses it took.
+    fn follow(&mut self, session: &mut Held, most: usize) -> usize {
+        self.rest(session, 5.0);
+        for pose in 1..most {
+            match session.guide().advice {
+                Advice::Enough => return pose,
+                Advice::Turn(to) => self.pose(session, &to),
+                Advice::TurnAbout(to) => {
+                    let from = (self.c_n_s.inverse() * FIELD).normalize();
+                    let by = Rotation3::rotation_between(&to.cast(), &from).expect("not opposite");
+                    self.turn(session, &by.scaled_axis());
+                }
+                Advice::HoldStill | Advice::HoldOn => self.rest(session, 1.0),
+            }
+        }
+        most
+    }
+}
+
+/// Differences of an estimate from the truth, in standard errors.
+fn standardised(estimate: &Estimate, truth: &Triad<f64>) -> std::vec::Vec<f64> {
+    let pairs = |own: &[f32], std: &[f32], truth: &[f64]| {
+        let each = own.iter().zip(std).zip(truth).filter(|((_, std), _)| **std > 0.0);
+        each.map(|((own, std), truth)| (f64::from(*own) - truth) / f64::from(*std))
+            .collect::<std::vec::Vec<_>>()
+    };
+    let mut all = pairs(estimate.triad.gain.as_slice(), estimate.std.gain.as_slice(), truth.gain.as_slice());
+    all.extend(pairs(estimate.triad.bias.as_slice(), estimate.std.bias.as_slice(), truth.bias.as_slice()));
+    all
+}
+
+#[test]
+fn a_hand_that_follows_the_guide_ends_with_three_accepted_sensors_as_sure_as_asked() {
+    let mut all: [std::vec::Vec<f64>; 2] = Default::default();
+    for seed in 0..100 {
+        let mut session = Held::new(SessionSettings::default());
+        let mut hand = Hand::new(seed);
+        assert!(hand.follow(&mut session, 60) < 60, "seed {seed}: {:?}", session.guide());
+        for (k, sensor) in Sensor::ALL.into_iter().enumerate() {
+            let estimate = session.estimate(sensor).expect("an estimate");
+            assert_eq!(estimate.verdict, Ok(()), "seed {seed}, {sensor:?}");
+            assert!(estimate.error <= SessionSettings::default().target[k]);
+            // The magnetometer's gauge is its own: a field of unknown length.
+            if let Some(errors) = all.get_mut(k) {
+                errors.extend(standardised(estimate, &hand.truth[k]));
+            }
+        }
+    }
+    for (sensor, errors) in Sensor::ALL.into_iter().zip(&all) {
+        let within = errors.iter().filter(|error| error.abs() < 1.96).count() as f64 / errors.len() as f64;
+        std::println!("{sensor:?}: {:.1} % of {} within", 100.0 * within, errors.len());
+        assert!((0.93..0.98).contains(&within), "{sensor:?}: {within}");
+    }
+}
+
+#[test]
+fn a_session_takes_less_than_twelve_kilobytes() {
+    let size = size_of::<Held>();
+    assert!(size < 12 * 1024, "{size}");
+}
+
+#[test]
+fn a_session_that_is_kept_and_gone_on_with_ends_with_the_same_bits() {
+    let (mut session, mut hand) = (Held::new(SessionSettings::default()), Hand::new(7));
+    hand.follow(&mut session, 60);
+    let (mut again, mut hand) = (Held::new(SessionSettings::default()), Hand::new(7));
+    hand.follow(&mut again, 6);
+    let mut kept = again.clone();
+    let mut hand_of_kept = Hand { random: hand.random.clone(), ..hand };
+    hand_of_kept.pose(&mut kept, &Vector3::x());
+    hand.pose(&mut again, &Vector3::x());
+    assert_eq!(kept.guide(), again.guide());
+}
+
+#[test]
+fn a_clipped_turn_is_thrown_away_and_said() {
+    let settings = SessionSettings { full_scale: [160.0, 1.0, 1e4], ..Default::default() };
+    let (mut session, mut hand) = (Held::new(settings), Hand::new(3));
+    hand.rest(&mut session, 5.0);
+    hand.pose(&mut session, &Vector3::x());
+    hand.turn(&mut session, &(Vector3::z() * 3.0));
+    let thrown = session.guide().thrown;
+    assert!(thrown.clipped > 0 && thrown.turns > 0, "{thrown:?}");
+}
+
+#[test]
+fn a_vehicle_s_vibration_is_never_still_and_nothing_is_estimated() {
+    let (mut session, mut hand) = (Held::new(SessionSettings::default()), Hand::new(4));
+    for _ in 0..3000 {
+        let shaken = hand.normals(3.0).cast();
+        let acc = Vector3::new(0.0, 0.0, -9.8) + shaken;
+        session.push(&Sample { time: hand.time, acc, gyr: Some(Vector3::zeros()), temperature: None });
+        hand.time += 10_000;
+    }
+    session.finish();
+    while session.work() {}
+    let guide = session.guide();
+    assert!(guide.never_still && guide.advice == Advice::HoldStill, "{guide:?}");
+    assert!(Sensor::ALL.iter().all(|sensor| session.estimate(*sensor).is_none()));
+}
