@@ -41,7 +41,9 @@ pub(super) fn reach_all() {
         let point = scene::spiral(k, 40) * 50.0;
         reach!(observer::cloud::CloudObserver::push(&mut points, &point));
     }
-    reach!(observer::cloud::CloudObserver::points(&points));
+    for slot in reach!(observer::cloud::CloudObserver::slots(&points)) {
+        reach!(observer::cloud::Slot::on_shell(slot, 50.0));
+    }
     reach!(observer::cloud::CloudObserver::apart(&points));
     turns();
     inertial();

@@ -1,30 +1,35 @@
 //! Points of a cloud, chosen by distance: what a magnetometer shows while it is turned about, in a fixed number of slots.
 //!
 //! ```text
-//! x̃_k = median(x_{k−2}, x_{k−1}, x_k)       a slot for x̃ if |x̃ − s| ≥ d for every slot s;   d ← 1.25 d when all are full
+//! a slot for x if |x − s| ≥ d for every slot s;    d ← 1.25 d when all are full
+//! s ← mean of the x with |x − s| < d/4             e = −Σ|x − s|² / (2 n F)
 //! ```
 //!
 //! | symbol | meaning |
 //! | --- | --- |
-//! | x̃ | median of three samples in succession, axis by axis: a spike of one sample is no point |
-//! | s | a point that has a slot |
-//! | d | [`CloudObserver::apart`]: slots are at least so far apart |
+//! | x | a sample that is no spike: further from both its neighbours than three times their distance and d |
+//! | s, n | mean of a slot's points, and how many they are |
+//! | d | [`CloudObserver::apart`]: slots begin at least so far apart |
+//! | e | distance of the mean outside the shell of radius F, on which its points lie: it lies inside |
 //!
-//! Where all slots are full, points that are nearer than the larger d to an earlier one lose theirs. So the points are spread
-//! over all that has been seen, whatever the order and however long a direction was looked at.
+//! Where all slots are full, those that are nearer than the larger d to an earlier one go. So slots are spread over all that has
+//! been seen, whatever the order and however long a direction was looked at; and what was looked at for long is a mean.
 //!
-//! Source: Charikar, Chekuri, Feder and Motwani (1997), of the doubling algorithm for k centres. Not done here: means of many
-//! samples; a fit weighs each point alone.
+//! Source: Charikar, Chekuri, Feder and Motwani (1997), of the doubling algorithm for k centres.
 
 use heapless::Vec;
 use nalgebra::Vector3;
 
-use crate::scalar::Scalar;
+use crate::{observation::ShellPoint, scalar::Scalar};
 
 /// By what slots are further apart once all are full.
 const WIDER: f64 = 1.25;
-/// A sample nearer than this share of d to the last one that was looked at is not looked at.
-const SKIPPED: f64 = 0.25;
+/// A point within this share of d of a slot's mean belongs to it; a sample within it of the last one that was compared with the
+/// slots is not compared again.
+const NEAR: f64 = 0.25;
+
+/// A sample is a spike where it is so many times as far from both its neighbours as they are from one another.
+const SPIKE: f64 = 3.0;
 
 /// What became of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,28 +38,61 @@ pub enum Chosen {
     New,
     /// It is near to a point that has one, or to the sample before.
     Near,
-    /// It is not finite, or the first two samples are not there yet.
+    /// It is not finite, the first one, or a spike; each is looked at once the next has come.
     Unusable,
+}
+
+/// Points in one place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slot<T: Scalar> {
+    /// Their mean, in the unit of the samples.
+    pub mean: Vector3<T>,
+    /// How many there are; counted up to the largest number.
+    pub count: u16,
+    /// Sum of their squared distances from the mean.
+    squares: T,
+}
+
+impl<T: Scalar> Slot<T> {
+    fn new(point: &Vector3<T>) -> Self {
+        Self { mean: *point, count: 1, squares: T::zero() }
+    }
+
+    fn push(&mut self, point: &Vector3<T>) {
+        if self.count == u16::MAX {
+            return;
+        }
+        self.count += 1;
+        let before = point - self.mean;
+        self.mean += before / T::whole(self.count.into());
+        self.squares += before.dot(&(point - self.mean));
+    }
+
+    /// As a point of a shell of some radius, in the unit of the samples: the mean of points on a sphere lies inside it.
+    pub fn on_shell(&self, radius: T) -> ShellPoint<T> {
+        let spread = self.squares / T::whole(self.count.into());
+        ShellPoint { value: self.mean, excess: -spread / (radius + radius) }
+    }
 }
 
 /// Chooses points of a cloud as samples arrive.
 #[derive(Clone, Debug)]
 pub struct CloudObserver<T: Scalar, const N: usize> {
-    points: Vec<Vector3<T>, N>,
+    slots: Vec<Slot<T>, N>,
     apart: T,
     /// The two samples before, the older first.
     before: [Option<Vector3<T>>; 2],
-    /// The last median that was compared with the slots.
-    compared: Option<Vector3<T>>,
+    /// The last sample that was compared with the slots, and the slot that it belongs to.
+    compared: Option<(Vector3<T>, Option<u8>)>,
 }
 
 impl<T: Scalar, const N: usize> CloudObserver<T, N> {
     /// Without points; slots, of which there is one at least, are `apart` at least, in the unit of the samples: a few times their
     /// noise. What is no positive distance counts as the least.
     pub fn new(apart: T) -> Self {
-        const { assert!(N > 0) };
+        const { assert!(N > 0 && N <= 256) };
         let apart = if apart > T::EPSILON { apart } else { T::EPSILON };
-        Self { points: Vec::new(), apart, before: [None; 2], compared: None }
+        Self { slots: Vec::new(), apart, before: [None; 2], compared: None }
     }
 
     /// Takes a sample in.
@@ -65,69 +103,87 @@ impl<T: Scalar, const N: usize> CloudObserver<T, N> {
         }
         let [older, newer] = self.before;
         self.before = [newer, Some(*sample)];
-        let (Some(older), Some(newer)) = (older, newer) else { return Chosen::Unusable };
-        let point = median(&older, &newer, sample);
-        let skipped = self.apart * T::of(SKIPPED);
-        if self.compared.is_some_and(|last| (point - last).norm_squared() < skipped * skipped) {
+        let Some(newer) = newer else { return Chosen::Unusable };
+        if older.is_some_and(|older| self.is_spike(&older, &newer, sample)) {
+            return Chosen::Unusable;
+        }
+        self.take(&newer)
+    }
+
+    /// A sample is far from both its neighbours, which are near to one another.
+    fn is_spike(&self, before: &Vector3<T>, sample: &Vector3<T>, after: &Vector3<T>) -> bool {
+        let apart = (after - before).norm_squared() * T::of(SPIKE * SPIKE);
+        let least = if apart > self.apart * self.apart { apart } else { self.apart * self.apart };
+        (sample - before).norm_squared() > least && (sample - after).norm_squared() > least
+    }
+
+    fn take(&mut self, point: &Vector3<T>) -> Chosen {
+        let within = self.apart * T::of(NEAR);
+        let near = |other: &Vector3<T>| (point - other).norm_squared() < within * within;
+        if let Some((last, at)) = &self.compared
+            && near(last)
+        {
+            let slot = at.and_then(|at| self.slots.get_mut(usize::from(at)));
+            if let Some(slot) = slot.filter(|slot| near(&slot.mean)) {
+                slot.push(point);
+            }
             return Chosen::Near;
         }
-        self.compared = Some(point);
-        if is_near(&self.points, &point, self.apart) {
+        let at = self.slots.iter().position(|slot| near(&slot.mean));
+        self.compared = Some((*point, at.and_then(|at| u8::try_from(at).ok())));
+        if let Some(slot) = at.and_then(|at| self.slots.get_mut(at)) {
+            slot.push(point);
             return Chosen::Near;
         }
-        // Each time fewer points keep their slots, until there is one for this, or no distance is left that is finite.
-        while self.points.is_full() && self.apart.finite() {
+        self.begin(point)
+    }
+
+    /// A slot for a point, if it is far enough from all.
+    fn begin(&mut self, point: &Vector3<T>) -> Chosen {
+        if is_near(&self.slots, point, self.apart) {
+            return Chosen::Near;
+        }
+        // Each time fewer slots stay, until there is one for this, or no distance is left that is finite.
+        while self.slots.is_full() && self.apart.finite() {
             self.apart *= T::of(WIDER);
             self.thin_out();
-            if is_near(&self.points, &point, self.apart) {
+            if is_near(&self.slots, point, self.apart) {
                 return Chosen::Near;
             }
         }
-        match self.points.push(point) {
+        self.compared = Some((*point, u8::try_from(self.slots.len()).ok()));
+        match self.slots.push(Slot::new(point)) {
             Ok(()) => Chosen::New,
             Err(_) => Chosen::Near,
         }
     }
 
-    /// The points, in the order of their coming.
-    pub fn points(&self) -> &[Vector3<T>] {
-        &self.points
+    /// The slots, in the order of their coming.
+    pub fn slots(&self) -> &[Slot<T>] {
+        &self.slots
     }
 
-    /// Slots are at least so far apart, in the unit of the samples.
+    /// Slots begin at least so far apart, in the unit of the samples.
     pub fn apart(&self) -> T {
         self.apart
     }
 
-    /// Points that are near to an earlier one lose their slots.
+    /// Slots that are near to an earlier one go.
     fn thin_out(&mut self) {
         let mut kept = Vec::new();
-        for point in &self.points {
-            if !is_near(&kept, point, self.apart) {
+        for slot in &self.slots {
+            if !is_near(&kept, &slot.mean, self.apart) {
                 // As many fit as there were.
-                let _ = kept.push(*point);
+                let _ = kept.push(*slot);
             }
         }
-        self.points = kept;
+        self.slots = kept;
     }
 }
 
-fn is_near<T: Scalar>(points: &[Vector3<T>], point: &Vector3<T>, apart: T) -> bool {
+fn is_near<T: Scalar>(slots: &[Slot<T>], point: &Vector3<T>, apart: T) -> bool {
     let near = apart * apart;
-    points.iter().any(|other| (other - point).norm_squared() < near)
-}
-
-/// Axis by axis.
-fn median<T: Scalar>(a: &Vector3<T>, b: &Vector3<T>, c: &Vector3<T>) -> Vector3<T> {
-    let middle = |a: T, b: T, c: T| {
-        let (low, high) = if a < b { (a, b) } else { (b, a) };
-        match c {
-            c if c < low => low,
-            c if c > high => high,
-            c => c,
-        }
-    };
-    Vector3::new(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z))
+    slots.iter().any(|slot| (slot.mean - point).norm_squared() < near)
 }
 
 #[cfg(test)]
@@ -173,12 +229,12 @@ mod tests {
                         .into_iter(),
                 )
             };
-            let (chosen, all) = (of(observer.points()), of(&samples));
-            assert!(observer.points().len() > 24, "{}", observer.points().len());
+            let means: std::vec::Vec<_> = observer.slots().iter().map(|slot| slot.mean).collect();
+            let (chosen, all) = (of(&means), of(&samples));
+            assert!(means.len() > 24, "{}", means.len());
             assert!(chosen.share > 0.97 * all.share, "{} of {}", chosen.share, all.share);
-            let apart = |a: usize, b: usize| (observer.points()[a] - observer.points()[b]).norm();
-            let count = observer.points().len();
-            assert!((0..count).all(|a| (0..a).all(|b| apart(a, b) >= observer.apart())));
+            let apart = |a: usize, b: usize| (means[a] - means[b]).norm();
+            assert!((0..means.len()).all(|a| (0..a).all(|b| apart(a, b) >= 0.5 * observer.apart())));
         }
     }
 
@@ -187,8 +243,9 @@ mod tests {
         let mut observer = CloudObserver::<f32, 8>::new(2.0);
         let still = Vector3::new(20.0, 3.0, -40.0);
         let chosen: std::vec::Vec<_> = (0..1000).map(|_| observer.push(&still)).collect();
-        assert_eq!(chosen[..4], [Chosen::Unusable, Chosen::Unusable, Chosen::New, Chosen::Near]);
-        assert_eq!(observer.points(), [still]);
+        assert_eq!(chosen[..3], [Chosen::Unusable, Chosen::New, Chosen::Near]);
+        assert_eq!((observer.slots().len(), observer.slots()[0].mean), (1, still));
+        assert_eq!(observer.slots()[0].count, 999);
     }
 
     #[test]
@@ -202,7 +259,20 @@ mod tests {
                 assert_eq!(observer.push(&Vector3::new(1.0, f64::NAN, 2.0)), Chosen::Unusable);
             }
         }
-        assert!(observer.points().iter().all(|point| (point - HARD_IRON).norm() < 52.0));
+        assert!(observer.slots().iter().all(|slot| (slot.mean - HARD_IRON).norm() < 52.0));
+    }
+
+    #[test]
+    fn the_mean_of_points_on_a_sphere_is_corrected_to_lie_on_it() {
+        let mut slot = Slot::new(&Vector3::new(50.0, 0.0, 0.0));
+        for k in 0..400 {
+            let (along, around) = (0.1 * f64::from(k % 20) / 20.0, 2.4 * f64::from(k));
+            let tangent = Vector3::new(0.0, around.cos(), around.sin()) * along.sin();
+            slot.push(&((Vector3::x() * along.cos() + tangent) * 50.0));
+        }
+        let point = slot.on_shell(50.0);
+        assert!(50.0 - point.value.norm() > 0.05, "{}", point.value.norm());
+        assert!((point.value.norm() - 50.0 - point.excess).abs() < 2e-3, "{point:?}");
     }
 
     #[test]
@@ -211,7 +281,7 @@ mod tests {
         walk(3, 500).iter().for_each(|sample| {
             observer.push(sample);
         });
-        assert_eq!(observer.points().len(), 1);
+        assert_eq!(observer.slots().len(), 1);
     }
 
     #[test]
@@ -221,12 +291,12 @@ mod tests {
             for k in 0..200u8 {
                 observer.push(&Vector3::new(f32::from(k), 0.0, 0.0));
             }
-            assert!((1..=4).contains(&observer.points().len()));
+            assert!((1..=4).contains(&observer.slots().len()));
         }
         let mut observer = CloudObserver::<f32, 1>::new(1.0);
         for far in [f32::MAX, f32::MAX, f32::MAX, -f32::MAX, -f32::MAX, -f32::MAX] {
             observer.push(&Vector3::new(far, far, far));
         }
-        assert_eq!(observer.points().len(), 1);
+        assert_eq!(observer.slots().len(), 1);
     }
 }

@@ -7,11 +7,12 @@ use super::poses::Poses;
 use crate::{
     model::{
         Model, RowSink,
-        norm::{NormModel, curvature_excess},
+        norm::NormModel,
         parameterisation::{FULL_GAIN, UPPER_TRIANGULAR},
         turn::TurnModel,
     },
     observation::ShellPoint,
+    observer::cloud::Slot,
     triad::Triad,
 };
 
@@ -94,33 +95,22 @@ impl<const N: usize, const B: usize> Model<f32, 9> for Turns<'_, N, B> {
 
 /// The magnetometer's cloud: E9.
 pub(super) struct Cloud<'a> {
-    pub(super) points: &'a [Vector3<f32>],
+    pub(super) slots: &'a [Slot<f32>],
     pub(super) used: Used,
     /// Length of the field, µT.
     pub(super) norm: f32,
-    /// The triad and the residuals' variance of a rough fit: single samples lie outside their shell on average.
-    pub(super) rough: Option<(Triad<f32>, f32)>,
-}
-
-impl Cloud<'_> {
-    pub(super) fn point(&self, value: &Vector3<f32>) -> ShellPoint<f32> {
-        let excess = self
-            .rough
-            .as_ref()
-            .map_or(0.0, |(triad, variance)| curvature_excess(triad, self.norm, value, *variance));
-        ShellPoint { value: *value, excess }
-    }
+    /// Radius of the cloud in the raw unit.
+    pub(super) radius: f32,
 }
 
 impl Model<f32, 9> for Cloud<'_> {
     fn rows<S: RowSink<f32, 9>>(&self, theta: &SVector<f32, 9>, sink: &mut S) {
-        for (_, value) in self.points.iter().enumerate().filter(|(at, _)| self.used.has(*at)) {
-            let point = self.point(value);
-            shell(&point, self.norm).rows(theta, sink);
+        for (_, slot) in self.slots.iter().enumerate().filter(|(at, _)| self.used.has(*at)) {
+            shell(&slot.on_shell(self.radius), self.norm).rows(theta, sink);
         }
     }
 
     fn independent_rows(&self) -> usize {
-        self.used.count(self.points.len())
+        self.used.count(self.slots.len())
     }
 }

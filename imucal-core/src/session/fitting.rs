@@ -18,6 +18,7 @@ use crate::{
         parameterisation::{FULL_GAIN, UPPER_TRIANGULAR},
     },
     observation::Moments,
+    observer::cloud::Slot,
     record::Sensor,
     solver::{LevenbergMarquardt, triangular::Triangular},
     triad::Triad,
@@ -39,8 +40,8 @@ pub(super) struct Fit {
     pub(super) norm: f32,
     /// The gyroscope's bias.
     pub(super) bias: Option<RestBias<f32>>,
-    /// The magnetometer's rough fit: triad and variance.
-    rough: Option<(Triad<f32>, f32)>,
+    /// The cloud's radius, raw unit.
+    radius: f32,
 }
 
 impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
@@ -94,17 +95,17 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
 
     /// From a sphere through the cloud, in whose gauge it stays where the field is not known.
     fn begin_magnetometer(&self) -> Option<Fit> {
-        let (centre, radius) = sphere(self.cloud.points())?;
+        let (centre, radius) = sphere(self.cloud.slots())?;
         let norm = self.settings.field.unwrap_or(radius);
         let gain = Matrix3::from_diagonal_element(norm / radius);
         let start = Triad { gain, bias: centre };
-        (self.cloud.points().len() >= acc_limits().observations)
-            .then(|| self.from(Sensor::Magnetometer, UPPER_TRIANGULAR, &start, norm))
+        (self.cloud.slots().len() >= acc_limits().observations)
+            .then(|| Fit { radius, ..self.from(Sensor::Magnetometer, UPPER_TRIANGULAR, &start, norm) })
     }
 
     fn from(&self, sensor: Sensor, form: Parameterisation<9>, start: &Triad<f32>, norm: f32) -> Fit {
         let solver = LevenbergMarquardt::new(form.theta(start), Default::default());
-        Fit { sensor, solver, used: Used::ALL, rounds: 0, norm, bias: None, rough: None }
+        Fit { sensor, solver, used: Used::ALL, rounds: 0, norm, bias: None, radius: norm }
     }
 
     /// One iteration; where the solver has stopped, outliers are left out, or the fit is judged.
@@ -136,7 +137,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     }
 
     pub(super) fn points_of(&self, fit: &Fit) -> Cloud<'_> {
-        Cloud { points: self.cloud.points(), used: fit.used, norm: fit.norm, rough: fit.rough }
+        Cloud { slots: self.cloud.slots(), used: fit.used, norm: fit.norm, radius: fit.radius }
     }
 
     /// Prepares another round, if there is to be one.
@@ -144,12 +145,6 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     fn refine(&self, fit: &mut Fit) -> bool {
         let theta = *fit.solver.theta();
         let again = |fit: &mut Fit| fit.solver = LevenbergMarquardt::new(theta, Default::default());
-        if fit.sensor == Sensor::Magnetometer && fit.rough.is_none() {
-            let variance = fit.solver.variance().unwrap_or(0.0);
-            fit.rough = Some((UPPER_TRIANGULAR.triad(&theta), variance));
-            again(fit);
-            return true;
-        }
         if fit.rounds >= ROUNDS {
             return false;
         }
@@ -167,7 +162,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     fn without_outliers(&self, fit: &Fit) -> Used {
         let (mut sizes, mut places): (Vec<f32, 64>, Vec<usize, 64>) = (Vec::new(), Vec::new());
         let count = match fit.sensor {
-            Sensor::Magnetometer => self.cloud.points().len(),
+            Sensor::Magnetometer => self.cloud.slots().len(),
             _ => self.poses.list().len(),
         };
         for at in (0..count).filter(|at| fit.used.has(*at)) {
@@ -207,18 +202,18 @@ fn length(model: &impl Model<f32, 9>, solver: &LevenbergMarquardt<f32, 9>) -> Op
 }
 
 /// Centre and radius of the sphere nearest to a cloud: `|x|² = 2 c·x + k` by least squares, about the mean.
-fn sphere(points: &[Vector3<f32>]) -> Option<(Vector3<f32>, f32)> {
+fn sphere(slots: &[Slot<f32>]) -> Option<(Vector3<f32>, f32)> {
     let mut moments = Moments::default();
-    points.iter().for_each(|point| moments.push(point));
+    slots.iter().for_each(|slot| moments.push(&slot.mean));
     let spread = moments.variance().sum();
-    if points.len() < 5 || spread <= 0.0 {
+    if slots.len() < 5 || spread <= 0.0 {
         return None;
     }
     // In units of the cloud's own size, so that single precision does.
     let size = libm::sqrtf(spread);
     let mut rows = Triangular::<f32, 4>::default();
-    for point in points {
-        let x = (point - moments.mean()) / size;
+    for slot in slots {
+        let x = (slot.mean - moments.mean()) / size;
         rows.push(-x.norm_squared(), &SVector::from([2.0 * x.x, 2.0 * x.y, 2.0 * x.z, 1.0]));
     }
     let found = rows.damped_step(0.0, &SVector::repeat(1.0))?;

@@ -80,7 +80,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             },
             rests: count(self.poses.list().len()),
             turns: count(turns),
-            points: count(self.cloud.points().len()),
+            points: count(self.cloud.slots().len()),
             error: Sensor::ALL.map(|sensor| of(sensor).map(|estimate| estimate.error)),
             accepted: Sensor::ALL.map(|sensor| of(sensor).is_some_and(|estimate| estimate.verdict.is_ok())),
             never_still: self.poses.list().is_empty()
@@ -123,7 +123,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     /// Direction of the field that is furthest from all seen, magnetometer's axes.
     fn field_missing(&self) -> Vector3<f32> {
         let centre = self.estimate(Sensor::Magnetometer).map_or_else(Vector3::zeros, |mag| mag.triad.bias);
-        let directions = self.cloud.points().iter().map(move |point| unit(&(point - centre)));
+        let directions = self.cloud.slots().iter().map(move |slot| unit(&(slot.mean - centre)));
         coverage::missing(directions).0
     }
 }

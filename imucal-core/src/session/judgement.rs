@@ -124,8 +124,8 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     fn judge_magnetometer(&self, fit: &Fit) -> Option<Estimate> {
         let triad = UPPER_TRIANGULAR.triad(fit.solver.theta());
         let cloud = self.points_of(fit);
-        let used = cloud.points.iter().enumerate().filter(|(at, _)| fit.used.has(*at));
-        let points: Vec<ShellPoint<f32>, M> = list(used.map(|(_, value)| cloud.point(value)));
+        let used = cloud.slots.iter().enumerate().filter(|(at, _)| fit.used.has(*at));
+        let points: Vec<ShellPoint<f32>, M> = list(used.map(|(_, slot)| slot.on_shell(cloud.radius)));
         let criteria = Criteria {
             observed: Observed::Points(&points),
             limits: acc_limits(),
@@ -157,7 +157,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         criteria: &Criteria<'_, f32>,
     ) -> Estimate {
         let count = match fit.sensor {
-            Sensor::Magnetometer => self.cloud.points().len(),
+            Sensor::Magnetometer => self.cloud.slots().len(),
             _ => self.poses.list().len(),
         };
         Estimate {

@@ -19,7 +19,8 @@
 //! [`Session::work`] does one slice of a fit, and is called whenever there is time. All is in `f32`, and to the same bits on a host.
 //!
 //! Not done here: the record's write to flash, the units of raw samples (nominal SI comes in), the rotation of the
-//! magnetometer's axes into the accelerometer's, and g-sensitivity.
+//! magnetometer's axes into the accelerometer's, g-sensitivity, and the host's examination of residuals: what the host accepts with
+//! a suspicion, a session accepts without one.
 
 pub mod bias;
 pub mod design;
@@ -185,9 +186,9 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         &self.poses
     }
 
-    /// Points of the magnetometer's cloud so far.
-    pub fn points(&self) -> &[Vector3<f32>] {
-        self.cloud.points()
+    /// The magnetometer's cloud so far.
+    pub fn cloud(&self) -> &CloudObserver<f32, M> {
+        &self.cloud
     }
 
     /// What is beyond a sensor's range is not what was measured.
