@@ -16,6 +16,7 @@ const SMALL_STACKS: [(&str, u32); 3] = [("coprocessor", 6992), ("fit", 9 * 1024)
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=src/bin");
     println!("cargo:rustc-check-cfg=cfg(mps2, microbit, nordic)");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;

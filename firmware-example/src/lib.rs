@@ -13,6 +13,7 @@
 //! | `fits` | reads a record, corrects, fits every model and packs a record, without text: what that takes of flash |
 //! | `cost` | prints what parts of the core take: instructions and stack |
 //! | `coprocessor` | keeps a record, corrects, fits and stores, at the end of a UART |
+//! | `standalone` | calibrates from raw samples alone and stores the record; on a board with room for a session |
 //! | `restarts` | ends its run by each way there is, and says after each reset how the run before ended |
 //! | `log` | says by defmt what it does, over semihosting; with `--features log` |
 //! | `nrf52840` | the co-processor on a real board; with `--features nrf52840` |
@@ -43,6 +44,7 @@ pub mod search;
 mod soft_float;
 #[cfg(target_os = "none")]
 pub mod stack;
+pub mod standalone;
 pub mod storage;
 pub mod surface;
 

@@ -33,7 +33,7 @@ pub use mps2::Watchdog;
 #[cfg(mps2)]
 use mps2::boot_number;
 #[cfg(mps2)]
-pub use mps2::{Flash, Uart, Uptime, idle};
+pub use mps2::{Flash, MemoryTape, Uart, Uptime, flash, idle};
 #[cfg(nordic)]
 pub use nordic::Watchdog;
 pub use stopwatch::Stopwatch;

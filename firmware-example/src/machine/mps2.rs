@@ -189,6 +189,24 @@ impl NorFlash for Flash {
 /// Starts so far, behind the record's pages.
 const STARTS: Register = Register(WINDOW as usize + CAPACITY);
 
+/// Where a tape lies in the PSRAM, behind the record's pages.
+const TAPE: u32 = WINDOW + 0x10_0000;
+
+/// The tape of [`crate::standalone`], which a file fills.
+#[derive(Clone, Copy, Debug)]
+pub struct MemoryTape;
+
+impl crate::standalone::Tape for MemoryTape {
+    fn read(&mut self, offset: usize, into: &mut [u8]) {
+        read_words(TAPE + offset as u32, into);
+    }
+}
+
+/// The record's flash, where no co-processor has it.
+pub fn flash() -> Flash {
+    Flash::new()
+}
+
 /// A number of this start alone, since the machine has no random numbers: a count of starts. It is kept as the record
 /// is; where no file backs the memory, it is lost with the record.
 pub(super) fn boot_number() -> u64 {
