@@ -10,8 +10,9 @@ use imucal_host::{
     calibrate::{Calibration, Options, calibrate, outcome::FitSummary},
     recording::{Recording, SensorKind, check::integrity, unit::STANDARD_GRAVITY},
 };
-use imucal_tests::data;
+use imucal_tests::{data, simulated};
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 type Device = Session<38, 4, 64>;
 
@@ -136,4 +137,57 @@ fn a_session_refuses_what_cannot_be_observed() {
     let accepted = device.guide().accepted;
     println!("{:?}", device.guide());
     assert_eq!(accepted, [false; 3]);
+}
+
+/// Gain and bias of a simulated sensor, nominal SI in.
+fn truth(kind: SensorKind) -> Triad<f64> {
+    let unit = simulated::unit();
+    let sensor = unit.sensor(kind);
+    let (truth, counts) = (sensor.truth, sensor.counts);
+    Triad {
+        gain: truth.gain * counts.per_unit,
+        bias: (truth.bias - Vector3::repeat(counts.offset)) / counts.per_unit,
+    }
+}
+
+#[test]
+fn a_hundred_simulated_sessions_agree_with_the_host_and_their_intervals_cover() {
+    // In the axes of the accelerometer's upper triangular gain.
+    let acc = truth(SensorKind::Acc);
+    let turned = without_rotation(&acc).gain * acc.gain.try_inverse().expect("regular");
+    let truths = [without_rotation(&acc), {
+        let gyr = truth(SensorKind::Gyr);
+        Triad { gain: turned * gyr.gain, bias: gyr.bias }
+    }];
+    let sessions: Vec<[Vec<f64>; 4]> = (0..100u64)
+        .into_par_iter()
+        .map(|seed| {
+            let recording = simulated::tumbled(20, 1000 + 7 * seed);
+            let calibration = calibrate(&recording, &Options::default(), &|_| {});
+            let device = session(&recording, settings(&recording));
+            let mut all = [const { Vec::new() }; 4];
+            for (k, kind) in [SensorKind::Acc, SensorKind::Gyr].into_iter().enumerate() {
+                let own = device.estimate(Sensor::ALL[k]).filter(|own| own.verdict.is_ok());
+                let host = fit(&calibration, kind);
+                assert_eq!(own.is_some(), host.is_some(), "seed {seed}, {kind:?}");
+                let (Some(own), Some(host)) = (own, host) else { continue };
+                all[k] = apart(own, &host.triad);
+                all[2 + k] = apart(own, &truths[k]);
+            }
+            all
+        })
+        .collect();
+    let share = |k: usize, most: f64| {
+        let all: Vec<f64> = sessions.iter().flat_map(|session| session[k].iter().copied()).collect();
+        (all.iter().filter(|off| off.abs() <= most).count() as f64 / all.len() as f64, all.len())
+    };
+    for (k, kind) in [SensorKind::Acc, SensorKind::Gyr].into_iter().enumerate() {
+        let ((near, count), (covered, _)) = (share(k, 1.0), share(2 + k, 1.96));
+        println!(
+            "{kind:?}: {:.1} % of {count} within a standard error of the host's, intervals cover {:.1} %",
+            100.0 * near,
+            100.0 * covered
+        );
+        assert!(near >= 0.95 && (0.93..0.97).contains(&covered), "{kind:?}: {near}, {covered}");
+    }
 }
