@@ -3,7 +3,10 @@
 
 use std::collections::HashMap;
 
-use firmware_example::fitting::{self, Fitting};
+use firmware_example::{
+    fitting::{self, Fitting},
+    standalone::Standalone,
+};
 use imucal_tests::call_stack::CallGraph;
 use imucal_tests::coprocessor::painted_stack;
 use imucal_tests::firmware::{BOARDS, SHIFT, announce, counted, ready};
@@ -38,6 +41,12 @@ fn parts(lines: &str, frequency: f64) -> HashMap<String, Part> {
 /// Flash that reading a record and correcting samples may take, bytes: of the board with a floating-point unit, and
 /// of the other, which brings its arithmetic along. Of them 2.7 KiB judge the record's figures.
 const FLASH: [u64; 2] = [9 * 1024, 11 * 1024];
+/// The same in integers, of which the part of a reading of the thermometer is in `f64`, and in software.
+const FLASH_IN_INTEGERS: [u64; 2] = [14 * 1024, 15 * 1024];
+/// Instructions of a session's sample.
+const OBSERVED: f64 = 900.0;
+/// Instructions of a sample in integers.
+const IN_INTEGERS: f64 = 200.0;
 /// Flash that reading a record, correcting, and fitting, judging and packing every model may take on the board with a
 /// floating-point unit, bytes.
 const FLASH_WITH_FITS: u64 = 52 * 1024;
@@ -66,10 +75,13 @@ fn every_part_stays_within_its_instructions_flash_ram_and_stack() {
     announce(&format!("{:<46} {:>12} {:>20}", "bytes over an empty image", "Cortex-M4F", "Cortex-M0"));
     let both = |what: &str, [a, b]: [u64; 2]| announce(&format!("{what:<46} {a:>12} {b:>20}"));
     both("flash: decode and correct", flash.correct);
+    both("flash: decode and correct in integers", flash.integer);
     announce(&format!("{:<46} {:>12}", "flash: and fit, judge and pack every model", flash.fits));
     both("flash: the co-processor, link and drivers", flash.whole);
     both("RAM: the co-processor and room for its fits", flash.ram);
     announce(&format!("{:<46} {:>12}", "RAM: of them T9 of 64 rests", ram[0]));
+    let session = size_of::<Standalone>();
+    announce(&format!("{:<46} {session:>12}", "RAM: a session, which the co-processor has not"));
     announce(&format!("{:<46} {:>12}", "RAM: of them a swarm of 40 in 12 parameters", ram[1]));
     let depths = stack.map(|graph| graph.depth("main"));
     both("stack: the co-processor, by analysis", [0, 1].map(|k| depths[k].bytes.into()));
@@ -79,11 +91,30 @@ fn every_part_stays_within_its_instructions_flash_ram_and_stack() {
 
     check_costs(m4, m0);
     assert!(flash.correct.iter().zip(FLASH).all(|(used, budget)| *used <= budget), "{:?}", flash.correct);
+    let within = flash.integer.iter().zip(FLASH_IN_INTEGERS).all(|(used, budget)| *used <= budget);
+    assert!(within, "{:?}", flash.integer);
     assert!(flash.fits <= FLASH_WITH_FITS, "{}", flash.fits);
+    // By the host's pointers, which are wider.
+    assert!(session <= 12 * 1024, "{session}");
     assert!(ram.iter().zip(RAM).all(|(used, budget)| *used <= budget), "{ram:?}");
     for ((depth, painted), room) in depths.iter().zip(painted).zip(room) {
         let most = STACK.min(room);
         assert!(painted <= depth.bytes && depth.bytes <= most, "{painted} B of {room} used, {depth:#?}");
+    }
+}
+
+#[test]
+fn a_sample_in_integers_calls_no_function_and_so_no_arithmetic_in_software() {
+    if ready() {
+        for board in BOARDS {
+            let graph = CallGraph::of(&footprint::elf(board, "integer"));
+            let sample = graph.depth("correct17apply_in_integers");
+            assert_eq!(sample.chain.len(), 1, "{sample:#?}");
+            assert!(!graph.indirect().contains(&sample.chain[0].0.as_str()), "{sample:#?}");
+            // Where there is one to be called, it is seen to be: the temperature's part is in `f64`.
+            let main = graph.depth("main");
+            assert!(main.chain.len() > 2, "{main:#?}");
+        }
     }
 }
 
@@ -100,6 +131,7 @@ fn only_the_gauge_of_the_stack_is_called_through_a_pointer() {
 /// Flash and RAM over an empty image, bytes, of each board.
 struct Flash {
     correct: [u64; 2],
+    integer: [u64; 2],
     fits: u64,
     whole: [u64; 2],
     ram: [u64; 2],
@@ -115,6 +147,7 @@ impl Flash {
         let whole = [0, 1].map(|k| over(k, "coprocessor"));
         Self {
             correct: [0, 1].map(|k| over(k, "correct").0),
+            integer: [0, 1].map(|k| over(k, "integer").0),
             fits: over(0, "fits").0,
             whole: whole.map(|(flash, _)| flash),
             ram: whole.map(|(_, ram)| ram),
@@ -141,6 +174,8 @@ fn print_costs([m4, m0]: &[Costs; 2]) {
     row("correct a sample, temperature as before", "apply_at", each);
     row("correct a sample of another temperature", "apply_at_moving", each);
     row("the same by hand, without a library", "apply_by_hand", each);
+    row("correct a sample in integers", "apply_in_integers", each);
+    row("another temperature for samples in integers", "set_temperature", each);
     for (what, name) in [
         ("add two numbers, in software", "add"),
         ("the same by the compiler's function", "add_by_compiler"),
@@ -160,6 +195,17 @@ fn print_costs([m4, m0]: &[Costs; 2]) {
     }
     row("swarm: a particle's block", "particle", each);
     row("swarm: a slice", "swarm_slice", whole);
+    for (what, name) in [
+        ("session: a sample at rest", "session_rest"),
+        ("session: a sample in a turn", "session_turn"),
+        ("session: a sample of the field at rest", "session_field_rest"),
+        ("session: a sample of the field in a turn", "session_field_turn"),
+        ("session: the longest slice of a fit", "session_slice"),
+        ("session: what to do next", "session_guide"),
+    ] {
+        let part = &m4[name];
+        announce(&format!("{what:<46} {:>12.0} {:>7}", part.instructions / part.count, part.stack));
+    }
     let search = m4["swarm_iteration"].instructions * SEARCH;
     announce(&format!(
         "swarm: 40 particles, 300 iterations, 1000 blocks: {:.2} G on the Cortex-M4F",
@@ -175,6 +221,14 @@ fn check_costs(m4: &Costs, m0: &Costs) {
         assert!(m0[name].instructions / m0[name].count <= 2_000.0, "{name}: {:?}", m0[name]);
     }
     assert!(cost("apply") / m4["apply"].count <= 40.0);
+    for costs in [m4, m0] {
+        let integers = &costs["apply_in_integers"];
+        assert!(integers.instructions / integers.count <= IN_INTEGERS, "{integers:?}");
+    }
+    // An observer's sample, of the inertial sensors and of the field, over a rest and a turn.
+    for name in ["session_rest", "session_turn", "session_field_rest", "session_field_turn"] {
+        assert!(m4[name].instructions / m4[name].count <= OBSERVED, "{name}: {:?}", m4[name]);
+    }
     assert!(cost("whole fit of T9") <= 3e6 && cost("whole fit of I14") <= 6e6);
     // 40 particles over 1000 blocks.
     assert_eq!(m4["swarm_iteration"].count, 40_000.0);

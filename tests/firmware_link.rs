@@ -22,7 +22,9 @@ fn every_image_links_without_panic_or_allocator_and_runs() {
     }
     for board in BOARDS {
         // With the key, so that the gate reaches the seals as well.
-        for (image, features) in [("gate", &["key"][..]), ("correct", &[]), ("empty", &[]), ("cost", &[])] {
+        for (image, features) in
+            [("gate", &["key"][..]), ("correct", &[]), ("integer", &[]), ("empty", &[]), ("cost", &[])]
+        {
             let output = run_with(board, image, features);
             assert_eq!(output.status.code(), Some(0), "{image} on {}: {output:?}", board.core);
         }

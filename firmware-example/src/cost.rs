@@ -2,10 +2,14 @@
 //!
 //! The image `cost` prints a line a part; `tests/device_cost.rs` reads them and makes the table of `imucal-host/docs/devices.md` of them.
 
+#[cfg(mps2)]
+mod observing;
+
 use core::{fmt::Write, hint::black_box};
 
 use imucal_core::{
     corrector::{Compensator, Corrector},
+    integer::{self, IntegerCompensator},
     link::FitModel,
     model::{Cost, attitude::AttitudeModel, parameterisation::FULL},
     observation::{Block, BlockBuilder, Compared, Durations, Motion},
@@ -60,8 +64,11 @@ pub fn write(out: &mut impl Write) -> core::fmt::Result {
     let watch = Stopwatch::start();
     decode(out, &watch)?;
     apply(out, &watch)?;
+    integers(out, &watch)?;
     #[cfg(microbit)]
     arithmetic(out, &watch)?;
+    #[cfg(mps2)]
+    observing::write(out, &watch)?;
     fits(out, &watch)?;
     particle(out, &watch)
 }
@@ -88,15 +95,14 @@ fn decode(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
     measured(out, watch, ("decode", 1), || record::decode(black_box(crate::RECORD)).is_ok()).map(drop)
 }
 
+fn terms() -> TemperatureTerms<f32> {
+    TemperatureTerms { reference: 25.0, bias_slope: [1e-3, -2e-3, 5e-4], scale_slope: [1e-5, 2e-5, -1e-5] }
+}
+
 /// Samples in a loop, by a full gain, without and with temperature terms, and the same without a corrector.
 #[inline(never)]
 fn apply(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
-    let terms = TemperatureTerms {
-        reference: 25.0,
-        bias_slope: [1e-3, -2e-3, 5e-4],
-        scale_slope: [1e-5, 2e-5, -1e-5],
-    };
-    let triad = scene::gyroscope().truth;
+    let (triad, terms) = (scene::gyroscope().truth, terms());
     let plain = Corrector::new(black_box(triad), black_box(None));
     let warm = Corrector::new(black_box(triad), black_box(Some(terms)));
     let mut compensator = Compensator::new(warm);
@@ -132,6 +138,32 @@ fn apply(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
                 (n[0] * raw.0 + n[1] * raw.1 + n[2] * raw.2) * (1.0 + scale * change)
             };
             [*p, *q, *r] = [row(a, u), row(b, v), row(c, w)];
+        }
+    })
+}
+
+/// The same of counts in integers, and the readings of a thermometer between them.
+#[inline(never)]
+fn integers(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
+    // ±2000 °/s.
+    let (triad, terms) = (scene::gyroscope().truth.in_unit(0.0, 939.0), terms().in_unit(939.0));
+    let corrector = integer::finest(&triad, Some(&terms))
+        .and_then(|finest| IntegerCompensator::new(&triad, Some(&terms), finest));
+    let mut compensator = black_box(corrector.map_err(|_| core::fmt::Error)?);
+    let (mut samples, mut corrected) = ([[0i16; 3]; SAMPLES], [[0i32; 3]; SAMPLES]);
+    for (k, sample) in samples.iter_mut().enumerate() {
+        *sample = [k as i16, -1000, 32_000];
+    }
+    measured(out, watch, ("apply_in_integers", SAMPLES), || {
+        for (raw, corrected) in black_box(&samples).iter().zip(black_box(&mut corrected)) {
+            *corrected = compensator.apply(*raw);
+        }
+    })?;
+    black_box(&corrected);
+    measured(out, watch, ("set_temperature", SAMPLES), || {
+        for k in 0..SAMPLES {
+            compensator.set_temperature(black_box(31.0 + k as f32 * 0.125));
+            black_box(&compensator);
         }
     })
 }

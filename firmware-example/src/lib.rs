@@ -9,6 +9,7 @@
 //! | `replay` | reads the record, corrects the samples, prints the bits; on a host it prints the host's |
 //! | `gate` | calls every public function of the core |
 //! | `correct` | reads the record and corrects a sample: the least a device does |
+//! | `integer` | the same in integers, for a core without a floating-point unit |
 //! | `fit` | fits every model to simulated sets, judges the fits and writes records, prints the bits as `replay` does |
 //! | `fits` | reads a record, corrects, fits every model and packs a record, without text: what that takes of flash |
 //! | `cost` | prints what parts of the core take: instructions and stack |
@@ -17,7 +18,7 @@
 //! | `restarts` | ends its run by each way there is, and says after each reset how the run before ended |
 //! | `log` | says by defmt what it does, over semihosting; with `--features log` |
 //! | `nrf52840` | the co-processor on a real board; with `--features nrf52840` |
-//! | `empty` | start-up code and the record's bytes, to compare the size of `correct` with |
+//! | `empty` | start-up code and the record's bytes, to compare the sizes of `correct` and `integer` with |
 #![no_std]
 
 pub mod board;

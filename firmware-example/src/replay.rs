@@ -4,7 +4,8 @@ use core::fmt::{self, Write};
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use imucal_core::corrector::Corrector;
-use imucal_core::record::{self, TriadRecord};
+use imucal_core::integer::{self, IntegerCompensator};
+use imucal_core::record::{self, RawUnit, TriadRecord};
 use nalgebra::Vector3;
 
 use crate::scene::Noise;
@@ -33,6 +34,7 @@ pub fn write(out: &mut impl Write) -> fmt::Result {
     for (sensor, triad) in record.triads() {
         write_triad(out, sensor.symbol(), triad)?;
         write_many(out, sensor.symbol(), triad)?;
+        write_integers(out, sensor.symbol(), triad)?;
     }
     write_arithmetic(out)
 }
@@ -116,6 +118,30 @@ fn faulty(line: u32, sample: u32, value: Vector3<f32>) -> Vector3<f32> {
     } else {
         value
     }
+}
+
+/// All counts of each axis in integers, folded, at each temperature.
+fn write_integers(out: &mut impl Write, sensor: &str, record: &TriadRecord) -> fmt::Result {
+    // Words of an unsigned converter; the other's milligauss are taken for counts.
+    let middle = if record.unit_in == RawUnit::Counts { -32_768.0 } else { 0.0 };
+    let (triad, terms) = (record.triad::<f32>().in_unit(middle, 1.0), record.temperature);
+    let corrector = integer::finest(&triad, terms.as_ref())
+        .and_then(|finest| IntegerCompensator::new(&triad, terms.as_ref(), finest));
+    let Ok(mut compensator) = corrector else { return writeln!(out, "{sensor} integers refused") };
+    for temperature in TEMPERATURES {
+        compensator.set_temperature(temperature);
+        let mut folded = 0u32;
+        for count in i16::MIN..=i16::MAX {
+            // Odd multipliers permute the counts.
+            let raw = [count, count.wrapping_mul(25_173), count.wrapping_mul(-25_033)];
+            folded = compensator.apply(raw).iter().fold(folded, |folded, axis| {
+                (folded ^ axis.cast_unsigned()).wrapping_mul(16_777_619).rotate_left(5)
+            });
+        }
+        let fraction = compensator.corrector().fraction();
+        writeln!(out, "{sensor} integers of 2^-{fraction} {folded:08x}")?;
+    }
+    Ok(())
 }
 
 fn write_triad(out: &mut impl Write, sensor: &str, triad: &TriadRecord) -> fmt::Result {

@@ -8,7 +8,7 @@
 //!
 //! ```text
 //! observation → model → observer → solver → accept → record → fit → session
-//!                                               record → corrector
+//!                                               record → corrector, integer
 //! ```
 //!
 //! | stage | module | what it holds |
@@ -22,9 +22,10 @@
 //! | what a fit comes to | [`fit`] | its figures, all checks in order, its part of a record |
 //! | all of it, without a host | [`session`] | what to do next, and when it is enough |
 //! | what is applied | [`corrector`] | `calibrated = gain · (raw − bias)`, sample by sample |
+//! | what is applied without a floating-point unit | [`integer`] | the same from counts of 16 bits, in integers alone |
 //! | what is said to a host | `link`, a feature | frames and messages between a device and its host |
 //!
-//! A device that only applies needs [`record`] and [`corrector`] alone.
+//! A device that only applies needs [`record`] and [`corrector`], or [`integer`], alone.
 //!
 //! # Parameterisation
 //!
@@ -83,6 +84,8 @@ pub mod fit;
 pub mod session;
 
 pub mod corrector;
+
+pub mod integer;
 
 #[cfg(feature = "link")]
 pub mod link;

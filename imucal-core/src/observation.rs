@@ -32,9 +32,16 @@ impl<T: Scalar> Moments<T> {
     /// Takes one sample in; its unit is that of the mean.
     pub fn push(&mut self, sample: &Vector3<T>) {
         self.count = self.count.saturating_add(1);
-        let before = sample - self.mean;
-        self.mean += before / T::whole(self.count);
-        self.squares += before.component_mul(&(sample - self.mean));
+        // By components, as in `rotation::image`: at a device's `opt-level = "s"` nalgebra's own are loops.
+        let count = T::whole(self.count);
+        let axis = |sample: T, mean: &mut T, squares: &mut T| {
+            let before = sample - *mean;
+            *mean += before / count;
+            *squares += before * (sample - *mean);
+        };
+        axis(sample.x, &mut self.mean.x, &mut self.squares.x);
+        axis(sample.y, &mut self.mean.y, &mut self.squares.y);
+        axis(sample.z, &mut self.mean.z, &mut self.squares.z);
     }
 
     /// The moments of these samples and of others (Chan, Golub and LeVeque 1983).
@@ -118,6 +125,7 @@ impl<T: Scalar> Block<T> {
 
     /// This block, of a duration in s, had the sensor read less by a constant rate, rad/s.
     #[must_use]
+    #[inline]
     pub fn less(&self, rate: &Vector3<T>, duration: T) -> Self {
         Self { s0: self.s0 - rate * duration, s1: self.s1, c: self.c - self.s1.cross(rate) }
     }
@@ -168,10 +176,19 @@ impl<T: Scalar> Default for BlockBuilder<T> {
 impl<T: Scalar> BlockBuilder<T> {
     /// Takes in a rate `w_ns_s`, rad/s, that held for `duration`, s.
     pub fn push(&mut self, rate: &Vector3<T>, duration: T) {
-        let angle = rate * duration;
-        self.c += self.s0.cross(&angle);
-        self.early += angle * (self.duration + self.duration + duration);
-        self.s0 += angle;
+        // By components, for the same reason as in `Moments::push`.
+        let (x, y, z) = (rate.x * duration, rate.y * duration, rate.z * duration);
+        let (s, c, early) = (&mut self.s0, &mut self.c, &mut self.early);
+        c.x += s.y * z - s.z * y;
+        c.y += s.z * x - s.x * z;
+        c.z += s.x * y - s.y * x;
+        let twice = self.duration + self.duration + duration;
+        early.x += x * twice;
+        early.y += y * twice;
+        early.z += z * twice;
+        s.x += x;
+        s.y += y;
+        s.z += z;
         self.duration += duration;
         self.count = self.count.saturating_add(1);
     }

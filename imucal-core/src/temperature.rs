@@ -85,6 +85,11 @@ impl<T: Scalar> TemperatureTerms<T> {
         }
     }
 
+    /// The same terms for raw values of another affine unit, as [`Triad::in_unit`] has it.
+    pub fn in_unit(&self, per_unit: T) -> Self {
+        Self { bias_slope: self.bias_slope.map(|slope| slope * per_unit), ..*self }
+    }
+
     #[inline]
     fn change(&self, temperature: T) -> T {
         if temperature.finite() { temperature - self.reference } else { T::zero() }
@@ -157,6 +162,16 @@ mod tests {
             let x = Vector3::from(x);
             let raw = w.predict(&t, &x, temperature).unwrap();
             prop_assert!((w.correct(&t, &raw, temperature) - x).norm() < 1e-11 * (1.0 + x.norm()));
+        }
+
+        #[test]
+        fn a_change_of_unit_changes_no_calibrated_value(t in triad(), w in terms(), x in uniform3(-100.0f64..100.0),
+                temperature in -40.0f64..85.0, offset in -4e4f64..4e4, per_unit in 1.0f64..5e3) {
+            let x = Vector3::from(x);
+            let counts = x * per_unit + Vector3::repeat(offset);
+            let a = w.correct(&t, &x, temperature);
+            let b = w.in_unit(per_unit).correct(&t.in_unit(offset, per_unit), &counts, temperature);
+            prop_assert!((a - b).norm() < 1e-9 * (1.0 + a.norm()));
         }
 
         #[test]

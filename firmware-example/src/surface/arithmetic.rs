@@ -66,7 +66,7 @@ fn triads() {
     reach!(triad::Triad::is_finite(&truth));
 }
 
-fn terms() -> TemperatureTerms<f32> {
+pub(super) fn terms() -> TemperatureTerms<f32> {
     TemperatureTerms { reference: 25.0, bias_slope: [1e-3, -2e-3, 5e-4], scale_slope: [1e-5, 2e-5, -1e-5] }
 }
 

@@ -2,8 +2,8 @@
 //!
 //! A function that no image calls is in none, and its panic paths with it. `tests/surface.rs` reads the core's
 //! sources and these, and fails where a public function is not reached here. In `f32`, as a device computes; generic
-//! functions are those of some model, which stand for the others. The texts of `Refusal`, `Defect`, `EncodeError` and
-//! `DecodeError` are left out: the compiler's library keeps panic paths where it writes a number with decimals, so a
+//! functions are those of some model, which stand for the others. The texts of `Refusal`, `Defect`, `IntegerRefusal`,
+//! `EncodeError` and `DecodeError` are left out: the compiler's library keeps panic paths where it writes a number with decimals, so a
 //! device names the reason instead.
 
 use core::fmt::{self, Write};
@@ -16,6 +16,7 @@ macro_rules! reach {
 }
 
 mod arithmetic;
+mod integer;
 mod link;
 mod model;
 mod observation;
@@ -27,6 +28,7 @@ mod solver;
 /// Calls them all.
 pub fn reach_all() {
     arithmetic::reach_all();
+    integer::reach_all();
     observation::reach_all();
     observer::reach_all();
     model::reach_all();

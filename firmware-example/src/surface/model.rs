@@ -76,6 +76,9 @@ fn turns(block: &Block<f32>) {
         after: Vector3::z(),
     };
     reach!(model::turn::attitude(&Triad::identity(), &turn));
+    let carrier = reach!(model::turn::Carrier::new(&Triad::identity()));
+    let mut attitude = nalgebra::Matrix3::<f32>::identity();
+    reach!(model::turn::Carrier::carry(&carrier, &mut attitude, block, 0.02));
     let turns = [turn];
     let carried = TurnModel { turns: &turns, form: FULL };
     reach!(model::turn::TurnModel::rows(&carried, &theta, &mut none()));

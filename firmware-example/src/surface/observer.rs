@@ -30,7 +30,6 @@ pub(super) fn reach_all() {
     }
     reach!(observer::rest::RestObserver::stage(&rests));
     reach!(observer::rest::RestObserver::quarters(&rests));
-    reach!(observer::rest::RestObserver::interval(&rests));
     reach!(observer::rest::RestObserver::rate(&rests));
     reach!(observer::rest::RestObserver::lasted(&rests));
     reach!(observer::rest::RestObserver::direction(&rests));

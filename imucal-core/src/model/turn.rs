@@ -25,7 +25,7 @@ use super::{
     block::{BlockRotation, ByEntries, DerivativeSums, reduce},
 };
 use crate::{
-    observation::Turn,
+    observation::{Block, Turn},
     rotation::{self, cross_matrix, exp_with_jacobian, product},
     scalar::Scalar,
     triad::Triad,
@@ -40,13 +40,33 @@ pub struct TurnModel<'a, T: Scalar, const P: usize> {
     pub form: Parameterisation<P>,
 }
 
+/// What a gyroscope of some triad makes of blocks, one after the other: [`attitude`] of a turn whose blocks are not kept.
+#[derive(Clone, Copy, Debug)]
+pub struct Carrier<T: Scalar> {
+    blocks: BlockRotation<T>,
+    /// A b.
+    still: Vector3<T>,
+}
+
+impl<T: Scalar> Carrier<T> {
+    /// Of a triad, nominal SI in.
+    pub fn new(triad: &Triad<T>) -> Self {
+        Self { blocks: BlockRotation::new(triad), still: triad.gain * triad.bias }
+    }
+
+    /// Turns an attitude on by a block of some duration, s.
+    #[inline]
+    pub fn carry(&self, c: &mut Matrix3<T>, block: &Block<T>, duration: T) {
+        rotation::turn(c, &self.blocks.vector(block, duration, &self.still));
+    }
+}
+
 /// `C_after_before`: the attitude after the turn, as the product of its blocks.
 pub fn attitude<T: Scalar>(triad: &Triad<T>, turn: &Turn<'_, T>) -> Matrix3<T> {
     let mut c = Matrix3::identity();
-    let blocks = BlockRotation::new(triad);
-    let still = triad.gain * triad.bias;
+    let carrier = Carrier::new(triad);
     for (index, block) in turn.blocks.iter().enumerate() {
-        rotation::turn(&mut c, &blocks.vector(block, turn.durations.get(index), &still));
+        carrier.carry(&mut c, block, turn.durations.get(index));
     }
     c
 }
@@ -147,7 +167,7 @@ mod tests {
     use super::*;
     use crate::{
         model::parameterisation::{FULL, FULL_GAIN},
-        observation::{Block, BlockBuilder, Durations},
+        observation::{BlockBuilder, Durations},
         rotation::exp,
         solver::jacobian_check::largest_jacobian_error,
     };

@@ -20,6 +20,7 @@
 use heapless::Vec;
 use nalgebra::Vector3;
 
+use super::{is_finite, squared_distance};
 use crate::{observation::ShellPoint, scalar::Scalar};
 
 /// By what slots are further apart once all are full.
@@ -63,9 +64,15 @@ impl<T: Scalar> Slot<T> {
             return;
         }
         self.count += 1;
-        let before = point - self.mean;
-        self.mean += before / T::whole(self.count.into());
-        self.squares += before.dot(&(point - self.mean));
+        let count = T::whole(self.count.into());
+        let mut axis = |point: T, mean: &mut T| {
+            let before = point - *mean;
+            *mean += before / count;
+            self.squares += before * (point - *mean);
+        };
+        axis(point.x, &mut self.mean.x);
+        axis(point.y, &mut self.mean.y);
+        axis(point.z, &mut self.mean.z);
     }
 
     /// As a point of a shell of some radius, in the unit of the samples: the mean of points on a sphere lies inside it.
@@ -97,7 +104,7 @@ impl<T: Scalar, const N: usize> CloudObserver<T, N> {
 
     /// Takes a sample in.
     pub fn push(&mut self, sample: &Vector3<T>) -> Chosen {
-        if !sample.iter().all(|component| component.finite()) {
+        if !is_finite(sample) {
             self.before = [None; 2];
             return Chosen::Unusable;
         }
@@ -112,14 +119,17 @@ impl<T: Scalar, const N: usize> CloudObserver<T, N> {
 
     /// A sample is far from both its neighbours, which are near to one another.
     fn is_spike(&self, before: &Vector3<T>, sample: &Vector3<T>, after: &Vector3<T>) -> bool {
-        let apart = (after - before).norm_squared() * T::of(SPIKE * SPIKE);
-        let least = if apart > self.apart * self.apart { apart } else { self.apart * self.apart };
-        (sample - before).norm_squared() > least && (sample - after).norm_squared() > least
+        let least = self.apart * self.apart;
+        let far = |other: &Vector3<T>| squared_distance(sample, other);
+        far(before) > least
+            && far(after) > least
+            && far(before) > squared_distance(after, before) * T::of(SPIKE * SPIKE)
+            && far(after) > squared_distance(after, before) * T::of(SPIKE * SPIKE)
     }
 
     fn take(&mut self, point: &Vector3<T>) -> Chosen {
         let within = self.apart * T::of(NEAR);
-        let near = |other: &Vector3<T>| (point - other).norm_squared() < within * within;
+        let near = |other: &Vector3<T>| squared_distance(point, other) < within * within;
         if let Some((last, at)) = &self.compared
             && near(last)
         {
@@ -183,7 +193,7 @@ impl<T: Scalar, const N: usize> CloudObserver<T, N> {
 
 fn is_near<T: Scalar>(slots: &[Slot<T>], point: &Vector3<T>, apart: T) -> bool {
     let near = apart * apart;
-    slots.iter().any(|slot| (slot.mean - point).norm_squared() < near)
+    slots.iter().any(|slot| squared_distance(&slot.mean, point) < near)
 }
 
 #[cfg(test)]

@@ -3,17 +3,14 @@
 //! A turn is seen once the rest after it has lasted a second, and that rest once it has ended. What breaks the chain between two
 //! rests (a gap, a clipped sample, a rest that proves too noisy) is an event of its own, so that nothing is joined across it.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use super::{
-    Sample,
+    Sample, is_finite,
     rest::{ObservedRest, RestObserver, RestSettings, Stage},
     turn::{ObservedTurn, TurnObserver},
 };
 use crate::{scalar::Scalar, triad::Triad};
-
-/// Time from one rate to the next that is so many times the usual one breaks a turn.
-const GAP: u64 = 5;
 
 /// What a sample has shown.
 #[derive(Clone, Debug)]
@@ -60,19 +57,31 @@ impl<T: Scalar, const B: usize> InertialObserver<T, B> {
     }
 
     /// Takes a sample in.
+    #[inline]
     pub fn push(&mut self, sample: &Sample<T>) -> Seen<T, B> {
+        if self.rests.goes_on(sample) {
+            self.follow(sample);
+            Seen::Nothing
+        } else {
+            self.turn_over(sample)
+        }
+    }
+
+    /// A quarter of a second has ended before a sample.
+    #[inline(never)]
+    fn turn_over(&mut self, sample: &Sample<T>) -> Seen<T, B> {
         let (stage, quarters) = (self.rests.stage(), self.rests.quarters());
-        let ended = self.rests.push(sample);
+        let ended = self.rests.turn_over(sample);
         let mut seen = match ended {
             Some(rest) => Seen::Rest(rest),
             None if stage != Stage::Moving && self.rests.stage() == Stage::Moving => Seen::NoRest,
             None => Seen::Nothing,
         };
-        if self.rests.quarters() != quarters
-            && let Some(turn) =
-                self.turns.quarter(self.rests.stage(), &Triad { gain: self.gain, bias: self.rests.rate() })
-        {
-            seen = Seen::Turn(turn);
+        if self.rests.quarters() != quarters {
+            let best = Triad { gain: self.gain, bias: self.rests.rate() };
+            if let Some(turn) = self.turns.quarter(self.rests.stage(), &best) {
+                seen = Seen::Turn(turn);
+            }
         }
         self.follow(sample);
         seen
@@ -107,19 +116,16 @@ impl<T: Scalar, const B: usize> InertialObserver<T, B> {
 
     /// Takes the rate of a sample into the turn.
     fn follow(&mut self, sample: &Sample<T>) {
-        let finite = |rate: &Vector3<T>| rate.iter().all(|component| component.finite());
         // One that is missing is bridged by its neighbours.
-        let Some(rate) = sample.gyr.filter(finite) else { return };
-        let since = self.last.map(|last| sample.time.checked_sub(last));
-        self.last = Some(sample.time);
-        let usual = self.rests.interval();
-        match since {
-            None => self.turns.push(&rate, T::zero()),
-            Some(Some(since)) if usual == 0 || since <= GAP.saturating_mul(usual) => {
-                let seconds = T::whole(u32::try_from(since).unwrap_or(u32::MAX)) * T::of(1e-6);
-                self.turns.push(&rate, seconds);
-            }
-            Some(_) => self.interrupt(),
+        let Some(rate) = sample.gyr.as_ref().filter(|rate| is_finite(rate)) else { return };
+        let Some(last) = self.last.replace(sample.time) else {
+            return self.turns.push(rate, T::zero());
+        };
+        let since = sample.time.wrapping_sub(last);
+        if sample.time < last || self.rests.gap().is_some_and(|gap| since > gap) {
+            return self.interrupt();
         }
+        let seconds = T::whole(u32::try_from(since).unwrap_or(u32::MAX)) * T::of(1e-6);
+        self.turns.push(rate, seconds);
     }
 }

@@ -34,7 +34,19 @@ pub struct Sample<T: Scalar> {
 impl<T: Scalar> Sample<T> {
     /// Every sensor has a value.
     pub fn is_whole(&self) -> bool {
-        let finite = |v: &Vector3<T>| v.iter().all(|component| component.finite());
-        finite(&self.acc) && self.gyr.as_ref().is_none_or(finite)
+        is_finite(&self.acc) && self.gyr.as_ref().is_none_or(is_finite)
     }
+}
+
+/// By components: at a device's `opt-level = "s"` iterators are loops.
+#[inline]
+fn is_finite<T: Scalar>(v: &Vector3<T>) -> bool {
+    v.x.finite() && v.y.finite() && v.z.finite()
+}
+
+/// Likewise.
+#[inline]
+fn squared_distance<T: Scalar>(a: &Vector3<T>, b: &Vector3<T>) -> T {
+    let (x, y, z) = (a.x - b.x, a.y - b.y, a.z - b.z);
+    x * x + y * y + z * z
 }

@@ -118,7 +118,9 @@ impl<T: Scalar> Stretch<T> {
         self.rows = self.rows.saturating_add(1);
         if sample.is_whole() {
             self.acc.push(&sample.acc);
-            sample.gyr.iter().for_each(|rate| self.gyr.push(rate));
+            if let Some(rate) = &sample.gyr {
+                self.gyr.push(rate);
+            }
         }
         if let Some(temperature) = sample.temperature.filter(|value| value.finite()) {
             self.temperature += temperature;
@@ -173,6 +175,8 @@ pub struct RestObserver<T: Scalar> {
     /// Time of the last sample and usual time between two, µs.
     last: u64,
     interval: u64,
+    /// Time between two from which there is a gap, µs.
+    gap: u64,
     quarters: u32,
     /// Variance of the quietest window so far, (m/s²)².
     quietest: Option<T>,
@@ -197,6 +201,7 @@ impl<T: Scalar> RestObserver<T> {
             now: None,
             last: 0,
             interval: 0,
+            gap: 0,
             quarters: 0,
             quietest: None,
             rate: None,
@@ -206,6 +211,26 @@ impl<T: Scalar> RestObserver<T> {
 
     /// Takes a sample in; a rest, when this sample shows that one has ended.
     pub fn push(&mut self, sample: &Sample<T>) -> Option<ObservedRest<T>> {
+        if self.goes_on(sample) { None } else { self.turn_over(sample) }
+    }
+
+    /// Takes in a sample of the quarter that goes on; false where it is of none. It is short, since it is for nearly all samples.
+    #[inline]
+    pub(super) fn goes_on(&mut self, sample: &Sample<T>) -> bool {
+        let Some(now) = &mut self.now else { return false };
+        let since = sample.time.wrapping_sub(self.last);
+        if sample.time < self.last || sample.time.wrapping_sub(now.start) >= QUARTER {
+            return false;
+        }
+        now.broken |= self.interval > 0 && since > self.gap;
+        self.last = sample.time;
+        now.push(sample);
+        true
+    }
+
+    /// Ends the quarter before a sample, and begins the next.
+    #[inline(never)]
+    pub(super) fn turn_over(&mut self, sample: &Sample<T>) -> Option<ObservedRest<T>> {
         let Some(now) = &mut self.now else {
             self.begin(sample);
             return None;
@@ -216,12 +241,8 @@ impl<T: Scalar> RestObserver<T> {
             self.begin(sample);
             return ended;
         };
-        now.broken |= self.interval > 0 && since > GAP.saturating_mul(self.interval);
+        now.broken |= self.interval > 0 && since > self.gap;
         let last = core::mem::replace(&mut self.last, sample.time);
-        if sample.time.saturating_sub(now.start) < QUARTER {
-            now.push(sample);
-            return None;
-        }
         now.end = sample.time;
         let whole = *now;
         // A gap before this sample is none of the intervals of the quarter.
@@ -229,6 +250,7 @@ impl<T: Scalar> RestObserver<T> {
             last.saturating_sub(whole.start).checked_div(u64::from(whole.rows).saturating_sub(1))
         {
             self.interval = interval;
+            self.gap = GAP.saturating_mul(interval);
         }
         let mut next = Stretch::new(sample.time);
         next.push(sample);
@@ -270,9 +292,9 @@ impl<T: Scalar> RestObserver<T> {
         self.quarters
     }
 
-    /// Usual time between two samples, µs; 0 before it is known.
-    pub fn interval(&self) -> u64 {
-        self.interval
+    /// Time between two samples beyond which there is a gap, µs; `None` before the usual one is known.
+    pub(super) fn gap(&self) -> Option<u64> {
+        (self.interval > 0).then_some(self.gap)
     }
 
     /// Usual rate at rest, rad/s; zero before the first rest.

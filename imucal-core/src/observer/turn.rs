@@ -30,7 +30,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::rest::Stage;
 use crate::{
-    model::turn::attitude,
+    model::turn::Carrier,
     observation::{Block, BlockBuilder, Durations, Turn},
     rotation::{exp, log},
     scalar::Scalar,
@@ -83,9 +83,8 @@ impl<T: Scalar, const B: usize> Path<T, B> {
         Self { blocks: Vec::new(), durations: Vec::new(), attitude: Matrix3::identity() }
     }
 
-    /// Goes on by a block that was turned by `attitude`.
-    fn push(&mut self, block: &Block<T>, duration: T, attitude: &Matrix3<T>) {
-        self.attitude *= attitude;
+    /// Goes on by a block.
+    fn push(&mut self, block: &Block<T>, duration: T) {
         if self.blocks.is_full() {
             self.join_the_least();
         }
@@ -115,10 +114,11 @@ impl<T: Scalar, const B: usize> Path<T, B> {
         }
     }
 
-    fn turn(&self, reference: &Triad<T>) -> ObservedTurn<T, B> {
+    fn turn(&self, reference: &Carrier<T>) -> ObservedTurn<T, B> {
         let (blocks, durations) = (self.blocks.clone(), self.durations.clone());
         let mut turn = ObservedTurn { blocks, durations, remainder: Vector3::zeros() };
-        let joined = attitude(reference, &turn.between(Vector3::z(), Vector3::z()));
+        let mut joined = Matrix3::identity();
+        turn.blocks().for_each(|(block, duration)| reference.carry(&mut joined, block, duration));
         turn.remainder = log(&joined.tr_mul(&self.attitude));
         turn
     }
@@ -153,10 +153,9 @@ impl<T: Scalar> Quarter<T> {
         }
     }
 
-    fn push(&mut self, block: &Block<T>, duration: T, attitude: &Matrix3<T>) {
+    fn push(&mut self, block: &Block<T>, duration: T) {
         self.block = self.block.join(self.duration, block, duration);
         self.duration += duration;
-        self.attitude *= attitude;
     }
 }
 
@@ -178,8 +177,8 @@ pub struct TurnObserver<T: Scalar, const B: usize> {
     builder: BlockBuilder<T>,
     /// The last rate, and half the time since the one before it, s.
     held: Option<(Vector3<T>, T)>,
-    /// A₀ and b₀ of the turn under way.
-    reference: Triad<T>,
+    /// By A₀ and b₀ of the turn under way.
+    reference: Carrier<T>,
 }
 
 impl<T: Scalar, const B: usize> Default for TurnObserver<T, B> {
@@ -191,7 +190,8 @@ impl<T: Scalar, const B: usize> Default for TurnObserver<T, B> {
 impl<T: Scalar, const B: usize> TurnObserver<T, B> {
     /// Before the first rest.
     pub fn new() -> Self {
-        Self { way: Way::Lost, builder: BlockBuilder::default(), held: None, reference: Triad::identity() }
+        let reference = Carrier::new(&Triad::identity());
+        Self { way: Way::Lost, builder: BlockBuilder::default(), held: None, reference }
     }
 
     /// Takes a rate `w_ns_s` in, rad/s, that was measured `since` s after the one before. It is held from half-way after the one
@@ -237,7 +237,8 @@ impl<T: Scalar, const B: usize> TurnObserver<T, B> {
             (Way::Resting(kept, now), _) => {
                 let mut path = Path::new();
                 for quarter in kept.iter().flatten().chain([&*now]) {
-                    path.push(&quarter.block, quarter.duration, &quarter.attitude);
+                    path.attitude *= quarter.attitude;
+                    path.push(&quarter.block, quarter.duration);
                 }
                 self.way = Way::Turning(path, None);
                 None
@@ -259,24 +260,23 @@ impl<T: Scalar, const B: usize> TurnObserver<T, B> {
     }
 
     fn rest(&mut self, best: &Triad<T>) {
-        self.reference = *best;
+        self.reference = Carrier::new(best);
         self.way = Way::Resting([None; KEPT], Quarter::new());
     }
 
     /// Ends a block.
     fn block(&mut self) {
         let (block, duration) = self.builder.finish();
-        let alone = Turn {
-            blocks: core::slice::from_ref(&block),
-            durations: Durations::Uniform(duration),
-            before: Vector3::z(),
-            after: Vector3::z(),
-        };
-        let step = attitude(&self.reference, &alone);
         match &mut self.way {
             Way::Lost => {}
-            Way::Resting(_, now) => now.push(&block, duration, &step),
-            Way::Turning(path, _) => path.push(&block, duration, &step),
+            Way::Resting(_, now) => {
+                self.reference.carry(&mut now.attitude, &block, duration);
+                now.push(&block, duration);
+            }
+            Way::Turning(path, _) => {
+                self.reference.carry(&mut path.attitude, &block, duration);
+                path.push(&block, duration);
+            }
         }
     }
 }

@@ -24,6 +24,7 @@ pub const CANDIDATES: usize = 26;
 const SAME: f32 = 0.965_925_8;
 
 /// Direction of candidate `index`, unit vector; `None` beyond the last.
+#[inline]
 pub(super) fn candidate(index: usize) -> Option<Vector3<f32>> {
     // Skips the middle of the cube.
     let index = if index < 13 { index } else { index.saturating_add(1) };
@@ -47,6 +48,7 @@ pub(super) struct Lowered<'a> {
 impl RowSink<f32, 9> for Lowered<'_> {
     const JACOBIAN: bool = true;
 
+    #[inline]
     fn row(&mut self, _: f32, jacobian: &SVector<f32, 9>) {
         let moved = self.covariance * jacobian;
         let weighed = moved.component_mul(&moved).dot(self.weights);
@@ -71,6 +73,7 @@ impl Scores {
     }
 
     /// The larger score of both.
+    #[inline]
     pub(super) fn larger(&self, other: &Self) -> Self {
         let mut all = *self;
         for (slot, new) in all.0.iter_mut().zip(&other.0) {

@@ -30,6 +30,7 @@ pub struct Estimate {
 
 impl Estimate {
     /// For a record, under the name of its model.
+    #[inline]
     pub fn record(&self, model: &str, units: &Units) -> TriadRecord {
         let mut record = self.summary.record(&self.triad, &self.std, model, units);
         record.quality.field_norm = self.field_norm;
@@ -41,6 +42,7 @@ impl Estimate {
 /// and the bias; gives the triad, its standard errors and the field's length.
 ///
 /// `A' = A / d`, d = det(A)^⅓, `dA' = (dA − A · ⅓ tr(A⁻¹ dA)) / d`, and the trace is `Σ dA_ii / A_ii`.
+#[inline]
 pub(super) fn to_unit_determinant(
     triad: &Triad<f32>,
     covariance: &SMatrix<f32, 9, 9>,

@@ -64,6 +64,7 @@ impl<const N: usize, const B: usize> Model<f32, 9> for Rests<'_, N, B> {
 }
 
 /// T9 and E9 of one point.
+#[inline]
 pub(super) fn shell(point: &ShellPoint<f32>, norm: f32) -> NormModel<'_, f32, 9> {
     NormModel { points: core::slice::from_ref(point), norm, form: UPPER_TRIANGULAR }
 }

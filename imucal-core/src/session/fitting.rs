@@ -190,6 +190,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     }
 }
 
+#[inline]
 pub(super) fn acc_limits() -> Limits {
     Limits::for_norm(9, 10)
 }
@@ -202,6 +203,7 @@ fn length(model: &impl Model<f32, 9>, solver: &LevenbergMarquardt<f32, 9>) -> Op
 }
 
 /// Centre and radius of the sphere nearest to a cloud: `|x|² = 2 c·x + k` by least squares, about the mean.
+#[inline]
 fn sphere(slots: &[Slot<f32>]) -> Option<(Vector3<f32>, f32)> {
     let mut moments = Moments::default();
     slots.iter().for_each(|slot| moments.push(&slot.mean));

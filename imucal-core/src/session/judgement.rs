@@ -184,6 +184,7 @@ fn list<V, const R: usize>(values: impl Iterator<Item = V>) -> Vec<V, R> {
 /// The covariance that is stated: of the residuals' variance, with that of white noise counted as [`PRIOR`] more of them where it
 /// is known, and wider by what few residuals leave open: 1.96 standard errors are the 95 % of Student's t (to its second order in
 /// 1/ν, Fisher and Cornish 1960).
+#[inline]
 fn stated(fit: &Fit, white: Option<f32>) -> Option<SMatrix<f32, 9, 9>> {
     let variance = fit.solver.variance()?;
     let own = fit.solver.report().independent_rows.saturating_sub(9) as f32;
@@ -195,11 +196,13 @@ fn stated(fit: &Fit, white: Option<f32>) -> Option<SMatrix<f32, 9, 9>> {
 }
 
 /// Raw length of a vector of some norm: that of a gain of the same size in all directions.
+#[inline]
 fn radius(triad: &Triad<f32>, norm: f32) -> f32 {
     norm * libm::sqrtf(3.0 / triad.gain.norm_squared())
 }
 
 /// Weights of the parameters in the square of the relative error; a full gain has no bias among its parameters.
+#[inline]
 fn weights(triad: &Triad<f32>, radius: f32) -> SVector<f32, 9> {
     let gain = 1.0 / triad.gain.norm_squared();
     let bias = if triad.gain.m21 == 0.0 && triad.gain.m31 == 0.0 { 1.0 / (radius * radius) } else { gain };

@@ -132,10 +132,20 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
 
     /// Takes a sample in: nominal SI, sensor axes.
     pub fn push(&mut self, sample: &Sample<f32>) {
-        let sample = self.within_range(sample);
-        match self.observer.push(&sample) {
+        let [acc, gyr, _] = self.settings.full_scale;
+        let clips = beyond(&sample.acc, acc) || sample.gyr.as_ref().is_some_and(|rate| beyond(rate, gyr));
+        let seen = if clips { self.clipped(sample) } else { self.observer.push(sample) };
+        if !matches!(seen, Seen::Nothing) {
+            self.take(&seen);
+        }
+    }
+
+    /// Something new was seen.
+    #[inline(never)]
+    fn take(&mut self, seen: &Seen<f32, B>) {
+        match seen {
             Seen::Nothing => {}
-            Seen::Rest(rest) => self.keep(&rest),
+            Seen::Rest(rest) => self.keep(rest),
             Seen::NoRest => {
                 self.thrown.rests = self.thrown.rests.saturating_add(1);
                 // It was a rest for the turn that led to it.
@@ -144,25 +154,28 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
                 }
                 self.field = Moments::default();
             }
-            Seen::Turn(turn) => self.pending = Some(turn),
+            Seen::Turn(turn) => self.pending = Some(turn.clone()),
         }
     }
 
     /// Takes a sample of the magnetometer in, nominal, µT, whenever it has one.
     pub fn push_field(&mut self, field: &Vector3<f32>) {
-        if !field.iter().all(|component| component.is_finite()) || beyond(field, self.settings.full_scale[2])
-        {
+        if beyond(field, self.settings.full_scale[2]) {
             self.thrown.clipped = self.thrown.clipped.saturating_add(1);
             return;
         }
+        match self.cloud.push(field) {
+            Chosen::Unusable => return,
+            Chosen::Near => {}
+            Chosen::New => {
+                self.new_points = self.new_points.saturating_add(1);
+                if self.new_points >= POINTS_A_FIT {
+                    self.mark(Sensor::Magnetometer);
+                }
+            }
+        }
         if self.observer.rests().stage() != Stage::Moving {
             self.field.push(field);
-        }
-        if self.cloud.push(field) == Chosen::New {
-            self.new_points = self.new_points.saturating_add(1);
-            if self.new_points >= POINTS_A_FIT {
-                self.mark(Sensor::Magnetometer);
-            }
         }
     }
 
@@ -192,20 +205,20 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     }
 
     /// What is beyond a sensor's range is not what was measured.
-    fn within_range(&mut self, sample: &Sample<f32>) -> Sample<f32> {
+    #[inline(never)]
+    fn clipped(&mut self, sample: &Sample<f32>) -> Seen<f32, B> {
         let mut sample = *sample;
         let [acc, gyr, _] = self.settings.full_scale;
         let missing = Vector3::repeat(f32::NAN);
+        self.thrown.clipped = self.thrown.clipped.saturating_add(1);
         if beyond(&sample.acc, acc) {
             sample.acc = missing;
-            self.thrown.clipped = self.thrown.clipped.saturating_add(1);
         }
         if sample.gyr.is_some_and(|rate| beyond(&rate, gyr)) {
             sample.gyr = Some(missing);
-            self.thrown.clipped = self.thrown.clipped.saturating_add(1);
             self.observer.interrupt();
         }
-        sample
+        self.observer.push(&sample)
     }
 
     /// A rest has ended.
@@ -228,8 +241,10 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
 }
 
 /// Any component reaches the end of the range.
+#[inline]
 fn beyond(value: &Vector3<f32>, full_scale: f32) -> bool {
-    value.iter().any(|component| libm::fabsf(*component) >= full_scale)
+    let reaches = |component: f32| component >= full_scale || component <= -full_scale;
+    reaches(value.x) || reaches(value.y) || reaches(value.z)
 }
 
 #[cfg(test)]

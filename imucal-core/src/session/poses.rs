@@ -203,6 +203,7 @@ impl<const B: usize> KeptTurn<B> {
 }
 
 /// Of any length but zero.
+#[inline]
 pub(super) fn unit(v: &Vector3<f32>) -> Vector3<f32> {
     v / libm::sqrtf(v.norm_squared())
 }

@@ -82,6 +82,7 @@ pub fn model_of(sensor: Sensor) -> &'static str {
 }
 
 /// Error of a calibrated vector of that length to be expected from what a record states, as a share of it.
+#[inline]
 pub fn stated_error(record: &TriadRecord, length: f32) -> f32 {
     let rows = |rows: &[[f32; 3]; 3]| Matrix3::from(*rows).transpose();
     let gain = rows(&record.gain);
@@ -93,6 +94,7 @@ pub fn stated_error(record: &TriadRecord, length: f32) -> f32 {
 /// three standard errors of both, `None` where it does not, or where the rest turned (its rates spread more than `most`, rad/s).
 ///
 /// A bias that is further off than a record may be wrong by is none: the sensor is turned steadily, or is another one.
+#[inline]
 pub fn bias_of_the_day(rest: &Rest<f32>, stored: &TriadRecord, units: &Units, most: f32) -> Option<[f32; 3]> {
     let count = rest.gyr.count();
     let variance = rest.gyr.variance();

@@ -5,6 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
+use crate::{model::turn::attitude, rotation::exp};
 
 /// A hand's turn by some angle about an axis that wanders, as rates at 100 Hz, rad/s.
 fn hand(seed: u64, angle: f64) -> Vec<Vector3<f64>> {

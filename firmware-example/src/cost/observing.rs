@@ -1,0 +1,74 @@
+//! What a session's samples and slices cost, at rest and in a turn.
+
+use core::{fmt::Write, mem::MaybeUninit};
+
+use imucal_core::{observer::Sample, rotation::exp};
+use nalgebra::{Matrix3, Vector3};
+
+use super::measured;
+use crate::{machine::Stopwatch, scene::Noise, standalone::Standalone};
+
+/// Samples of a rest, and of a turn, at 100 Hz.
+const RESTING: usize = 300;
+const TURNING: usize = 200;
+
+/// A sensor that is turned about by hand.
+struct Hand {
+    noise: Noise,
+    /// From the sensor's axes to the local ones.
+    attitude: Matrix3<f32>,
+    time: u64,
+}
+
+impl Hand {
+    fn sample(&mut self, rate: &Vector3<f32>) -> (Sample<f32>, Vector3<f32>) {
+        self.attitude *= exp(&(rate * 0.01));
+        self.time += 10_000;
+        let to_sensor = self.attitude.transpose();
+        let acc = to_sensor * Vector3::new(0.0, 0.0, -9.8) + self.noise.vector(0.01);
+        let field = to_sensor * Vector3::new(20.0, 2.0, 44.0) + self.noise.vector(0.3);
+        let gyr = Some(rate + self.noise.vector(0.001));
+        (Sample { time: self.time, acc, gyr, temperature: Some(25.0) }, field)
+    }
+}
+
+#[inline(never)]
+fn place() -> &'static mut Standalone {
+    static mut SESSION: MaybeUninit<Standalone> = MaybeUninit::uninit();
+    #[expect(unsafe_code, reason = "memory of the session, which stays off the stack")]
+    // SAFETY: this is called once, and nothing else knows the variable.
+    let session = unsafe { &mut *(&raw mut SESSION) };
+    session.write(Standalone::new(Default::default()))
+}
+
+/// Samples of a whole session in turn, each kind by itself; and the largest slice.
+#[inline(never)]
+pub(super) fn write(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
+    let session = place();
+    let mut hand = Hand { noise: Noise(7), attitude: Matrix3::identity(), time: 0 };
+    let mut slice = 0;
+    for pose in 0..16u32 {
+        let turned = Vector3::new(0.9 - 0.1 * pose as f32, 0.5, 0.3 * (pose % 3) as f32);
+        for (kind, count, rate) in [("rest", RESTING, Vector3::zeros()), ("turn", TURNING, turned)] {
+            let (mut inertial, mut field) = (0u32, 0u32);
+            for _ in 0..count {
+                let (sample, measured) = hand.sample(&rate);
+                let before = watch.ticks();
+                session.push(&sample);
+                let between = watch.ticks();
+                session.push_field(&measured);
+                let after = watch.ticks();
+                session.work();
+                slice = watch.ticks().wrapping_sub(after).max(slice);
+                inertial = inertial.wrapping_add(between.wrapping_sub(before));
+                field = field.wrapping_add(after.wrapping_sub(between));
+            }
+            if pose == 15 {
+                writeln!(out, "session_{kind} ticks {inertial} for {count} stack 0")?;
+                writeln!(out, "session_field_{kind} ticks {field} for {count} stack 0")?;
+            }
+        }
+    }
+    writeln!(out, "session_slice ticks {slice} for 1 stack 0")?;
+    measured(out, watch, ("session_guide", 1), || session.guide()).map(drop)
+}
