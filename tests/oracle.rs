@@ -11,6 +11,7 @@ use imucal_core::{
     scalar::Scalar,
     solver::LevenbergMarquardt,
     triad::Triad,
+    watch::run_length::Thresholds,
 };
 use imucal_host::{
     ellipsoid::{adjusted, sphere},
@@ -352,5 +353,22 @@ fn own_ends_of_turns_move_the_gyroscope_by_little_of_its_error() {
         let Some((worst, ..)) = gyroscope(name, &golden, false) else { return };
         // A row of noise more at either end: 0.3 °/s · 0.01 s against residuals of 0.1° and more.
         assert!(worst < 0.05, "{name}: gain off by {worst} standard errors");
+    }
+}
+
+#[test]
+fn thresholds_of_the_drift_watch_are_those_of_the_chain_of_run_lengths() {
+    let golden = golden("watch_run_length");
+    // As `watch::run_length` shares the rate out: twelve sums, seconds of a day or so many poses.
+    for (chart, terms, share) in [("step", 86_400.0, 0.8), ("record", 8640.0, 0.2)] {
+        let (decades, thresholds) =
+            (numbers(&golden[chart]["decades"]), numbers(&golden[chart]["thresholds"]));
+        assert_eq!((decades.len(), thresholds.len()), (9, 9));
+        for (decade, expected) in decades.into_iter().zip(thresholds) {
+            let rate = 12.0 * terms / (share * 10f64.powf(decade));
+            let of = Thresholds::of(rate as f32);
+            let found = f64::from(if chart == "step" { of.step } else { of.record });
+            assert!((found - expected).abs() < 2e-3, "{chart}, 10^{decade}: {found} for {expected}");
+        }
     }
 }

@@ -23,6 +23,7 @@
 //! | all of it, without a host | [`session`] | what to do next, and when it is enough |
 //! | what is applied | [`corrector`] | `calibrated = gain · (raw − bias)`, sample by sample |
 //! | what is applied without a floating-point unit | [`integer`] | the same from counts of 16 bits, in integers alone |
+//! | whether it still holds | [`watch`] | alarms of drift while the device does its work, and a summary |
 //! | what is said to a host | `link`, a feature | frames and messages between a device and its host |
 //!
 //! A device that only applies needs [`record`] and [`corrector`], or [`integer`], alone.
@@ -86,6 +87,8 @@ pub mod session;
 pub mod corrector;
 
 pub mod integer;
+
+pub mod watch;
 
 #[cfg(feature = "link")]
 pub mod link;

@@ -19,6 +19,7 @@ mod outputs;
 mod overwriting;
 mod printing;
 mod trials;
+mod watching;
 
 /// Runs the program with these arguments.
 fn imucal<A: AsRef<OsStr>>(arguments: &[A]) -> Ended {

@@ -24,6 +24,7 @@ mod observer;
 mod record;
 mod session;
 mod solver;
+mod watch;
 
 /// Calls them all.
 pub fn reach_all() {
@@ -35,6 +36,7 @@ pub fn reach_all() {
     solver::reach_all();
     record::reach_all();
     session::reach_all();
+    watch::reach_all();
     link::reach_all();
 }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
+use imucal_core::watch::WatchSummary;
 
 use super::{
     Ending, load, output,
@@ -22,6 +23,7 @@ use crate::{
     file::OutputSet,
     recording::{self, Recording, Stream, Warning},
     report,
+    store::watch_file,
 };
 
 #[derive(Args, Debug)]
@@ -39,6 +41,9 @@ pub(super) struct Arguments {
     /// Which of several streams in SIM is meant: NAME of columns sim_NAME_acc_x, sim_NAME_gyr_x, … (m/s², rad/s, µT)
     #[arg(long, value_name = "NAME", requires = "sim")]
     sim_topic: Option<String>,
+    /// What the drift watch of the unit's device has seen, as the device wrote it; it is reported next to the diagnosis
+    #[arg(long, value_name = "FILE")]
+    watch: Option<PathBuf>,
     /// Exclude effects from the candidates, or terms (such as acc.misalignment) from the baseline
     #[arg(long, value_name = "EFFECT_OR_TERM", num_args = 1..)]
     without: Vec<String>,
@@ -86,6 +91,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     inputs.extend(arguments.model.clone());
     inputs.extend(arguments.sim.iter().flat_map(|path| files_of(path)));
     inputs.extend(arguments.effects.clone());
+    inputs.extend(arguments.watch.clone());
     let files = arguments.overwrite.plan(&inputs, &written.map(Planned::new).collect::<Vec<_>>())?;
     let recording = read(path, arguments.reading)?;
     let model = arguments.model.as_deref().map(|path| load(path, arguments.reading)).transpose()?;
@@ -96,12 +102,29 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let topic = arguments.sim_topic.as_deref();
     let stream = arguments.sim.as_deref().map(|path| stream(path, topic, &recording, arguments.reading));
     let stream = stream.transpose()?;
-    let options = Options { without, model, stream, effects: own, frozen, settings: None };
+    let watch =
+        arguments.watch.as_deref().map(|path| watch_of(path, &recording, arguments.reading)).transpose()?;
+    let options = Options { without, model, stream, effects: own, frozen, watch, settings: None };
     let progress = Progress::start();
     let diagnosis = diagnose(&recording, &options, &|stage| progress.stage(stage));
     drop(progress);
     print(arguments, &diagnosis, files)?;
     Ok(if diagnosis.verdict == Verdict::NotTestable { Ending::Refused } else { Ending::Done })
+}
+
+/// The summary of a drift watch, which must be of the recording's unit where both are known.
+fn watch_of(path: &Path, recording: &Recording, reading: Reading) -> anyhow::Result<WatchSummary> {
+    let summary = watch_file::read_within(path, &reading.limits())?;
+    let (found, expected) =
+        (summary.sensor.serial.as_str(), recording.manifest.sensor.serial.as_deref().unwrap_or_default());
+    if !found.is_empty() && !expected.is_empty() && found != expected {
+        anyhow::bail!(
+            "{}: found the drift watch of the unit `{found}`, expected that of the recording, `{expected}`; give the summary of \
+             that unit",
+            path.display()
+        );
+    }
+    Ok(summary)
 }
 
 /// The text of the user's file, where its effects are to be confirmed.

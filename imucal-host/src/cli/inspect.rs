@@ -4,25 +4,36 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Ending, load, output::say, reading::Reading};
+use super::{
+    Ending, load,
+    output::{self, say},
+    reading::Reading,
+};
 use crate::{
+    diagnosis::watched::Watched,
     recording::SensorKind,
     report::{
         measure::{measure, percent, plain, rounded},
         table::words,
+        watch,
     },
-    store::StoredTriad,
+    store::{StoredTriad, watch_file},
 };
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
-    /// The calibration: TOML or record
+    /// The calibration: TOML or record; or the summary of a device's drift watch
     calibration: PathBuf,
     #[command(flatten)]
     reading: Reading,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let limits = arguments.reading.limits();
+    // What cannot be read is reported below, as of a calibration.
+    if limits.read_small(&arguments.calibration).is_ok_and(|bytes| watch_file::is_summary(&bytes)) {
+        return print_watch(arguments);
+    }
     let stored = match load(&arguments.calibration, arguments.reading)? {
         Ok(stored) => stored,
         Err(damaged) => {
@@ -40,6 +51,20 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         }
     }
     Ok(Ending::Done)
+}
+
+fn print_watch(arguments: &Arguments) -> anyhow::Result<Ending> {
+    match watch_file::read_within(&arguments.calibration, &arguments.reading.limits()) {
+        Ok(summary) => {
+            say!("{}: intact", arguments.calibration.display());
+            output::text(&watch::watched(&Watched::of(&summary, &[])))?;
+            Ok(Ending::Done)
+        }
+        Err(damaged) => {
+            say!("{damaged}");
+            Ok(Ending::Refused)
+        }
+    }
 }
 
 fn or_unknown(text: &str) -> &str {

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::watched::Watched;
 use crate::{effect::Effect, recording::manifest::ReferenceKind};
 
 /// The contract's name of what [`Diagnosis`] is serialised to.
@@ -69,6 +70,9 @@ pub struct Diagnosis {
     /// Formulas for what no effect of the catalogue explains.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub proposals: Vec<Proposal>,
+    /// What the drift watch of the unit's device has seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub watch: Option<Watched>,
 }
 
 impl Diagnosis {

@@ -12,6 +12,7 @@ pub mod screening;
 pub mod search;
 pub mod settings;
 pub mod verdict;
+pub mod watched;
 
 pub use self::{
     error::DiagnosisError,
@@ -31,7 +32,10 @@ use self::{
     },
     settings::{Settings, Source},
     verdict::answer::{Answer, answer, untestable},
+    watched::Watched,
 };
+use imucal_core::watch::WatchSummary;
+
 use crate::{
     effect::Effect,
     recording::{Recording, Stream},
@@ -52,16 +56,21 @@ pub struct Options {
     /// Text of the user's file where its effects are no candidates: their amplitudes are as the file has found them, and the
     /// diagnosis says whether the recording confirms them.
     pub frozen: Option<String>,
+    /// What the drift watch of the unit's device has seen.
+    pub watch: Option<WatchSummary>,
     /// Settings; without them, the preset of the source of the movement.
     pub settings: Option<Settings>,
 }
 
 /// Diagnoses a recording; `progress` hears of each stage. Where no diagnosis can be made, a remark says why.
 pub fn diagnose(recording: &Recording, options: &Options, progress: &dyn Fn(&str)) -> Diagnosis {
-    try_diagnose(recording, options, progress).unwrap_or_else(|why| untestable(recording, why.to_string()))
+    let diagnosed = try_diagnose(recording, options, progress);
+    let diagnosis = diagnosed.unwrap_or_else(|why| untestable(recording, why.to_string()));
+    let watch = options.watch.as_ref().map(|summary| Watched::of(summary, &diagnosis.causes));
+    Diagnosis { watch, ..diagnosis }
 }
 
-/// Likewise.
+/// Likewise, without the drift watch.
 ///
 /// # Errors
 ///

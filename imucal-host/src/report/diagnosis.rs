@@ -5,6 +5,7 @@ use std::fmt::{self, Write};
 use super::{
     measure::{measure, plain},
     prose::{hanging, listed},
+    watch,
 };
 use crate::{
     diagnosis::{
@@ -49,7 +50,11 @@ fn write_page(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
     write_proposals(text, &diagnosis.proposals)?;
     write_experiments(text, diagnosis)?;
     write_absent(text, diagnosis)?;
-    write_not_testable(text, diagnosis)
+    write_not_testable(text, diagnosis)?;
+    if let Some(watch) = &diagnosis.watch {
+        write!(text, "\n{}", watch::watched(watch))?;
+    }
+    Ok(())
 }
 
 /// The contract's word for a verdict.

@@ -7,3 +7,4 @@ pub mod measure;
 pub mod model;
 pub mod prose;
 pub mod table;
+pub mod watch;

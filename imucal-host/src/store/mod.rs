@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 pub mod form;
 pub mod record_form;
+pub mod watch_file;
 
 use crate::{
     calibrate::{Calibration, FitSummary, SensorOutcome},

@@ -22,6 +22,7 @@ fn nothing(recording: &Recording) -> Diagnosis {
         not_testable: Vec::new(),
         user_effects: Vec::new(),
         proposals: Vec::new(),
+        watch: None,
         next_experiment: Vec::new(),
     }
 }

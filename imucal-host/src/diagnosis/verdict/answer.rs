@@ -46,6 +46,7 @@ pub fn untestable(recording: &Recording, why: String) -> Diagnosis {
         next_experiment: Vec::new(),
         user_effects: Vec::new(),
         proposals: Vec::new(),
+        watch: None,
     }
 }
 
