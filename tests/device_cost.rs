@@ -9,7 +9,7 @@ use firmware_example::{
 };
 use imucal_tests::call_stack::CallGraph;
 use imucal_tests::coprocessor::painted_stack;
-use imucal_tests::firmware::{BOARDS, SHIFT, announce, counted, ready};
+use imucal_tests::firmware::{MEASURED, SHIFT, announce, counted, ready};
 use imucal_tests::footprint::{self, Footprint};
 
 /// Frequency of the images' stopwatch, Hz: of mps2-an386, and of the micro:bit.
@@ -60,14 +60,14 @@ fn every_part_stays_within_its_instructions_flash_ram_and_stack() {
     if !ready() {
         return;
     }
-    let costs = [0, 1].map(|k| parts(&counted(BOARDS[k], "cost"), STOPWATCH[k]));
+    let costs = [0, 1].map(|k| parts(&counted(MEASURED[k], "cost"), STOPWATCH[k]));
     let flash = Flash::measured();
     let ram = [size_of::<fitting::Memory<64, 0, 0, 0, 0>>() + size_of::<Fitting<'_, 0, 0, 0, 0, 0>>()]
         .into_iter()
         .chain([size_of::<fitting::Memory<0, 0, 0, 0, 40>>()]);
     let ram: Vec<usize> = ram.collect();
-    let stack = BOARDS.map(|board| CallGraph::of(&footprint::elf(board, "coprocessor")));
-    let painted = BOARDS.map(painted_stack);
+    let stack = MEASURED.map(|board| CallGraph::of(&footprint::elf(board, "coprocessor")));
+    let painted = MEASURED.map(painted_stack);
 
     print_costs(&costs);
     let [m4, m0] = &costs;
@@ -86,7 +86,7 @@ fn every_part_stays_within_its_instructions_flash_ram_and_stack() {
     let depths = stack.map(|graph| graph.depth("main"));
     both("stack: the co-processor, by analysis", [0, 1].map(|k| depths[k].bytes.into()));
     both("stack: after fits, search, storing, by paint", painted.map(Into::into));
-    let room = BOARDS.map(|board| footprint::stack(board, "coprocessor"));
+    let room = MEASURED.map(|board| footprint::stack(board, "coprocessor"));
     both("stack: room for it, and then a fault", room.map(Into::into));
 
     check_costs(m4, m0);
@@ -106,7 +106,7 @@ fn every_part_stays_within_its_instructions_flash_ram_and_stack() {
 #[test]
 fn a_sample_in_integers_calls_no_function_and_so_no_arithmetic_in_software() {
     if ready() {
-        for board in BOARDS {
+        for board in MEASURED {
             let graph = CallGraph::of(&footprint::elf(board, "integer"));
             let sample = graph.depth("correct17apply_in_integers");
             assert_eq!(sample.chain.len(), 1, "{sample:#?}");
@@ -121,7 +121,7 @@ fn a_sample_in_integers_calls_no_function_and_so_no_arithmetic_in_software() {
 #[test]
 fn only_the_gauge_of_the_stack_is_called_through_a_pointer() {
     if ready() {
-        for board in BOARDS {
+        for board in MEASURED {
             let graph = CallGraph::of(&footprint::elf(board, "coprocessor"));
             assert!(graph.indirect().len() <= 1, "{:?}", graph.indirect());
         }
@@ -139,9 +139,9 @@ struct Flash {
 
 impl Flash {
     fn measured() -> Self {
-        let empty = BOARDS.map(|board| Footprint::of(board, "empty"));
+        let empty = MEASURED.map(|board| Footprint::of(board, "empty"));
         let over = |k: usize, image: &str| {
-            let footprint = Footprint::of(BOARDS[k], image);
+            let footprint = Footprint::of(MEASURED[k], image);
             (footprint.flash - empty[k].flash, footprint.ram - empty[k].ram)
         };
         let whole = [0, 1].map(|k| over(k, "coprocessor"));

@@ -5,7 +5,7 @@ use imucal_core::{
     link::FitModel,
     model::parameterisation::{FULL, UPPER_TRIANGULAR},
 };
-use imucal_tests::firmware::{BOARDS, Board, build, ready, run, run_with};
+use imucal_tests::firmware::{BOARDS, Board, RISC_V, build, ready, run, run_with};
 use imucal_tests::footprint;
 use object::{Object, ObjectSection, ObjectSymbol};
 
@@ -20,14 +20,17 @@ fn every_image_links_without_panic_or_allocator_and_runs() {
     if !ready() {
         return;
     }
-    for board in BOARDS {
-        // With the key, so that the gate reaches the seals as well.
-        for (image, features) in
-            [("gate", &["key"][..]), ("correct", &[]), ("integer", &[]), ("empty", &[]), ("cost", &[])]
-        {
+    // With the key, so that the gate reaches the seals as well.
+    let everywhere = [("gate", &["key"][..]), ("correct", &[]), ("integer", &[]), ("empty", &[])];
+    for board in BOARDS.into_iter().chain([RISC_V]) {
+        for (image, features) in everywhere {
             let output = run_with(board, image, features);
             assert_eq!(output.status.code(), Some(0), "{image} on {}: {output:?}", board.core);
         }
+    }
+    for board in BOARDS {
+        let output = run(board, "cost");
+        assert_eq!(output.status.code(), Some(0), "cost on {}: {output:?}", board.core);
         build(board, "coprocessor", &[]).unwrap_or_else(|refusal| panic!("{refusal}"));
     }
 }
@@ -52,7 +55,7 @@ fn a_deliberate_panic_does_not_link() {
     if !ready() {
         return;
     }
-    for board in BOARDS {
+    for board in BOARDS.into_iter().chain([RISC_V]) {
         let refusal =
             build(board, "gate", &["control-panic", "key"]).expect_err("the gate lets a panic through");
         assert!(
@@ -70,7 +73,7 @@ fn device_and_host_compute_the_same_bits() {
     if !ready() {
         return;
     }
-    for board in BOARDS {
+    for board in BOARDS.into_iter().chain([RISC_V]) {
         assert_eq!(after_the_lines_of(&host, board, "replay"), "", "on {}", board.core);
     }
 }
@@ -141,6 +144,7 @@ fn device_and_host_fit_search_and_pack_to_the_same_bits() {
         assert!(used < there, "{}: the stack has left its memory", board.core);
         assert!(used <= STACK_BUDGET, "{}: {used} B of stack", board.core);
     }
+    assert_eq!(after_the_lines_of(&host, RISC_V, "fit"), "", "on {}", RISC_V.core);
 }
 
 fn fits_of_the_host() -> String {
@@ -161,9 +165,18 @@ fn after_the_lines_of(host: &str, board: Board, image: &str) -> String {
 }
 
 #[test]
-fn the_image_of_the_real_board_links() {
-    if ready() {
-        build(BOARDS[0], "nrf52840", &["nrf52840"]).unwrap_or_else(|refusal| panic!("{refusal}"));
+fn the_images_of_the_real_board_link_with_their_log() {
+    if !ready() {
+        return;
+    }
+    for image in ["nrf52840", "embassy", "rtic"] {
+        let elf = build(BOARDS[0], image, &[image]).unwrap_or_else(|refusal| panic!("{refusal}"));
+        let bytes = std::fs::read(elf).expect("the image can be read");
+        let file = object::File::parse(&*bytes).expect("an ELF file");
+        // What a debugger looks for in RAM, and the texts that defmt leaves in the file.
+        assert!(file.symbol_by_name("_SEGGER_RTT").is_some(), "{image} has no RTT");
+        let texts = file.section_by_name(".defmt").map_or(0, |section| section.size());
+        assert!(texts > 0, "{image} says nothing");
     }
 }
 

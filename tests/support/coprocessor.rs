@@ -18,7 +18,11 @@ use crate::firmware::{Board, build};
 /// Where it does not build.
 pub fn address(board: Board) -> String {
     let image = build(board, "coprocessor", &[]).unwrap_or_else(|refusal| panic!("{refusal}"));
-    let machine = if board.machine == "microbit" { "microbit" } else { "qemu" };
+    let machine = match board.machine {
+        "mps2-an386" => "qemu",
+        "mps2-an505" => "an505",
+        other => other,
+    };
     format!("{machine}:{}", image.display())
 }
 

@@ -2,7 +2,7 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-#[cortex_m_rt::entry]
+#[firmware_example::entry]
 fn main() -> ! {
     // A real unit reads serial and key where they were written when it was made.
     let serial = option_env!("IMUCAL_SERIAL").unwrap_or_default();

@@ -2,14 +2,12 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-#[cortex_m_rt::entry]
+#[firmware_example::entry]
 fn main() -> ! {
-    use core::fmt::Write;
     use firmware_example::{
         FAILED,
         console::Console,
         fit::{self, FitMemory},
-        stack,
     };
 
     #[expect(unsafe_code, reason = "memory of the fits, as on the co-processor")]
@@ -18,11 +16,21 @@ fn main() -> ! {
         // SAFETY: the entry point runs once, and nothing else knows the variable.
         unsafe { &mut *(&raw mut MEMORY) }
     };
-    let written = fit::write(&mut Console, memory).and_then(|()| {
-        let (used, there) = stack::deepest();
-        writeln!(Console, "stack {used} of {there} B")
-    });
+    let written = fit::write(&mut Console, memory).and_then(|()| gauge());
     semihosting::process::exit(if written.is_ok() { 0 } else { FAILED })
+}
+
+#[cfg(cortex_m)]
+fn gauge() -> core::fmt::Result {
+    use core::fmt::Write;
+    let (used, there) = firmware_example::stack::deepest();
+    writeln!(firmware_example::console::Console, "stack {used} of {there} B")
+}
+
+/// The start-up code of RISC-V paints no stack.
+#[cfg(virt)]
+fn gauge() -> core::fmt::Result {
+    Ok(())
 }
 
 #[cfg(not(target_os = "none"))]

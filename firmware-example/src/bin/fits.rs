@@ -3,7 +3,7 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-#[cortex_m_rt::entry]
+#[firmware_example::entry]
 fn main() -> ! {
     use core::hint::black_box;
     use firmware_example::{

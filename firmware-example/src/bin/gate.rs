@@ -2,7 +2,7 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-#[cortex_m_rt::entry]
+#[firmware_example::entry]
 fn main() -> ! {
     let status = if runs() { 0 } else { firmware_example::FAILED };
     semihosting::process::exit(status)

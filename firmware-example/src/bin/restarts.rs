@@ -3,7 +3,7 @@
 #![cfg_attr(target_os = "none", allow(unsafe_code))] // A read of what is not there.
 
 #[cfg(target_os = "none")]
-#[cortex_m_rt::entry]
+#[firmware_example::entry]
 fn main() -> ! {
     use core::fmt::Write;
     use firmware_example::{FAILED, console::Console, machine::reset};

@@ -2,7 +2,7 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(all(target_os = "none", mps2))]
-#[cortex_m_rt::entry]
+#[firmware_example::entry]
 fn main() -> ! {
     use firmware_example::{FAILED, console::Console, machine, standalone};
     use imucal_core::record::SensorIdentity;
@@ -33,7 +33,7 @@ fn place(
 
 /// The other board has no memory for a session.
 #[cfg(all(target_os = "none", not(mps2)))]
-#[cortex_m_rt::entry]
+#[firmware_example::entry]
 fn main() -> ! {
     semihosting::process::exit(firmware_example::FAILED)
 }

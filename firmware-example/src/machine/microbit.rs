@@ -6,7 +6,7 @@ use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
 
-use super::{CLEAR_PENDING, Register, read_words, wait, wake_by};
+use super::{Register, clear, read_words, wait, wake_by};
 use crate::{
     board::{ByteLink, Clock},
     elapsed::Elapsed,
@@ -116,7 +116,7 @@ pub fn idle() {
         wait(LINE);
     }
     ALARMED.write(0);
-    CLEAR_PENDING.write(1 << TIMER_LINE);
+    clear(TIMER_LINE);
 }
 
 const READY: Register = Register(0x4001_E400);

@@ -3,9 +3,10 @@
 //! | machine | core | UART | record's flash |
 //! | --- | --- | --- | --- |
 //! | `mps2-an386` | Cortex-M4F | CMSDK (Arm DDI 0479) | a window of the board's PSRAM under NOR rules, that a file backs |
+//! | `mps2-an505` | Cortex-M33, secure side | CMSDK | as above |
 //! | `microbit` | Cortex-M0, soft float | nRF51 | the nRF51's own, by its NVMC; lost when QEMU ends |
 //!
-//! What ends a run ([`reset`]) is kept over the reset. The watchdog of `mps2-an386` is run by the tests; of that of the
+//! What ends a run ([`reset`]) is kept over the reset. The watchdogs of the `mps2` are run by the tests; of that of the
 //! `microbit` QEMU has no model.
 #![allow(unsafe_code)] // Registers, and memory that no variable owns.
 
@@ -19,6 +20,8 @@ mod microbit;
 mod mps2;
 #[cfg(nordic)]
 mod nordic;
+#[cfg(all(mps2, nordic))]
+pub mod nrf52840;
 pub mod reset;
 mod stopwatch;
 #[cfg(mps2)]
@@ -122,18 +125,27 @@ fn read_words(from: u32, bytes: &mut [u8]) {
     }
 }
 
-/// Interrupts stay masked: one that is pending ends the wait, and is cleared by hand.
-const ENABLE: Register = Register(0xE000_E100);
-const CLEAR_PENDING: Register = Register(0xE000_E280);
+/// Interrupts stay masked: one that is pending ends the wait, and is cleared by hand. 32 lines a register.
+const ENABLE: usize = 0xE000_E100;
+const CLEAR_PENDING: usize = 0xE000_E280;
+
+fn set_line(registers: usize, line: u32) {
+    Register(registers + (line / 32 * 4) as usize).write(1 << (line % 32));
+}
 
 /// Lets an interrupt line end [`wait`].
 fn wake_by(line: u32) {
     cortex_m::interrupt::disable();
-    ENABLE.write(1 << line);
+    set_line(ENABLE, line);
+}
+
+/// A line is pending no more.
+fn clear(line: u32) {
+    set_line(CLEAR_PENDING, line);
 }
 
 /// Waits for an interrupt; not at all, if one is pending. Those of that line are then pending no more.
 fn wait(line: u32) {
     cortex_m::asm::wfi();
-    CLEAR_PENDING.write(1 << line);
+    clear(line);
 }

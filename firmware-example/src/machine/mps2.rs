@@ -1,4 +1,4 @@
-//! mps2-an386: CMSDK UART 0, and flash in the board's PSRAM.
+//! mps2-an386 and mps2-an505: CMSDK UART 0, and flash in the board's PSRAM.
 
 use core::num::NonZeroU32;
 
@@ -12,13 +12,39 @@ use crate::{
     elapsed::Elapsed,
 };
 
-const DATA: Register = Register(0x4000_4000);
-const STATE: Register = Register(0x4000_4004);
-const CONTROL: Register = Register(0x4000_4008);
-const CLEAR: Register = Register(0x4000_400C);
-const DIVISOR: Register = Register(0x4000_4010);
-/// Interrupt of a byte that has come.
-const RECEIVED: u32 = 0;
+/// Where things lie (Arm AN386, 3.1), and the peripherals' clock, Hz.
+#[cfg(an386)]
+mod map {
+    pub(in crate::machine) const TIMER: usize = 0x4000_0000;
+    pub(super) const UART: usize = 0x4000_4000;
+    #[cfg(not(nordic))]
+    pub(super) const WATCHDOG: usize = 0x4000_8000;
+    /// The PSRAM, which QEMU lets a file back.
+    pub(super) const WINDOW: u32 = 0x2100_0000;
+    /// Interrupt of a byte that has come.
+    pub(super) const RECEIVED: u32 = 0;
+    pub(super) const CLOCK: u32 = 25_000_000;
+}
+
+/// The same, from the secure side (Arm AN505, 3.2 and 3.4).
+#[cfg(an505)]
+mod map {
+    pub(in crate::machine) const TIMER: usize = 0x5000_0000;
+    pub(super) const UART: usize = 0x5020_0000;
+    pub(super) const WATCHDOG: usize = 0x5008_1000;
+    pub(super) const WINDOW: u32 = 0x8000_0000;
+    pub(super) const RECEIVED: u32 = 32;
+    pub(super) const CLOCK: u32 = 20_000_000;
+}
+
+pub(super) use map::TIMER;
+use map::{CLOCK, RECEIVED, UART, WINDOW};
+
+const DATA: Register = Register(UART);
+const STATE: Register = Register(UART + 0x4);
+const CONTROL: Register = Register(UART + 0x8);
+const CLEAR: Register = Register(UART + 0xC);
+const DIVISOR: Register = Register(UART + 0x10);
 
 /// The UART.
 #[derive(Debug)]
@@ -28,7 +54,7 @@ impl Uart {
     /// Switches it on, at 115 200 baud.
     pub fn start() -> Self {
         // QEMU sends nothing while the divisor is below 16.
-        DIVISOR.write(25_000_000 / 115_200);
+        DIVISOR.write(CLOCK / 115_200);
         // Both directions, and an interrupt where a byte comes.
         CONTROL.write(0b1011);
         wake_by(RECEIVED);
@@ -60,7 +86,7 @@ pub struct Uptime {
 impl Uptime {
     /// Starts both timers.
     pub fn start() -> Self {
-        const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(25_000).unwrap();
+        const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(CLOCK / 1_000).unwrap();
         ALARM_ROUND.write(0x00FF_FFFF);
         // By the core's clock, with an interrupt: all are masked, and there is no handler.
         ALARM.write(0b111);
@@ -86,16 +112,16 @@ pub fn idle() {
     INTERRUPT_CONTROL.write(CLEAR_TICK);
 }
 
-#[cfg(not(nordic))]
+#[cfg(all(an386, not(nordic)))]
 const MPU_CONTROL: Register = Register(0xE000_ED94);
-#[cfg(not(nordic))]
+#[cfg(all(an386, not(nordic)))]
 const MPU_BASE: Register = Register(0xE000_ED9C);
-#[cfg(not(nordic))]
+#[cfg(all(an386, not(nordic)))]
 const MPU_SIZE: Register = Register(0xE000_EDA0);
 
 /// Closes the 64 KiB below RAM, so that a stack that is full leaves memory here too: on this machine something unnamed
-/// takes what is written there. The nRF52840 has nothing there.
-#[cfg(not(nordic))]
+/// takes what is written there. The nRF52840 and mps2-an505 have nothing there.
+#[cfg(all(an386, not(nordic)))]
 pub(super) fn close_below_stack() {
     MPU_BASE.write(0x1FFF_0000 | 1 << 4);
     // No access, 2^16 bytes, enabled.
@@ -106,7 +132,7 @@ pub(super) fn close_below_stack() {
     cortex_m::asm::isb();
 }
 
-/// The CMSDK's watchdog (Arm DDI 0479, 4.4), at 25 MHz. It interrupts by the NMI, whose handler ends the run; were that
+/// The CMSDK's watchdog (Arm DDI 0479, 4.4). It interrupts by the NMI, whose handler ends the run; were that
 /// to hang too, it would reset after as long again.
 #[cfg(not(nordic))]
 #[derive(Debug)]
@@ -116,20 +142,18 @@ pub struct Watchdog(());
 impl Watchdog {
     /// Starts it; `milliseconds`: up to 171 000.
     pub fn start(milliseconds: u32) -> Self {
-        Register(0x4000_8000).write(milliseconds.saturating_mul(25_000));
-        Register(0x4000_8008).write(0b11);
+        Register(map::WATCHDOG).write(milliseconds.saturating_mul(CLOCK / 1_000));
+        Register(map::WATCHDOG + 0x8).write(0b11);
         Self(())
     }
 
     /// Puts the reset off.
     pub fn feed(&self) {
-        Register(0x4000_800C).write(1);
+        Register(map::WATCHDOG + 0xC).write(1);
     }
 }
 
-/// Start of the PSRAM, which QEMU lets a file back.
-const WINDOW: u32 = 0x2100_0000;
-/// Bytes of it that are the record's.
+/// Bytes of the window that are the record's.
 const CAPACITY: usize = 4 * PAGE;
 const PAGE: usize = 4096;
 const WORD: usize = 4;

@@ -31,7 +31,7 @@ fn with_kept<R>(change: impl FnOnce(&mut Words) -> R) -> R {
 
 /// How the run before ended; to be asked once, at the start, for it also guards the stack.
 pub fn last() -> LastReset {
-    #[cfg(all(mps2, not(nordic)))]
+    #[cfg(all(an386, not(nordic)))]
     super::mps2::close_below_stack();
     let last = with_kept(restart::begin);
     #[cfg(nordic)]

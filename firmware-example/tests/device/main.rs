@@ -1,5 +1,6 @@
 //! The co-processor's logic, tested where it can be watched: on the host, with simulated flash and a bad link.
 
+mod adapter;
 mod bad_link;
 mod bench;
 mod hostile_line;

@@ -20,10 +20,12 @@ pub struct Mean {
 
 impl Mean {
     /// Every figure is finite.
+    #[inline]
     pub fn is_finite(&self) -> bool {
         self.value.iter().chain(self.variance.iter()).all(|figure| figure.is_finite())
     }
 
+    #[inline]
     fn of(moments: &Moments<f32>) -> Option<Self> {
         let count = moments.count();
         (count > 0).then(|| Self { value: moments.mean(), variance: moments.variance() / count as f32 })
@@ -71,6 +73,7 @@ struct Second {
 }
 
 impl Second {
+    #[inline]
     fn push(&mut self, sample: &CalibratedSample) {
         let values = [Some(sample.acc), sample.gyr, sample.mag];
         for (moments, value) in self.means.iter_mut().zip(values) {
@@ -82,6 +85,7 @@ impl Second {
         }
     }
 
+    #[inline]
     fn look(&self, moved: bool) -> Option<Look> {
         let [acc, gyr, mag] = &self.means;
         Some(Look {
@@ -109,6 +113,7 @@ pub struct LookObserver {
 impl LookObserver {
     /// Takes a sample in; `still`: the [`stage`](crate::observer::rest::RestObserver::stage) of a `RestObserver` that had the raw sample
     /// is not [`Moving`](crate::observer::rest::Stage::Moving).
+    #[inline]
     pub fn push(&mut self, sample: &CalibratedSample, still: bool) -> Option<Look> {
         let since = sample.time.checked_sub(self.last);
         self.last = sample.time;

@@ -84,6 +84,7 @@ impl Statistic {
     pub const ALL: [Self; 6] = [Self::Force, Self::RateX, Self::RateY, Self::RateZ, Self::Field, Self::Dip];
 
     /// The triad that it is of; of the dip, the magnetometer.
+    #[inline]
     pub fn sensor(self) -> Sensor {
         match self {
             Self::Force => Sensor::Accelerometer,
@@ -93,6 +94,7 @@ impl Statistic {
     }
 
     /// Its error depends on the direction of gravity in the sensor.
+    #[inline]
     fn is_of_pose(self) -> bool {
         !matches!(self, Self::RateX | Self::RateY | Self::RateZ)
     }
@@ -134,6 +136,7 @@ struct Seen {
 
 impl Watch {
     /// Of a unit with its record, before the first look. A triad that the record lacks is not watched.
+    #[inline]
     pub fn new(record: &CalibrationRecord, settings: WatchSettings) -> Self {
         let reference = Reference::of(record, &settings);
         Self {
@@ -151,6 +154,7 @@ impl Watch {
     }
 
     /// Takes a second of rest in; true where something was found, or came back: [`summary`](Self::summary) says what.
+    #[inline]
     pub fn push(&mut self, look: &Look) -> bool {
         let back = self.is_set_back(look);
         self.heed_temperature(look.temperature);
@@ -180,12 +184,14 @@ impl Watch {
     }
 
     /// Forgets what the seconds before let expect, as after a start of the device; what was found stays.
+    #[inline]
     pub fn restart(&mut self) {
         self.charts.iter_mut().for_each(Chart::restart);
         self.up = None;
     }
 
     /// What has been seen and found so far.
+    #[inline]
     pub fn summary(&self) -> WatchSummary {
         let Seen {
             started, ended, watched, rests, rejected, outside, clock_jumps, stuck, temperature, ..
@@ -208,6 +214,7 @@ impl Watch {
     }
 
     /// Heeds the clock; true where it was set back.
+    #[inline]
     fn is_set_back(&mut self, look: &Look) -> bool {
         self.seen.started.get_or_insert(look.time);
         let back = look.time < self.seen.ended;
@@ -216,6 +223,7 @@ impl Watch {
         back
     }
 
+    #[inline]
     fn heed_temperature(&mut self, temperature: f32) {
         if !temperature.is_finite() {
             return;
@@ -232,11 +240,13 @@ impl Watch {
     }
 
     /// The record was made for other temperatures.
+    #[inline]
     fn is_outside(&self, temperature: f32) -> bool {
         self.settings.span.is_some_and(|[least, most]| temperature < least || temperature > most)
     }
 
     /// Gravity has the direction that it had; a look without an accelerometer is taken for the same pose.
+    #[inline]
     fn is_same_pose(&mut self, look: &Look) -> bool {
         let up = look.acc.value / libm::sqrtf(look.acc.value.dot(&look.acc.value));
         if !up.iter().all(|component| component.is_finite()) {
@@ -250,6 +260,7 @@ impl Watch {
     }
 
     /// Of each triad, whether its value can be judged: finite, and not stuck.
+    #[inline]
     fn usable(&mut self, look: &Look) -> [bool; 3] {
         let mut usable = [false; 3];
         let means = [Some(look.acc), look.gyr, look.mag];
@@ -269,6 +280,7 @@ impl Watch {
         usable
     }
 
+    #[inline]
     fn now(&self, look: &Look, since: u32) -> Now {
         let memory = if self.settings.memory > 1.0 { self.settings.memory } else { 1.0 };
         Now { time: look.time, since, memory, temperature: look.temperature }

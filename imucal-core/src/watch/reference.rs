@@ -34,6 +34,7 @@ pub(super) struct Reading {
 
 impl Reading {
     /// A figure that a sensor can have, in whatever unit: its squares are finite too.
+    #[inline]
     pub(super) fn is_usable(&self) -> bool {
         self.value.is_finite() && self.value.abs() < LARGEST && self.white >= 0.0 && self.white < LARGEST
     }
@@ -53,6 +54,7 @@ struct Errors {
 }
 
 impl Errors {
+    #[inline]
     fn of(record: &TriadRecord) -> Option<Self> {
         let Triad { gain, .. } = record.triad::<f32>();
         let quality = &record.quality;
@@ -67,6 +69,7 @@ impl Errors {
     }
 
     /// Variance of the component of `value` along `a`.
+    #[inline]
     fn along(&self, a: &Vector3<f32>, value: &Vector3<f32>) -> f32 {
         let raw = self.sensitivity * value;
         let of_gain = a.component_mul(a).dot(&(self.gain * raw.component_mul(&raw)));
@@ -91,6 +94,7 @@ pub(super) struct Reference {
 }
 
 impl Reference {
+    #[inline]
     pub(super) fn of(record: &CalibrationRecord, settings: &WatchSettings) -> Self {
         let acc = record.acc.as_ref().and_then(Errors::of);
         let gyr = record.gyr.as_ref().and_then(Errors::of);
@@ -113,6 +117,7 @@ impl Reference {
     }
 
     /// The statistics of a look, in the order of [`Statistic::ALL`]; of triads that are not watched or not usable, `None`.
+    #[inline]
     pub(super) fn readings(&self, look: &Look, usable: [bool; 3]) -> [Option<Reading>; 6] {
         let [acc, gyr, mag] = usable;
         let force = self.acc.filter(|_| acc).and(length(&look.acc));
@@ -141,6 +146,7 @@ impl Reference {
     }
 
     /// What a healthy unit may be off by at this look.
+    #[inline]
     pub(super) fn allowance(&self, settings: &WatchSettings, statistic: Statistic, look: &Look) -> Allowance {
         let square = |value: f32| value * value;
         let [of_acc, of_gyr, of_mag] = settings.instability.map(square);
@@ -184,21 +190,25 @@ impl Reference {
 }
 
 /// The field's length, where the fit found it and calibrated values have its unit.
+#[inline]
 fn own_field(mag: &TriadRecord) -> Option<f32> {
     let alike = mag.unit_out == mag.unit_in || mag.unit_out == RawUnit::Arbitrary;
     mag.quality.field_norm.filter(|_| alike)
 }
 
+#[inline]
 fn rows_squared(matrix: &Matrix3<f32>) -> Vector3<f32> {
     let square = matrix.component_mul(matrix);
     square.column(0) + square.column(1) + square.column(2)
 }
 
+#[inline]
 fn unit(vector: &Vector3<f32>) -> Vector3<f32> {
     vector / libm::sqrtf(vector.dot(vector))
 }
 
 /// Length of a mean.
+#[inline]
 fn length(mean: &Mean) -> Option<Reading> {
     let value = libm::sqrtf(mean.value.dot(&mean.value));
     let up = mean.value / value;
@@ -206,6 +216,7 @@ fn length(mean: &Mean) -> Option<Reading> {
 }
 
 /// How the cosine of the angle between two vectors changes with each.
+#[inline]
 fn across(f: &Vector3<f32>, b: &Vector3<f32>) -> (Vector3<f32>, Vector3<f32>) {
     let (u, v) = (unit(f), unit(b));
     let cosine = u.dot(&v);
@@ -213,6 +224,7 @@ fn across(f: &Vector3<f32>, b: &Vector3<f32>) -> (Vector3<f32>, Vector3<f32>) {
 }
 
 /// Cosine of the angle between two means.
+#[inline]
 fn cosine(f: &Mean, b: &Mean) -> Option<Reading> {
     let value = unit(&f.value).dot(&unit(&b.value));
     let (of_f, of_b) = across(&f.value, &b.value);

@@ -56,7 +56,7 @@ enum Command {
 /// Where the device is.
 #[derive(Args, Debug)]
 pub(super) struct Place {
-    /// `serial:PATH[@BAUD]`, `tcp:HOST:PORT`, `qemu[:IMAGE]` or `microbit[:IMAGE]`
+    /// `serial:PATH[@BAUD]`, `tcp:HOST:PORT`, `qemu[:IMAGE]`, `an505[:IMAGE]` or `microbit[:IMAGE]`
     #[arg(long, value_name = "WHERE")]
     device: Address,
     /// File that keeps the flash of qemu from one start to the next

@@ -2,7 +2,8 @@
 
 use std::{fmt, path::PathBuf, str::FromStr};
 
-/// Where a device is: `serial:PATH[@BAUD]`, `tcp:HOST:PORT`, `qemu[:IMAGE]` or `microbit[:IMAGE]`.
+/// Where a device is: `serial:PATH[@BAUD]`, `tcp:HOST:PORT`, `qemu[:IMAGE]`, `an505[:IMAGE]` or
+/// `microbit[:IMAGE]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
     /// A serial port and its speed, baud.
@@ -18,13 +19,17 @@ pub enum Address {
 pub enum Machine {
     /// mps2-an386, a Cortex-M4F.
     Mps2,
+    /// mps2-an505, a Cortex-M33.
+    An505,
     /// micro:bit, a Cortex-M0.
     Microbit,
 }
 
 /// No address of a device.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("found `{0}`, expected `serial:PATH[@BAUD]`, `tcp:HOST:PORT`, `qemu[:IMAGE]` or `microbit[:IMAGE]`")]
+#[error(
+    "found `{0}`, expected `serial:PATH[@BAUD]`, `tcp:HOST:PORT`, `qemu[:IMAGE]`, `an505[:IMAGE]` or `microbit[:IMAGE]`"
+)]
 pub struct AddressError(String);
 
 /// Speed of a serial port, unless another is named.
@@ -35,6 +40,7 @@ impl Machine {
     pub fn name(self) -> &'static str {
         match self {
             Self::Mps2 => "mps2-an386",
+            Self::An505 => "mps2-an505",
             Self::Microbit => "microbit",
         }
     }
@@ -43,6 +49,7 @@ impl Machine {
     fn image(self) -> PathBuf {
         let target = match self {
             Self::Mps2 => "thumbv7em-none-eabihf",
+            Self::An505 => "thumbv8m.main-none-eabihf",
             Self::Microbit => "thumbv6m-none-eabi",
         };
         ["target", target, "firmware", "coprocessor"].iter().collect()
@@ -68,6 +75,7 @@ impl FromStr for Address {
             }
             "tcp" if rest.contains(':') => Ok(Self::Tcp(rest.into())),
             "qemu" => Ok(qemu(Machine::Mps2)),
+            "an505" => Ok(qemu(Machine::An505)),
             "microbit" => Ok(qemu(Machine::Microbit)),
             _ => Err(wrong()),
         }
@@ -96,6 +104,7 @@ mod tests {
         assert_eq!(read("tcp:localhost:3333"), Ok(Address::Tcp("localhost:3333".into())));
         assert_eq!(read("qemu:a.elf"), Ok(Address::Qemu(Machine::Mps2, "a.elf".into())));
         assert_eq!(read("microbit"), Ok(Address::Qemu(Machine::Microbit, Machine::Microbit.image())));
+        assert_eq!(read("an505"), Ok(Address::Qemu(Machine::An505, Machine::An505.image())));
         for wrong in ["", "usb", "serial:", "tcp:localhost", "serial:COM3@fast"] {
             assert!(read(wrong).is_err(), "{wrong}");
         }

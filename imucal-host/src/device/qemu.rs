@@ -36,7 +36,8 @@ pub(super) fn check_flash(flash: Option<&Path>) -> io::Result<()> {
 pub(super) struct Qemu(Child);
 
 impl Qemu {
-    /// Starts an image; `flash` is the file that keeps its flash (only on mps2-an386).
+    /// Starts an image; `flash` is the file that keeps its flash (not on the micro:bit, whose flash QEMU
+    /// keeps in no file).
     pub(super) fn start(
         machine: Machine,
         image: &Path,
@@ -50,7 +51,7 @@ impl Qemu {
         listener.set_nonblocking(true)?;
         let mut command = Command::new("qemu-system-arm");
         let mut board = machine.name().to_owned();
-        if let Some(flash) = flash.filter(|_| machine == Machine::Mps2) {
+        if let Some(flash) = flash.filter(|_| machine != Machine::Microbit) {
             let file = OpenOptions::new().create(true).truncate(false).write(true).open(flash)?;
             file.set_len(PSRAM)?;
             let backend = format!("memory-backend-file,id=nv,size=16M,mem-path={},share=on", flash.display());

@@ -2,8 +2,11 @@
 
 use core::sync::atomic::{Ordering, compiler_fence};
 
-use bmi160::{AccelerometerPowerMode, Bmi160, GyroscopePowerMode, SlaveAddr};
-use firmware_example::board::{Sample, SampleSource};
+use bmi160::{Bmi160, SlaveAddr};
+use firmware_example::{
+    adapter::bmi160::{self as registers, BlockingImu, DATA, DATA_LEN},
+    board::{Sample, SampleSource},
+};
 use imucal_core::record::RawUnit;
 use nrf52840_hal::{
     Timer, Twim,
@@ -13,18 +16,16 @@ use nrf52840_hal::{
 
 /// Between samples, µs.
 const INTERVAL: u32 = 10_000;
-/// The first register of the rates, which the specific forces follow.
-const DATA: u8 = 0x0C;
 
 /// Memory of the DMA.
 pub struct ImuMemory {
     register: [u8; 1],
-    data: [u8; 12],
+    data: [u8; DATA_LEN],
 }
 
 impl ImuMemory {
     pub const fn new() -> Self {
-        Self { register: [DATA], data: [0; 12] }
+        Self { register: [DATA], data: [0; DATA_LEN] }
     }
 }
 
@@ -41,9 +42,11 @@ pub struct Imu {
 impl Imu {
     /// Wakes the sensor, which waits for the bus: before the first turn. One that does not answer gives no samples.
     pub fn start(bus: Twim<TWIM0>, timer: TIMER0, memory: &'static mut ImuMemory) -> Self {
-        let mut sensor = Bmi160::new_with_i2c(bus, SlaveAddr::default());
-        let _awake = sensor.set_accel_power_mode(AccelerometerPowerMode::Normal);
-        let _awake = sensor.set_gyro_power_mode(GyroscopePowerMode::Normal);
+        let mut timer = Timer::periodic(timer);
+        let driver = Bmi160::new_with_i2c(bus, SlaveAddr::default());
+        if BlockingImu::start(driver, || false, &mut timer).is_err() {
+            defmt::warn!("the IMU does not answer");
+        }
         // SAFETY: the driver above ends here, and its registers are this one's alone.
         let bus = unsafe { Peripherals::steal() }.TWIM0;
         let memory = &raw mut *memory;
@@ -53,9 +56,8 @@ impl Imu {
             bus.txd.ptr.write(|w| w.ptr().bits((&raw const (*memory).register).addr() as u32));
             bus.txd.maxcnt.write(|w| w.maxcnt().bits(1));
             bus.rxd.ptr.write(|w| w.ptr().bits((&raw const (*memory).data).addr() as u32));
-            bus.rxd.maxcnt.write(|w| w.maxcnt().bits(12));
+            bus.rxd.maxcnt.write(|w| w.maxcnt().bits(DATA_LEN as u16));
         }
-        let mut timer = Timer::periodic(timer);
         timer.start(INTERVAL);
         Self { bus, timer, memory, reading: false }
     }
@@ -100,14 +102,10 @@ impl SampleSource for Imu {
         compiler_fence(Ordering::Acquire);
         // SAFETY: the DMA has stopped.
         let data = unsafe { (&raw const (*self.memory).data).read_volatile() };
-        let (words, _) = data.as_chunks::<2>();
-        let counts = |first: usize| {
-            [0, 1, 2].map(|k| words.get(first + k).map_or(0.0, |word| f32::from(i16::from_le_bytes(*word))))
-        };
-        Some(Sample { raw: [Some(counts(3)), Some(counts(0)), None], temperature: f32::NAN })
+        Some(registers::sample(&data))
     }
 
     fn units(&self) -> [Option<RawUnit>; 3] {
-        [Some(RawUnit::Counts), Some(RawUnit::Counts), None]
+        registers::UNITS
     }
 }

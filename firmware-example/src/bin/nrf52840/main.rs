@@ -31,15 +31,16 @@ mod board {
         board::Board,
         coprocessor::Coprocessor,
         fitting::Memory,
-        machine::{PATIENCE, Ticks, Watchdog, reset},
+        log,
+        machine::{PATIENCE, Ticks, Watchdog, nrf52840, reset},
         stack,
     };
-    use imucal_core::{link::Guard, record::SensorIdentity};
+    use imucal_core::link::Guard;
     use nrf52840_hal::{
         Clocks, Rng, Twim,
         gpio::{Level, p0},
         nvmc::Nvmc,
-        pac::{FICR, NVMC, Peripherals},
+        pac::{NVMC, Peripherals},
         twim, uarte,
     };
 
@@ -50,28 +51,16 @@ mod board {
 
     /// The core's clock, ticks of a millisecond.
     const PER_MILLISECOND: NonZeroU32 = NonZeroU32::new(64_000).unwrap();
-    /// The record's region: it lies beyond what memory.x gives to code.
-    const REGION: (usize, usize) = (0x000F_C000, 0x4000);
-    type BoardMemory = Memory<256, 64, 48, 2048, 40>;
-
-    /// The chip's device id, 16 digits.
-    fn serial(ficr: &FICR) -> heapless::String<32> {
-        let digits =
-            |word: u32| (0..8).rev().map(move |k| char::from_digit(word >> (4 * k) & 15, 16).unwrap_or('0'));
-        digits(ficr.deviceid[1].read().bits()).chain(digits(ficr.deviceid[0].read().bits())).collect()
-    }
 
     pub fn run() -> ! {
-        static mut MEMORY: BoardMemory = BoardMemory::new();
+        static mut MEMORY: nrf52840::BoardMemory = Memory::new();
         static mut UART: UartMemory = UartMemory::new();
         static mut IMU: ImuMemory = ImuMemory::new();
-        // SAFETY: the entry point calls this once, and nothing else knows the variables; the region is flash that the
-        // linker leaves alone.
-        let (memory, uart_memory, imu_memory, region) = unsafe {
-            let region = core::slice::from_raw_parts_mut(REGION.0 as *mut u8, REGION.1);
-            (&mut *(&raw mut MEMORY), &mut *(&raw mut UART), &mut *(&raw mut IMU), region)
-        };
+        // SAFETY: the entry point calls this once, and nothing else knows the variables.
+        let (memory, uart_memory, imu_memory) =
+            unsafe { (&mut *(&raw mut MEMORY), &mut *(&raw mut UART), &mut *(&raw mut IMU)) };
         let last_reset = reset::last();
+        log::started(&last_reset);
         let Some(chip) = Peripherals::take() else { cortex_m::peripheral::SCB::sys_reset() };
         let _crystal = Clocks::new(chip.CLOCK).enable_ext_hfosc();
         let pins = p0::Parts::new(chip.P0);
@@ -91,11 +80,8 @@ mod board {
         // A number of this start alone.
         let guard = Guard::new(None, Rng::new(chip.RNG).random_u64());
 
-        let unit = SensorIdentity {
-            name: "nRF52840 BMI160".parse().unwrap_or_default(),
-            serial: serial(&chip.FICR),
-        };
-        let flash: Nvmc<NVMC> = Nvmc::new(chip.NVMC, region);
+        let unit = nrf52840::unit();
+        let flash: Nvmc<NVMC> = Nvmc::new(chip.NVMC, nrf52840::region());
         let board = Board {
             link,
             flash,
