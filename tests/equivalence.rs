@@ -4,8 +4,8 @@
 use std::{path::PathBuf, sync::LazyLock};
 
 use imucal_core::{
-    corrector::{Compensator, Corrector},
-    record::{Date, TriadRecord},
+    corrector::{Compensator, FullCorrector},
+    record::{Date, HigherOrder, TriadRecord},
     temperature::TemperatureTerms,
 };
 use imucal_host::{
@@ -55,6 +55,7 @@ fn plausible(triple: &Triple, kind: SensorKind) -> StoredTriad {
         coverage: 1.0,
         field_norm: None,
         provenance: None,
+        nonlinearity: None,
         temperature: None,
     }
 }
@@ -69,7 +70,7 @@ fn with(mut stored: StoredCalibration, kind: SensorKind, triad: StoredTriad) -> 
 }
 
 /// What the device holds of a calibration.
-fn on_device(stored: &StoredCalibration, kind: SensorKind) -> TriadRecord {
+fn on_device(stored: &StoredCalibration, kind: SensorKind) -> TriadRecord<HigherOrder> {
     let record = stored.to_record(&PathBuf::from("record")).expect("it fits the record");
     record.triad(kind.into()).expect("it was put there").clone()
 }
@@ -93,7 +94,7 @@ fn compare(recording: &Recording) -> (usize, usize) {
         assert!(result.passes(), "{}: {result:?}", recording.name);
         let mut wrong = record.clone();
         wrong.gain.as_flattened_mut().iter_mut().for_each(|entry| *entry *= 1.0 + 1e-6);
-        let core = Corrector::<f32>::from(&wrong);
+        let core = FullCorrector::<f32>::try_from(&wrong).expect("no steep terms");
         let result = samples::compare_by(replayed, &triad, &record, |raw, _| core.apply(raw));
         assert!(!result.passes(), "{}: a gain wrong by a millionth passes: {result:?}", recording.name);
         sensors += 1;
@@ -166,6 +167,8 @@ fn warm(triple: &Triple) -> StoredTemperature {
         reference: 22.5,
         bias_slope: [drift(1.3e-3), drift(-0.7e-3), drift(0.9e-3)],
         scale_slope: [1.1e-4, -0.6e-4, 0.8e-4],
+        quality: None,
+        curvature: None,
     }
 }
 
@@ -186,12 +189,12 @@ fn heated() -> (Recording, StoredCalibration) {
 }
 
 /// The comparison with a core that computes by other figures than the record's: by what has become of them.
-fn faulty(kind: SensorKind, fault: impl Fn(&mut TriadRecord)) -> SampleEquivalence {
+fn faulty(kind: SensorKind, fault: impl Fn(&mut TriadRecord<HigherOrder>)) -> SampleEquivalence {
     let (recording, stored) = &*HEATED;
     let record = on_device(stored, kind);
     let mut wrong = record.clone();
     fault(&mut wrong);
-    let mut core = Compensator::<f32>::new(Corrector::from(&wrong));
+    let mut core = Compensator::new(FullCorrector::<f32>::try_from(&wrong).expect("no steep terms"));
     let replayed = Samples::of(recording, kind).expect("recorded");
     let triad = stored.triad(kind).expect("accepted");
     samples::compare_by(replayed, triad, &record, |raw, temperature| core.apply_at(raw, temperature))
@@ -253,7 +256,7 @@ fn a_temperature_term_wrong_by_a_hundredth_fails_the_comparison() {
 
 #[test]
 fn a_record_that_is_one_ulp_from_what_was_stored_fails_the_comparison() {
-    type Fault = fn(&mut TriadRecord) -> &mut f32;
+    type Fault = fn(&mut TriadRecord<HigherOrder>) -> &mut f32;
     let faults: [Fault; 5] = [
         |triad| &mut triad.gain[0][1],
         |triad| &mut triad.bias[2],

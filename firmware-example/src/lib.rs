@@ -65,5 +65,8 @@ pub use riscv_rt::entry;
 /// A record as it would lie in flash: the golden bytes of the format's version 1.0.
 pub static RECORD: &[u8] = include_bytes!("../../imucal-core/tests/golden/record-1.0.bin");
 
+/// The same of [`HigherOrder`](imucal_core::record::HigherOrder): temperature to second order, and nonlinear terms.
+pub static RECORD_2: &[u8] = include_bytes!("../../imucal-core/tests/golden/record-2.0.bin");
+
 /// Exit status of an image that found its answer wrong.
 pub const FAILED: i32 = 1;

@@ -3,9 +3,9 @@
 use core::fmt::{self, Write};
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
-use imucal_core::corrector::Corrector;
+use imucal_core::corrector::{Corrector, FullCorrector};
 use imucal_core::integer::{self, IntegerCompensator};
-use imucal_core::record::{self, RawUnit, TriadRecord};
+use imucal_core::record::{self, HigherOrder, RawUnit, TriadRecord};
 use nalgebra::Vector3;
 
 use crate::scene::Noise;
@@ -22,6 +22,14 @@ const SAMPLES: u16 = 16;
 ///
 /// Those of `out`. A record that cannot be read is a line, and not an error.
 pub fn write(out: &mut impl Write) -> fmt::Result {
+    write_first_order(out)?;
+    write_higher_order(out)?;
+    write_arithmetic(out)
+}
+
+/// Out of line, as the next: a record takes kilobytes of stack only while it is looked at.
+#[inline(never)]
+fn write_first_order(out: &mut impl Write) -> fmt::Result {
     let record = match record::decode(crate::RECORD) {
         Ok(record) => record,
         // Without its reason, whose figures core formats by code that can panic.
@@ -36,7 +44,30 @@ pub fn write(out: &mut impl Write) -> fmt::Result {
         write_many(out, sensor.symbol(), triad)?;
         write_integers(out, sensor.symbol(), triad)?;
     }
-    write_arithmetic(out)
+    Ok(())
+}
+
+/// Samples corrected by a record with all terms there are, and what is predicted of them.
+#[inline(never)]
+fn write_higher_order(out: &mut impl Write) -> fmt::Result {
+    let Ok(record) = record::decode_as::<HigherOrder>(crate::RECORD_2) else {
+        return writeln!(out, "record refused");
+    };
+    for (sensor, triad) in record.triads() {
+        let Ok(corrector) = FullCorrector::<f32>::try_from(triad) else {
+            return writeln!(out, "{} is too steep", sensor.symbol());
+        };
+        for temperature in TEMPERATURES {
+            for sample in 0..SAMPLES {
+                let corrected = corrector.apply_at(&sample_at(sample), temperature);
+                write_bits(out, sensor.symbol(), "full", &corrected)?;
+                if let Some(raw) = corrector.predict_at(&corrected, temperature) {
+                    write_bits(out, sensor.symbol(), "predicted", &raw)?;
+                }
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Lines of [`write_arithmetic`], and pairs of operands of each.

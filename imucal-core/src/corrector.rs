@@ -1,14 +1,41 @@
 //! The per-sample correction: the one part of this library that every device needs.
 //!
-//! [`crate::triad`] and [`crate::temperature`] hold the formulas; here they are chosen between once, from a record.
-//! The cost of a sample is asserted by `tests/firmware_link.rs`.
+//! [`crate::triad`], [`crate::temperature`] and [`crate::nonlinearity`] hold the formulas; here they are chosen between
+//! once, from a record:
+//!
+//! | record | corrector | a sample |
+//! | --- | --- | --- |
+//! | of [`FirstOrder`] | [`Corrector`] | subtractions and a product |
+//! | of [`HigherOrder`] | [`FullCorrector`] | the same, and what the record has besides |
+//!
+//! The types keep the two apart: a [`Corrector`] is not made from a record of higher order, whose terms it would leave
+//! out. The cost of a sample is asserted by `tests/firmware_link.rs` and `tests/device_cost.rs`.
 
 use nalgebra::Vector3;
 
-use crate::record::TriadRecord;
+use crate::nonlinearity::TooSteep;
+use crate::record::{FirstOrder, HigherOrder, TriadRecord};
 use crate::scalar::Scalar;
 use crate::temperature::{TemperatureTerms, Warmth};
 use crate::triad::Triad;
+
+mod full;
+
+pub use full::FullCorrector;
+
+mod sealed {
+    pub trait Sealed {}
+}
+
+/// A correction that depends on the temperature through [`Warmth`] alone: what a [`Compensator`] keeps.
+pub trait Correction<T: Scalar>: sealed::Sealed + Copy {
+    /// The triad.
+    fn triad(&self) -> &Triad<T>;
+    /// What warmth makes of the triad at `temperature` °C; `None` where it makes nothing at any.
+    fn warmth(&self, temperature: T) -> Option<Warmth<T>>;
+    /// `raw`, sensor axes and raw unit, to calibrated axes and unit.
+    fn correct(&self, warmth: &Warmth<T>, raw: &Vector3<T>) -> Vector3<T>;
+}
 
 /// Turns raw samples of one triad into calibrated ones. No state; [`Compensator`] has what a stream can do with one.
 ///
@@ -67,36 +94,77 @@ impl<T: Scalar> Corrector<T> {
 /// assert_eq!(compensator.apply_at(&Vector3::repeat(3.0), 27.0), Vector3::repeat(2.0));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Compensator<T: Scalar> {
-    corrector: Corrector<T>,
+pub struct Compensator<T: Scalar, C = Corrector<T>> {
+    corrector: C,
     /// The last reading, °C; not a number before the first.
     temperature: T,
     /// At that temperature.
     warmth: Warmth<T>,
 }
 
-impl<T: Scalar> Compensator<T> {
+impl<T: Scalar, C: Correction<T>> Compensator<T, C> {
     /// Before the first sample.
-    pub fn new(corrector: Corrector<T>) -> Self {
-        Self { temperature: T::of(f64::NAN), warmth: Warmth::none(&corrector.triad), corrector }
+    pub fn new(corrector: C) -> Self {
+        Self { temperature: T::of(f64::NAN), warmth: Warmth::none(corrector.triad()), corrector }
     }
 
     /// `raw`, taken at `temperature` °C, as [`Corrector::apply_at`] has it.
     #[inline]
     pub fn apply_at(&mut self, raw: &Vector3<T>, temperature: T) -> Vector3<T> {
-        let Corrector { triad, temperature: terms } = &self.corrector;
-        if let Some(terms) = terms
-            && !temperature.same(self.temperature)
+        if !temperature.same(self.temperature)
+            && let Some(warmth) = self.corrector.warmth(temperature)
         {
-            (self.temperature, self.warmth) = (temperature, terms.at(triad, temperature));
+            (self.temperature, self.warmth) = (temperature, warmth);
         }
-        self.warmth.correct(triad, raw)
+        self.corrector.correct(&self.warmth, raw)
+    }
+}
+
+impl<T: Scalar> sealed::Sealed for Corrector<T> {}
+
+impl<T: Scalar> Correction<T> for Corrector<T> {
+    #[inline]
+    fn triad(&self) -> &Triad<T> {
+        &self.triad
+    }
+    #[inline]
+    fn warmth(&self, temperature: T) -> Option<Warmth<T>> {
+        self.temperature.as_ref().map(|terms| terms.at(&self.triad, temperature))
+    }
+    #[inline]
+    fn correct(&self, warmth: &Warmth<T>, raw: &Vector3<T>) -> Vector3<T> {
+        warmth.correct(&self.triad, raw)
     }
 }
 
 impl<T: Scalar> From<&TriadRecord> for Corrector<T> {
     fn from(record: &TriadRecord) -> Self {
+        Self::of(record)
+    }
+}
+
+impl<T: Scalar> Corrector<T> {
+    /// What a record has of the first order.
+    fn of<O>(record: &TriadRecord<O>) -> Self {
         Self::new(record.triad(), record.temperature.map(|terms| terms.cast()))
+    }
+}
+
+impl<T: Scalar> From<&TriadRecord> for FullCorrector<T> {
+    fn from(record: &TriadRecord<FirstOrder>) -> Self {
+        Corrector::from(record).into()
+    }
+}
+
+impl<T: Scalar> TryFrom<&TriadRecord<HigherOrder>> for FullCorrector<T> {
+    type Error = TooSteep;
+
+    /// Refuses none that [`decode_as`](crate::record::decode_as) gives.
+    fn try_from(record: &TriadRecord<HigherOrder>) -> Result<Self, TooSteep> {
+        let HigherOrder { curvature, nonlinearity, warmth: _ } = &record.order;
+        let curvature = curvature.map(|curvature| curvature.terms.cast());
+        let nonlinearity = nonlinearity.map(|found| found.nonlinearity().cast());
+        Self::new(Corrector::of(record), curvature, nonlinearity)
     }
 }
 

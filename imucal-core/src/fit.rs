@@ -15,7 +15,7 @@ use crate::{
     coverage::Coverage,
     model::{Model, rig::GimbalPose},
     observation::ShellPoint,
-    record::{FitQuality, ModelName, RawUnit, TriadRecord},
+    record::{FirstOrder, FitQuality, ModelName, RawUnit, TriadRecord},
     scalar::Scalar,
     solver::{LevenbergMarquardt, SolveReport},
     triad::Triad,
@@ -152,6 +152,7 @@ impl FitSummary<f32> {
                 coverage: self.coverage.share,
                 field_norm: None,
             },
+            order: FirstOrder,
         }
     }
 }

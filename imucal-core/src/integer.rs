@@ -51,7 +51,7 @@ pub use refusal::IntegerRefusal;
 
 use nalgebra::Vector3;
 
-use crate::record::{RawUnit, TriadRecord};
+use crate::record::{FirstOrder, RawUnit, TriadRecord};
 use crate::scalar::Scalar;
 use crate::temperature::TemperatureTerms;
 use crate::triad::Triad;
@@ -225,7 +225,16 @@ impl Row {
 /// What integers correct by, where the record's samples are counts.
 fn of_counts(record: &TriadRecord) -> Result<(Triad<f32>, Option<TemperatureTerms<f32>>), IntegerRefusal> {
     // Named one by one: whatever else a record comes to hold is to be carried or refused here.
-    let TriadRecord { gain: _, bias: _, unit_in, unit_out: _, model: _, temperature, quality: _ } = record;
+    let TriadRecord {
+        gain: _,
+        bias: _,
+        unit_in,
+        unit_out: _,
+        model: _,
+        temperature,
+        quality: _,
+        order: FirstOrder,
+    } = record;
     match *unit_in {
         RawUnit::Counts => Ok((record.triad(), *temperature)),
         unit => Err(IntegerRefusal::NotCounts { unit }),

@@ -14,7 +14,7 @@
 //! | stage | module | what it holds |
 //! | --- | --- | --- |
 //! | what is given | [`observation`] | rests, blocks of gyroscope samples, turns, points of a cloud |
-//! | what is assumed | [`model`] | residual and Jacobian rows, streamed; [`triad`], [`rotation`], [`temperature`] below it |
+//! | what is assumed | [`model`] | residual and Jacobian rows, streamed; [`triad`], [`rotation`], [`temperature`], [`nonlinearity`] below it |
 //! | what is seen as samples arrive | [`observer`] | rests, turns and points of a cloud, in fixed memory |
 //! | what is found | [`solver`] | Levenberg–Marquardt and particle swarm of fixed size, each with a report |
 //! | whether to believe it | [`coverage`], [`accept`] | typed refusals with their figures |
@@ -65,6 +65,8 @@ pub mod rotation;
 pub mod triad;
 
 pub mod temperature;
+
+pub mod nonlinearity;
 
 pub mod observation;
 

@@ -1,9 +1,11 @@
-//! What warmth does to a triad: to first order, a bias that drifts and a scale that drifts.
+//! What warmth does to a triad: a bias that drifts and a scale that drifts, to first order or to second.
 //!
 //! ```text
 //! Δ          = θ − θ₀
-//! calibrated = (1 + s·Δ) ∘ gain · (raw − (bias + β·Δ))          correct, on the device
-//! raw        = gain⁻¹ · (calibrated ⊘ (1 + s·Δ)) + bias + β·Δ    predict, in the simulator
+//! b          = bias + β·Δ + β₂·Δ²
+//! f          = 1 + s·Δ + s₂·Δ²
+//! calibrated = f ∘ gain · (raw − b)             correct, on the device
+//! raw        = gain⁻¹ · (calibrated ⊘ f) + b    predict, in the simulator
 //! ```
 //!
 //! | symbol | meaning |
@@ -11,14 +13,15 @@
 //! | θ, θ₀ | the sensor's temperature, and that at which `gain` and `bias` hold, °C |
 //! | β | [`bias_slope`](TemperatureTerms::bias_slope) |
 //! | s | [`scale_slope`](TemperatureTerms::scale_slope) |
+//! | β₂, s₂ | [`bias`](TemperatureCurvature::bias) and [`scale`](TemperatureCurvature::scale) of the curvature; zero to first order |
 //! | ∘, ⊘ | product and quotient axis by axis |
 //!
-//! Both brackets hold for all samples of one temperature: a device keeps them ([`Warmth`]) from one reading of its
+//! Both b and f hold for all samples of one temperature: a device keeps them ([`Warmth`]) from one reading of its
 //! thermometer to the next. The scale stays outside the gain: as part of it it would spare a product an axis while the
 //! temperature stands, and take six more wherever it moves.
 //!
-//! Source: the temperature terms of IEEE Std 1293, cut after the first order. Not modelled: second order, drift of
-//! the axes' directions, hysteresis, and the lag between the thermometer and the sensing element.
+//! Source: the temperature terms of IEEE Std 1293, cut after the second order. Not modelled: drift of the axes'
+//! directions, hysteresis, and the lag between the thermometer and the sensing element.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -57,18 +60,29 @@ impl<T: Scalar> TemperatureTerms<T> {
         Warmth { bias, factor }
     }
 
+    /// The same to second order.
+    #[inline]
+    pub fn at_curved(
+        &self,
+        curvature: &TemperatureCurvature<T>,
+        triad: &Triad<T>,
+        temperature: T,
+    ) -> Warmth<T> {
+        let Warmth { bias, factor } = self.at(triad, temperature);
+        let change = self.change(temperature);
+        let (drift, growth) = (curvature.drift(change), curvature.growth(change));
+        Warmth {
+            bias: Vector3::new(bias.x + drift.x, bias.y + drift.y, bias.z + drift.z),
+            factor: Vector3::new(factor.x + growth.x, factor.y + growth.y, factor.z + growth.z),
+        }
+    }
+
     /// What the sensor would put out at `temperature` °C for a calibrated value.
     ///
     /// `None` where the gain is singular or the scale has drifted to zero, which nothing can undo.
     pub fn predict(&self, triad: &Triad<T>, calibrated: &Vector3<T>, temperature: T) -> Option<Vector3<T>> {
-        let change = self.change(temperature);
-        let factor = self.factor(change);
-        if factor.iter().any(|f| *f == T::zero()) {
-            return None;
-        }
-        // Component by component: `component_div` indexes, a path to a panic.
-        let value = Vector3::new(calibrated.x / factor.x, calibrated.y / factor.y, calibrated.z / factor.z);
-        Some(triad.predict(&value)? + self.drift(change))
+        let sensed = self.at(triad, temperature).sensed(triad, calibrated)?;
+        Some(sensed + triad.bias + self.drift(self.change(temperature)))
     }
 
     /// Every term is finite.
@@ -108,12 +122,48 @@ impl<T: Scalar> TemperatureTerms<T> {
     }
 }
 
+/// What the first order leaves: the coefficients of Δ², from the same reference temperature.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct TemperatureCurvature<T> {
+    /// β₂, raw unit per kelvin², sensor axes.
+    pub bias: [T; 3],
+    /// s₂, per kelvin², calibrated axes. Well below 1e-4 on real sensors.
+    pub scale: [T; 3],
+}
+
+impl<T: Scalar> TemperatureCurvature<T> {
+    /// β₂·Δ²: what it adds to the bias `change` kelvin from the reference, raw unit.
+    #[inline]
+    pub fn drift(&self, change: T) -> Vector3<T> {
+        times_square(&self.bias, change)
+    }
+
+    /// s₂·Δ²: what it adds to the scale's factor.
+    #[inline]
+    pub fn growth(&self, change: T) -> Vector3<T> {
+        times_square(&self.scale, change)
+    }
+
+    /// The same in another precision.
+    pub fn cast<U: Scalar>(&self) -> TemperatureCurvature<U> {
+        let of = |x: T| U::of(x.wide());
+        TemperatureCurvature { bias: self.bias.map(of), scale: self.scale.map(of) }
+    }
+}
+
+#[inline]
+fn times_square<T: Scalar>([x, y, z]: &[T; 3], change: T) -> Vector3<T> {
+    let square = change * change;
+    Vector3::new(*x * square, *y * square, *z * square)
+}
+
 /// A triad's bias and scale at one temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Warmth<T: Scalar> {
-    /// `bias + β·Δ`, raw unit, sensor axes.
+    /// b, raw unit, sensor axes.
     pub bias: Vector3<T>,
-    /// `1 + s·Δ`, calibrated axes.
+    /// f, calibrated axes.
     pub factor: Vector3<T>,
 }
 
@@ -129,6 +179,20 @@ impl<T: Scalar> Warmth<T> {
     pub fn correct(&self, triad: &Triad<T>, raw: &Vector3<T>) -> Vector3<T> {
         let value = Triad { gain: triad.gain, bias: self.bias }.correct(raw);
         Vector3::new(value.x * self.factor.x, value.y * self.factor.y, value.z * self.factor.z)
+    }
+
+    /// What each axis senses of a calibrated value at this temperature: `gain⁻¹ · (calibrated ⊘ f)`, raw unit, sensor
+    /// axes. With the bias it is what the sensor would put out.
+    ///
+    /// `None` where the gain is singular or the scale has drifted to zero, which nothing can undo.
+    pub fn sensed(&self, triad: &Triad<T>, calibrated: &Vector3<T>) -> Option<Vector3<T>> {
+        // Component by component: `component_div` indexes, a path to a panic.
+        let factor = &self.factor;
+        if factor.iter().any(|f| *f == T::zero()) {
+            return None;
+        }
+        let value = Vector3::new(calibrated.x / factor.x, calibrated.y / factor.y, calibrated.z / factor.z);
+        Some(triad.sensitivity()? * value)
     }
 }
 

@@ -11,8 +11,8 @@
 //! | `bias` | raw output at zero input, raw unit | b |
 //!
 //! Source: Secer & Barshan 2016, eq. (1) with h affine; the split of K is a reconstruction, since only the
-//! paper's first two pages were at hand. Not modelled: anything that is not affine in the input (quadratic
-//! scale, saturation, bandwidth), temperature (see [`crate::temperature`]).
+//! paper's first two pages were at hand. Not modelled: saturation, bandwidth; what is not affine in the input is
+//! [`crate::nonlinearity`], and temperature [`crate::temperature`].
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -36,9 +36,15 @@ impl<T: Scalar> Triad<T> {
     /// `gain · (raw − bias)`: a raw sample, sensor axes and raw unit, to calibrated axes and unit.
     #[inline]
     pub fn correct(&self, raw: &Vector3<T>) -> Vector3<T> {
+        self.scaled(raw.x - self.bias.x, raw.y - self.bias.y, raw.z - self.bias.z)
+    }
+
+    /// `gain · (x, y, z)`.
+    #[inline]
+    pub(crate) fn scaled(&self, x: T, y: T, z: T) -> Vector3<T> {
         // By components: nalgebra's product is the same arithmetic in the same order, but at the device's
         // `opt-level = "s"` it stays a loop, several times as long as the count `tests/firmware_link.rs` asserts.
-        let (m, x, y, z) = (&self.gain, raw.x - self.bias.x, raw.y - self.bias.y, raw.z - self.bias.z);
+        let m = &self.gain;
         Vector3::new(
             m.m11 * x + m.m12 * y + m.m13 * z,
             m.m21 * x + m.m22 * y + m.m23 * z,

@@ -1,10 +1,9 @@
 //! Apply: a recording corrected by the core, in `f32`, as the device would.
 
-use std::convert::Infallible;
-
 use imucal_core::{
-    corrector::Corrector,
-    record::{CalibrationRecord, Match},
+    corrector::{Compensator, FullCorrector},
+    nonlinearity::TooSteep,
+    record::{CalibrationRecord, HigherOrder, Match},
 };
 use nalgebra::Vector3;
 
@@ -62,7 +61,7 @@ pub enum ApplyError {
 pub fn check(
     recording: &Recording,
     stored: &StoredCalibration,
-    record: &CalibrationRecord,
+    record: &CalibrationRecord<HigherOrder>,
     other_serial: bool,
 ) -> Result<Option<String>, ApplyError> {
     let serial = recording.manifest.sensor.serial.as_deref().unwrap_or_default();
@@ -103,18 +102,19 @@ pub fn check(
 }
 
 /// The recording with every calibrated sensor corrected, in calibrated units; the others as they were.
-pub fn apply(recording: &Recording, stored: &StoredCalibration, record: &CalibrationRecord) -> Recording {
-    let by_core = |kind: SensorKind, raw: &[Vector3<f32>], warmth: &[f32]| {
-        let corrector = record.triad(kind.into()).map(Corrector::<f32>::from);
-        let corrected = |(raw, warmth): (&Vector3<f32>, &f32)| {
-            corrector.as_ref().map_or(*raw, |corrector| corrector.apply_at(raw, *warmth))
-        };
-        Ok::<_, Infallible>(raw.iter().zip(warmth).map(corrected).collect())
-    };
-    match apply_by(recording, stored, by_core) {
-        Ok(corrected) => corrected,
-        Err(never) => match never {},
-    }
+///
+/// # Errors
+/// [`TooSteep`] for nonlinear terms that cannot be undone, which no record that was read holds.
+pub fn apply(
+    recording: &Recording,
+    stored: &StoredCalibration,
+    record: &CalibrationRecord<HigherOrder>,
+) -> Result<Recording, TooSteep> {
+    apply_by(recording, stored, |kind, raw, warmth| {
+        let Some(triad) = record.triad(kind.into()) else { return Ok(raw.to_vec()) };
+        let mut core = Compensator::new(FullCorrector::<f32>::try_from(triad)?);
+        Ok(raw.iter().zip(warmth).map(|(raw, warmth)| core.apply_at(raw, *warmth)).collect())
+    })
 }
 
 /// The same, corrected by whoever is called: with a sensor, its raw samples, and the temperature of each, °C or NaN.

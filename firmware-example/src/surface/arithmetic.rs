@@ -2,10 +2,11 @@
 
 use imucal_core::{
     corrector,
+    nonlinearity::{self, NonlinearTerms, Nonlinearity},
     record::{self, Sensor},
     rotation,
     scalar::Scalar,
-    temperature::{self, TemperatureTerms},
+    temperature::{self, TemperatureCurvature, TemperatureTerms},
     triad::{self, Triad},
 };
 use nalgebra::{Matrix3, Quaternion, Vector3};
@@ -18,6 +19,7 @@ pub(super) fn reach_all() {
     rotations();
     triads();
     warmth();
+    bends();
     corrections();
 }
 
@@ -80,6 +82,52 @@ fn warmth() {
     let _wide: TemperatureTerms<f64> = reach!(temperature::TemperatureTerms::cast(&terms));
     reach!(temperature::Warmth::none(&truth));
     reach!(temperature::Warmth::correct(&warm, &truth, &raw));
+    reach!(temperature::Warmth::sensed(&warm, &truth, &raw));
+    let curvature = curvature();
+    let drift = reach!(temperature::TemperatureCurvature::drift(&curvature, 6.0));
+    reach!(temperature::TemperatureCurvature::growth(&curvature, drift.x));
+    let _wide: TemperatureCurvature<f64> = reach!(temperature::TemperatureCurvature::cast(&curvature));
+    reach!(temperature::TemperatureTerms::at_curved(&terms, &curvature, &truth, 31.0));
+}
+
+fn curvature() -> TemperatureCurvature<f32> {
+    TemperatureCurvature { bias: [1e-5, -2e-5, 3e-5], scale: [1e-7, -1e-7, 2e-7] }
+}
+
+#[inline(never)]
+fn bends() {
+    let x = Vector3::new(1.0f32, 2.0, 3.0);
+    let mut terms: NonlinearTerms<f32> = reach!(nonlinearity::NonlinearTerms::none());
+    terms.quadratic = [1e-3, -1e-3, 2e-3];
+    terms.cubic = [1e-5, 2e-5, -1e-5];
+    terms.cross = [[1e-4; 3]; 3];
+    reach!(nonlinearity::quadratic(&terms.quadratic, &x));
+    reach!(nonlinearity::cubic(&terms.cubic, &x));
+    reach!(nonlinearity::cross(&terms.cross, &x));
+    reach!(nonlinearity::NonlinearTerms::slope(&terms, 10.0));
+    let _wide: NonlinearTerms<f64> = reach!(nonlinearity::NonlinearTerms::cast(&terms));
+    let bent = Nonlinearity { terms, range: 10.0 };
+    let _wide: Nonlinearity<f64> = reach!(nonlinearity::Nonlinearity::cast(&bent));
+    reach!(nonlinearity::Nonlinearity::excess(&bent, &x));
+    reach!(nonlinearity::Nonlinearity::respond(&bent, &x));
+    if let Ok(linearizer) = reach!(nonlinearity::Linearizer::new(bent)) {
+        reach!(nonlinearity::Linearizer::rounds(&linearizer));
+        let own = *reach!(nonlinearity::Linearizer::nonlinearity(&linearizer));
+        let sensed = reach!(nonlinearity::Linearizer::sense(&linearizer, &x));
+        full(&sensed, own);
+    }
+}
+
+#[inline(never)]
+fn full(raw: &Vector3<f32>, bent: Nonlinearity<f32>) {
+    let first = corrector::Corrector::new(scene::gyroscope().truth, Some(terms()));
+    if let Ok(full) = reach!(corrector::FullCorrector::new(first, Some(curvature()), Some(bent))) {
+        reach!(corrector::FullCorrector::apply(&full, raw));
+        reach!(corrector::FullCorrector::apply_at(&full, raw, 31.0));
+        reach!(corrector::FullCorrector::predict_at(&full, raw, 31.0));
+        let mut following = reach!(corrector::Compensator::new(full));
+        reach!(corrector::Compensator::apply_at(&mut following, raw, 31.0));
+    }
 }
 
 #[inline(never)]

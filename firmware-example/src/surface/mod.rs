@@ -13,6 +13,10 @@ macro_rules! reach {
     ($($segment:ident)::+ ($($argument:expr),* $(,)?)) => {
         core::hint::black_box($($segment)::+($(core::hint::black_box($argument)),*))
     };
+    // A result of kilobytes is looked at where it lies: each copy of it takes stack.
+    ($($segment:ident)::+ ($($argument:expr),*), $look:path) => {
+        $look(core::hint::black_box(&$($segment)::+($(core::hint::black_box($argument)),*)))
+    };
 }
 
 mod arithmetic;
@@ -35,6 +39,7 @@ pub fn reach_all() {
     model::reach_all();
     solver::reach_all();
     record::reach_all();
+    record::reach_higher_order();
     session::reach_all();
     watch::reach_all();
     link::reach_all();

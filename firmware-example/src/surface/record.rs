@@ -3,11 +3,12 @@
 use core::fmt::Display;
 
 use imucal_core::record::{
-    self, CalibrationRecord, Defect, Figures, MAX_LEN, RawUnit, Sensor, TriadRecord, WrongSensor,
+    self, CalibrationRecord, DecodeError, Defect, Figures, FirstOrder, HigherOrder, MAX_LEN, Order, RawUnit,
+    Sensor, TriadRecord, WrongSensor,
 };
 
 use super::write;
-use crate::RECORD;
+use crate::{RECORD, RECORD_2};
 
 #[inline(never)]
 pub(super) fn reach_all() {
@@ -17,6 +18,39 @@ pub(super) fn reach_all() {
     if let Ok(record) = reach!(record::decode(RECORD)) {
         whole(&record);
     }
+}
+
+/// By itself, since such a record takes kilobytes of stack.
+#[inline(never)]
+pub(super) fn reach_higher_order() {
+    reach!(record::decode_as(RECORD_2), decoded);
+}
+
+#[inline(never)]
+fn decoded(decoded: &Result<CalibrationRecord<HigherOrder>, DecodeError>) {
+    let Ok(record) = decoded else { return };
+    pack_higher_order(record);
+    for (sensor, triad) in record.triads() {
+        order_of(sensor, triad);
+    }
+}
+
+#[inline(never)]
+fn pack_higher_order(record: &CalibrationRecord<HigherOrder>) {
+    let mut page = [0xFF; HigherOrder::MAX_LEN];
+    let _bytes = reach!(record::encode(record, &mut page));
+}
+
+#[inline(never)]
+fn order_of(sensor: Sensor, triad: &TriadRecord<HigherOrder>) {
+    if let Some(bent) = &triad.order.nonlinearity {
+        reach!(record::NonlinearRecord::nonlinearity(bent));
+    }
+    if let Some(warmth) = &triad.order.warmth {
+        reach!(record::TemperatureQuality::covers(warmth, 20.0));
+    }
+    let _usable = reach!(record::TriadRecord::check(triad, sensor));
+    let _first = reach!(record::TriadRecord::with_order(triad.clone(), FirstOrder));
 }
 
 #[inline(never)]

@@ -5,7 +5,8 @@ use core::fmt::Display;
 use imucal_core::{
     record::{self, CalibrationRecord, Date, Sensor, SensorIdentity},
     watch::{
-        self, CalibratedSample, LookObserver, MAX_LEN, Mean, Statistic, Watch, WatchSettings, WatchSummary,
+        self, CalibratedSample, LookObserver, MAX_LEN, Mean, Statistic, SummaryError, Watch, WatchSettings,
+        WatchSummary,
     },
 };
 use nalgebra::Vector3;
@@ -15,15 +16,21 @@ use crate::RECORD;
 
 #[inline(never)]
 pub(super) fn reach_all() {
+    let mut watch = begun();
+    seconds(&mut watch);
+    reach!(watch::Watch::restart(&mut watch));
+    reach!(watch::Watch::summary(&watch), summary);
+    reach!(watch::run_length::Thresholds::of(0.01));
+    reach!(watch::run_length::siegmund(0.5, 10.0));
+}
+
+/// Out of line, as what follows: the record it is made from is gone before the watch goes on.
+#[inline(never)]
+fn begun() -> Watch {
     let sensor = SensorIdentity::default();
     let nothing = CalibrationRecord::empty(sensor, Date::from_days(20_000));
     let record = record::decode(RECORD).unwrap_or(nothing);
-    let mut watch = reach!(watch::Watch::new(&record, WatchSettings::default()));
-    seconds(&mut watch);
-    reach!(watch::Watch::restart(&mut watch));
-    summary(&reach!(watch::Watch::summary(&watch)));
-    reach!(watch::run_length::Thresholds::of(0.01));
-    reach!(watch::run_length::siegmund(0.5, 10.0));
+    reach!(watch::Watch::new(&record, WatchSettings::default()))
 }
 
 #[inline(never)]
@@ -54,8 +61,12 @@ fn summary(summary: &WatchSummary) {
     let mut page = [0xFF; MAX_LEN];
     // The result borrows the page: looked at here, it need not leave the call.
     let _bytes = reach!(watch::encode(summary, &mut page));
-    let read = reach!(watch::decode(&page));
-    if let Err(why) = &read {
+    reach!(watch::decode(&page), decoded);
+}
+
+#[inline(never)]
+fn decoded(read: &Result<WatchSummary, SummaryError>) {
+    if let Err(why) = read {
         write(|f| reach!(watch::SummaryError::fmt(why, f)));
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::record::{FitQuality, Sensor};
+use crate::record::{FirstOrder, FitQuality, Sensor};
 use crate::temperature::Warmth;
 use nalgebra::Matrix3;
 use proptest::array::uniform3;
@@ -269,6 +269,7 @@ fn record(triad: Triad<f64>, temperature: Option<TemperatureTerms<f64>>) -> Tria
             coverage: 1.0,
             field_norm: None,
         },
+        order: FirstOrder,
     }
 }
 

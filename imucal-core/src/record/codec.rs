@@ -4,14 +4,38 @@ use core::fmt;
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
+use serde::Deserialize;
+
 use super::payload::serialize;
-use super::{CalibrationRecord, Defect, Provenance};
+use super::{CalibrationRecord, Defect, FirstOrder, HigherOrder, Order, Provenance};
 
-/// Major version of the format, and the newest minor, that this library reads and writes.
-pub const VERSION: (u8, u8) = (1, 1);
+/// Major version of the format, and the newest minor, that this library reads and writes: those of [`HigherOrder`].
+pub const VERSION: (u8, u8) = HigherOrder::VERSION;
 
-/// The minor that appended the triads' provenance.
-pub(super) const WITH_PROVENANCE: u8 = 1;
+/// Major and minor of a record, in the order in which they appended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Version {
+    pub(super) major: u8,
+    pub(super) minor: u8,
+}
+
+impl Version {
+    /// The first there was.
+    pub(super) const FIRST: Self = Self { major: 1, minor: 0 };
+    /// With the provenance of each triad.
+    pub(super) const WITH_PROVENANCE: Self = Self { major: 1, minor: 1 };
+    /// With span and errors of temperature terms.
+    pub(super) const WITH_TEMPERATURE_QUALITY: Self = Self { major: 1, minor: 2 };
+    /// With terms that change what is corrected.
+    pub(super) const HIGHER_ORDER: Self = Self { major: 2, minor: 0 };
+
+    /// An order knows all that a record of this version holds.
+    fn is_known<O: Order>(self) -> bool {
+        let newest = Self { major: O::VERSION.0, minor: O::VERSION.1 };
+        let of_major = if self.major < newest.major { Self::WITH_TEMPERATURE_QUALITY } else { newest };
+        self <= of_major
+    }
+}
 
 const MAGIC: [u8; 4] = *b"IMUC";
 const HEADER: usize = MAGIC.len() + 2 + 2;
@@ -19,16 +43,16 @@ const CHECKSUM: usize = 4;
 /// Without a table: a record is read once a start, and a table costs a kilobyte of flash.
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
-/// The longest record of this version, bytes: a buffer of this length always suffices for [`encode`].
-///
-/// A newer minor may write longer ones, which [`decode`] reads all the same.
-pub const MAX_LEN: usize = HEADER + longest::RECORD + CHECKSUM;
+/// The longest record of first order, bytes: a buffer of this length always suffices for [`encode`] of one.
+pub const MAX_LEN: usize = FirstOrder::MAX_LEN;
 
 // The header holds the length of the payload in 16 bits.
-const _: () = assert!(longest::RECORD <= u16::MAX as usize);
+const _: () = assert!(HigherOrder::MAX_LEN <= u16::MAX as usize);
 
-/// Longest encoding of each part, in postcard's terms.
-mod longest {
+/// Longest encoding of each part, in postcard's terms, and of whole records.
+pub(super) mod longest {
+    use super::{CHECKSUM, HEADER};
+
     const TAG: usize = 1;
     const F32: usize = 4;
     /// A varint holds 7 bits a byte.
@@ -41,7 +65,13 @@ mod longest {
     const QUALITY: usize = 9 * F32 + 3 * F32 + F32 + (TAG + F32) + U32 + U8 + F32 + F32 + (TAG + F32);
     const TRIAD: usize = 9 * F32 + 3 * F32 + TAG + TAG + text(8) + (TAG + TEMPERATURE) + QUALITY;
     const PROVENANCE: usize = text(32) + U32;
-    pub const RECORD: usize = text(32) + text(32) + U32 + 3 * (TAG + TRIAD) + 3 * (TAG + PROVENANCE);
+    const RECORD: usize = text(32) + text(32) + U32 + 3 * (TAG + TRIAD) + 3 * (TAG + PROVENANCE);
+    const WARMTH: usize = 2 * F32 + 6 * F32;
+    const CURVATURE: usize = 2 * 6 * F32;
+    const NONLINEARITY: usize = F32 + 2 * 15 * F32;
+    pub const FIRST_ORDER: usize = HEADER + RECORD + CHECKSUM;
+    pub const HIGHER_ORDER: usize =
+        FIRST_ORDER + 3 * (TAG + WARMTH) + 3 * (TAG + CURVATURE) + 3 * (TAG + NONLINEARITY);
 }
 
 /// Why a record was not written.
@@ -49,7 +79,7 @@ mod longest {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum EncodeError {
-    /// The buffer is shorter than the record; [`MAX_LEN`] always suffices.
+    /// The buffer is shorter than the record; [`Order::MAX_LEN`] always suffices.
     BufferTooSmall {
         /// Bytes given.
         have: usize,
@@ -78,7 +108,7 @@ pub enum DecodeError {
     UnsupportedVersion {
         /// Major version of the record.
         found: u8,
-        /// Major version this library reads.
+        /// Newest major version that was asked for: that of the [`Order`].
         supported: u8,
     },
     /// The bytes were damaged after they were written.
@@ -94,7 +124,7 @@ pub enum DecodeError {
     Unusable(Defect),
 }
 
-/// Writes a record to the start of `buffer`; gives the bytes written.
+/// Writes a record to the start of `buffer`, in the lowest version that holds it; gives the bytes written.
 ///
 /// # Errors
 ///
@@ -112,12 +142,16 @@ pub enum DecodeError {
 /// assert_eq!(record::decode(&page)?, record);
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
-pub fn encode<'b>(record: &CalibrationRecord, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError> {
+pub fn encode<'b, O: Order>(
+    record: &CalibrationRecord<O>,
+    buffer: &'b mut [u8],
+) -> Result<&'b [u8], EncodeError> {
     record.check().map_err(EncodeError::Unusable)?;
     let have = buffer.len();
     // Serialising has no way to fail; were there one, the longest record asks for the largest buffer.
     let room = buffer.get_mut(HEADER..).unwrap_or_default();
-    let (minor, payload) = serialize(record, room).unwrap_or((VERSION.1, longest::RECORD));
+    let longest = (Version::FIRST, O::MAX_LEN - HEADER - CHECKSUM);
+    let (Version { major, minor }, payload) = serialize(record, room).unwrap_or(longest);
     let need = HEADER + payload + CHECKSUM;
     let short = EncodeError::BufferTooSmall { have, need };
 
@@ -126,17 +160,39 @@ pub fn encode<'b>(record: &CalibrationRecord, buffer: &'b mut [u8]) -> Result<&'
     let header = checked.first_chunk_mut::<HEADER>().ok_or(short)?;
     let [a, b] = (payload as u16).to_le_bytes();
     let [m, u, c, l] = MAGIC;
-    *header = [m, u, c, l, VERSION.0, minor, a, b];
+    *header = [m, u, c, l, major, minor, a, b];
     *checksum = CRC.checksum(checked).to_le_bytes();
     Ok(whole)
 }
 
-/// Reads the record at the start of `bytes`; what follows its checksum is ignored.
+/// Reads the record of first order at the start of `bytes`; what follows its checksum is ignored.
 ///
 /// # Errors
 ///
-/// [`DecodeError`]. Whatever the bytes, there is no panic and no half-read record.
+/// [`DecodeError`]; for a record of higher order [`DecodeError::UnsupportedVersion`]. Whatever the bytes, there is no
+/// panic and no half-read record.
+#[inline]
 pub fn decode(bytes: &[u8]) -> Result<CalibrationRecord, DecodeError> {
+    decode_as::<FirstOrder>(bytes)
+}
+
+/// Reads the record at the start of `bytes`, of that order or lower; what follows its checksum is ignored.
+///
+/// # Errors
+///
+/// As [`decode`].
+///
+/// # Examples
+///
+/// ```
+/// use imucal_core::record::{self, HigherOrder, Order};
+/// # let record = record::CalibrationRecord::<HigherOrder>::empty(Default::default(), record::Date::from_days(0));
+/// let mut page = [0xFF; HigherOrder::MAX_LEN];
+/// record::encode(&record, &mut page)?;
+/// assert_eq!(record::decode_as::<HigherOrder>(&page)?, record);
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+pub fn decode_as<O: Order>(bytes: &[u8]) -> Result<CalibrationRecord<O>, DecodeError> {
     let have = bytes.len();
     let truncated = |need| DecodeError::Truncated { have, need };
 
@@ -146,9 +202,10 @@ pub fn decode(bytes: &[u8]) -> Result<CalibrationRecord, DecodeError> {
     if [m, u, c, l] != MAGIC {
         return Err(DecodeError::BadMagic);
     }
-    if major != VERSION.0 {
-        return Err(DecodeError::UnsupportedVersion { found: major, supported: VERSION.0 });
+    if !(1..=O::VERSION.0).contains(&major) {
+        return Err(DecodeError::UnsupportedVersion { found: major, supported: O::VERSION.0 });
     }
+    let version = Version { major, minor };
 
     let need = HEADER + usize::from(u16::from_le_bytes([a, b])) + CHECKSUM;
     let whole = bytes.get(..need).ok_or(truncated(need))?;
@@ -159,12 +216,12 @@ pub fn decode(bytes: &[u8]) -> Result<CalibrationRecord, DecodeError> {
     }
 
     let payload = checked.get(HEADER..).ok_or(truncated(need))?;
-    let (mut record, mut appended) =
-        postcard::take_from_bytes::<CalibrationRecord>(payload).map_err(|_| DecodeError::Malformed)?;
-    if minor >= WITH_PROVENANCE {
-        appended = take_provenance(&mut record, appended)?;
+    let (mut record, mut appended) = taken::<CalibrationRecord<O>>(payload)?;
+    if version >= Version::WITH_PROVENANCE {
+        appended = take_provenance(&mut record.provenance, appended)?;
     }
-    if minor <= VERSION.1 && !appended.is_empty() {
+    appended = O::read(&mut record, version, appended)?;
+    if version.is_known::<O>() && !appended.is_empty() {
         return Err(DecodeError::Malformed);
     }
     record.check().map_err(DecodeError::Unusable)?;
@@ -173,11 +230,18 @@ pub fn decode(bytes: &[u8]) -> Result<CalibrationRecord, DecodeError> {
 
 /// Reads what minor 1 appended; gives what follows.
 #[inline(never)]
-fn take_provenance<'a>(record: &mut CalibrationRecord, appended: &'a [u8]) -> Result<&'a [u8], DecodeError> {
-    let (provenance, rest) =
-        postcard::take_from_bytes::<[Option<Provenance>; 3]>(appended).map_err(|_| DecodeError::Malformed)?;
-    record.provenance = provenance;
+fn take_provenance<'a>(
+    provenance: &mut [Option<Provenance>; 3],
+    appended: &'a [u8],
+) -> Result<&'a [u8], DecodeError> {
+    let (all, rest) = taken(appended)?;
+    *provenance = all;
     Ok(rest)
+}
+
+/// Reads a value from the start of `bytes`; gives what follows as well.
+pub(super) fn taken<'a, V: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(V, &'a [u8]), DecodeError> {
+    postcard::take_from_bytes(bytes).map_err(|_| DecodeError::Malformed)
 }
 
 impl fmt::Display for EncodeError {

@@ -49,7 +49,7 @@ impl fmt::Display for WrongSensor<'_> {
 
 impl core::error::Error for WrongSensor<'_> {}
 
-impl CalibrationRecord {
+impl<O: Clone> CalibrationRecord<O> {
     /// Was the record, each of its triads, made for the unit with this serial? Names are not compared, for they are
     /// written in many ways.
     ///

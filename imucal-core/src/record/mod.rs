@@ -16,17 +16,27 @@
 //! * **n** frames the payload, so that an older reader can step over fields appended after its time.
 //! * **payload**: [`CalibrationRecord`] in postcard 1, fields in the order of declaration. `f32` is 4 bytes,
 //!   integers wider than a byte and lengths are LEB128 varints, an `Option` is a byte 0 or 1 and then the value, a
-//!   unit is a byte, text is a length and UTF-8. Arrays carry no length. `provenance` is there from minor 1 on.
+//!   unit is a byte, text is a length and UTF-8. Arrays carry no length. What is appended to it:
+//!
+//!   | from | three options each, in the order of [`Sensor::ALL`] |
+//!   | --- | --- |
+//!   | 1.1 | [`Provenance`] |
+//!   | 1.2 | [`TemperatureQuality`] |
+//!   | 2.0 | [`CurvatureRecord`], then [`NonlinearRecord`] |
+//!
 //! * **CRC-32** (ISO-HDLC: polynomial 0x04C11DB7 reflected, initial value and final xor 0xFFFF_FFFF, as in zlib)
 //!   over everything before it. It finds damage, not forgery.
 //!
 //! # Stability policy
 //!
-//! * The **major** rises when the layout, the order or the meaning of a field changes. Another major is refused.
+//! * The **major** rises when the layout, the order or the meaning of a field changes, or where a record cannot be
+//!   applied without what was added ([`order`](Order)). A newer major is refused.
 //! * The **minor** rises when fields are appended to [`CalibrationRecord`] (never to a struct inside it), or variants
 //!   to [`RawUnit`]. An older reader steps over appended fields and refuses, as malformed, only a record that uses a
-//!   variant it does not know. A newer reader still reads every older minor of its major.
-//! * A record is written in the lowest minor that holds it: one whose triads have one provenance is 1.0, byte for byte.
+//!   variant it does not know.
+//! * A newer reader still reads every older version.
+//! * A record is written in the lowest version that holds it: one of first order whose triads have one provenance is
+//!   1.0, byte for byte.
 //! * The golden bytes of each version stay in `tests/golden` and are decoded for ever.
 //!
 //! # What is refused
@@ -39,14 +49,16 @@
 mod codec;
 mod date;
 mod identity;
+mod order;
 mod payload;
 mod plausibility;
 mod provenance;
 mod validity;
 
-pub use codec::{DecodeError, EncodeError, MAX_LEN, VERSION, decode, encode};
+pub use codec::{DecodeError, EncodeError, MAX_LEN, VERSION, decode, decode_as, encode};
 pub use date::Date;
 pub use identity::{Match, SensorIdentity, WrongSensor};
+pub use order::{CurvatureRecord, FirstOrder, HigherOrder, NonlinearRecord, Order, TemperatureQuality};
 pub use provenance::Provenance;
 pub use validity::{Defect, Figures};
 
@@ -62,33 +74,36 @@ use crate::triad::Triad;
 pub type ModelName = String<8>;
 
 /// The calibration of one unit: whose it is, when it was made, and one triad for each sensor calibrated.
+///
+/// `O` says how far its terms go: a [`CalibrationRecord`] without further word is of [`FirstOrder`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound(serialize = "", deserialize = "O: Default"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct CalibrationRecord {
+pub struct CalibrationRecord<O = FirstOrder> {
     /// The unit that was calibrated.
     pub sensor: SensorIdentity,
     /// The day of the last calibration that the record took, UTC.
     pub date: Date,
     /// Accelerometer.
-    pub acc: Option<TriadRecord>,
+    pub acc: Option<TriadRecord<O>>,
     /// Gyroscope.
-    pub gyr: Option<TriadRecord>,
+    pub gyr: Option<TriadRecord<O>>,
     /// Magnetometer.
-    pub mag: Option<TriadRecord>,
+    pub mag: Option<TriadRecord<O>>,
     /// Of each triad in the order of [`Sensor::ALL`], where it comes from; `None` where that is as `sensor` and `date`
     /// say. Appended in minor 1.
     #[serde(skip)]
     pub provenance: [Option<Provenance>; 3],
 }
 
-impl CalibrationRecord {
+impl<O> CalibrationRecord<O> {
     /// A record without a triad.
     pub fn empty(sensor: SensorIdentity, date: Date) -> Self {
         Self { sensor, date, acc: None, gyr: None, mag: None, provenance: [const { None }; 3] }
     }
 
     /// The calibration of one triad; `None` where the record has none.
-    pub fn triad(&self, sensor: Sensor) -> Option<&TriadRecord> {
+    pub fn triad(&self, sensor: Sensor) -> Option<&TriadRecord<O>> {
         match sensor {
             Sensor::Accelerometer => self.acc.as_ref(),
             Sensor::Gyroscope => self.gyr.as_ref(),
@@ -97,7 +112,7 @@ impl CalibrationRecord {
     }
 
     /// The triads the record holds, in the order of [`Sensor::ALL`].
-    pub fn triads(&self) -> impl Iterator<Item = (Sensor, &TriadRecord)> {
+    pub fn triads(&self) -> impl Iterator<Item = (Sensor, &TriadRecord<O>)> {
         Sensor::ALL.into_iter().filter_map(|sensor| Some((sensor, self.triad(sensor)?)))
     }
 }
@@ -128,13 +143,14 @@ impl Sensor {
     }
 }
 
-/// The calibration of one triad: `calibrated = gain · (raw − bias)`, and how well it was found.
+/// The calibration of one triad: to first order `calibrated = gain · (raw − bias)`, and how well it was found.
 ///
 /// Axes: raw values in the sensor's own, calibrated ones in the frame of the accelerometer's orthogonal axes. Plain
 /// arrays, row by row, as they are stored; [`TriadRecord::triad`] computes with them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound(serialize = "", deserialize = "O: Default"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct TriadRecord {
+pub struct TriadRecord<O = FirstOrder> {
     /// `unit_out` per `unit_in`; one row for each calibrated axis. Finite and not singular.
     pub gain: [[f32; 3]; 3],
     /// Raw output at zero input, `unit_in`, sensor axes. Finite.
@@ -149,9 +165,18 @@ pub struct TriadRecord {
     pub temperature: Option<TemperatureTerms<f32>>,
     /// How good the fit was.
     pub quality: FitQuality,
+    /// Terms beyond these; nothing for [`FirstOrder`]. Appended after the triads.
+    #[serde(skip)]
+    pub order: O,
 }
 
-impl TriadRecord {
+impl<O> TriadRecord<O> {
+    /// The same triad with these terms in place of its own beyond the first order.
+    pub fn with_order<P>(self, order: P) -> TriadRecord<P> {
+        let Self { gain, bias, unit_in, unit_out, model, temperature, quality, order: _ } = self;
+        TriadRecord { gain, bias, unit_in, unit_out, model, temperature, quality, order }
+    }
+
     /// Gain and bias to compute with, in either precision; `f64` holds the stored numbers exactly.
     #[inline]
     pub fn triad<T: Scalar>(&self) -> Triad<T> {

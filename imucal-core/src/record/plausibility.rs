@@ -9,15 +9,24 @@
 //! | bias, its standard error, the field's magnitude, rms residual | 100 m/s², 10 rad/s, 10 mT; 2³² counts |
 //! | rms residual of a gyroscope's fit, an angle | 10 rad |
 //! | bias slope, scale slope | a hundredth of the bias' limit, 0.01, per kelvin |
-//! | reference temperature | −100 to 250 °C |
+//! | reference temperature, temperature span | −100 to 250 °C |
+//! | bias curvature, scale curvature | a hundredth of the slopes' limits, per kelvin |
+//! | range of the nonlinear terms | above 0, to a hundred times the bias' limit |
+//! | slope of the nonlinear terms over it | [`STEEPEST`]: so steep they can be undone |
 //! | standard error of a gain's entry | the gain's longest column |
+//! | standard error of a temperature term | the term's own limit |
+//! | slope of the nonlinear terms' standard errors | 1 |
 //! | condition, coverage | at least 1; 0 to 1 |
 //!
 //! A factor of 3: accepted fits lie within 2 ([`crate::accept::Limits`]), and of the units that are taken for one
 //! another the nearest, g and m/s², lie 9.8 apart. The biases are some ten times the worst of data sheets (±10 % of
 //! full scale of a high-g accelerometer, null of a rate table's gyroscope, a magnetometer's whole range).
 
-use super::{Defect, Figures, FitQuality, RawUnit, Sensor, TriadRecord};
+use super::{
+    CurvatureRecord, Defect, Figures, FitQuality, NonlinearRecord, Order, RawUnit, Sensor,
+    TemperatureQuality, TriadRecord,
+};
+use crate::nonlinearity::{NonlinearTerms, STEEPEST};
 use crate::temperature::TemperatureTerms;
 
 /// Factor about the nominal gain.
@@ -34,6 +43,8 @@ const LARGEST_COUNT: f32 = 4_294_967_296.0;
 const WARMTH: f32 = 100.0;
 /// Most that a scale grows a kelvin.
 const SCALE_SLOPE: f32 = 0.01;
+/// Most that a range is, of the bias' limit.
+const RANGE: f32 = 100.0;
 /// °C.
 const REFERENCE: (f32, f32) = (-100.0, 250.0);
 /// A condition of exactly one may have been rounded down.
@@ -84,7 +95,8 @@ fn gain_limits(from: RawUnit, to: RawUnit) -> (f32, f32) {
 }
 
 /// Checks the figures of one sensor, and keeps the first defect: a result of each check would double the code.
-struct Check {
+#[derive(Debug)]
+pub struct Check {
     sensor: Sensor,
     found: Option<Defect>,
 }
@@ -124,7 +136,7 @@ impl Check {
     }
 
     /// Lengths of the gain's columns; gives the longest.
-    fn gain(&mut self, triad: &TriadRecord) -> f32 {
+    fn gain<O>(&mut self, triad: &TriadRecord<O>) -> f32 {
         self.within(Figures::Gain, triad.gain.as_flattened(), f32::MIN, f32::MAX);
         let (least, most) = gain_limits(triad.unit_in, triad.unit_out);
         let (mut shortest, mut longest) = (f32::MAX, 0f32);
@@ -147,6 +159,38 @@ impl Check {
         self.within(Figures::ScaleSlope, &terms.scale_slope, -SCALE_SLOPE, SCALE_SLOPE);
     }
 
+    /// Figures of temperature terms are there with the terms alone.
+    pub(super) fn belongs(&mut self, figures: Figures, warm: bool) {
+        self.unless(warm, Defect::WithoutTerms { sensor: self.sensor, figures });
+    }
+
+    pub(super) fn warmth(&mut self, warmth: &TemperatureQuality, bias: f32) {
+        let [least, _] = warmth.span;
+        self.within(Figures::TemperatureSpan, &warmth.span, REFERENCE.0, REFERENCE.1);
+        self.within(Figures::TemperatureSpan, &warmth.span, least, REFERENCE.1);
+        self.within(Figures::BiasSlopeStd, &warmth.bias_slope_std, 0.0, bias / WARMTH);
+        self.within(Figures::ScaleSlopeStd, &warmth.scale_slope_std, 0.0, SCALE_SLOPE);
+    }
+
+    pub(super) fn curvature(&mut self, curvature: &CurvatureRecord, bias: f32) {
+        let (bias, scale) = (bias / (WARMTH * WARMTH), SCALE_SLOPE / WARMTH);
+        self.within(Figures::BiasCurvature, &curvature.terms.bias, -bias, bias);
+        self.within(Figures::ScaleCurvature, &curvature.terms.scale, -scale, scale);
+        self.within(Figures::BiasCurvatureStd, &curvature.std.bias, 0.0, bias);
+        self.within(Figures::ScaleCurvatureStd, &curvature.std.scale, 0.0, scale);
+    }
+
+    pub(super) fn nonlinearity(&mut self, found: &NonlinearRecord, bias: f32) {
+        let range = found.range;
+        self.within(Figures::NonlinearRange, &[range], f32::MIN_POSITIVE, bias * RANGE);
+        self.within(Figures::Nonlinearity, &[found.terms.slope(range)], 0.0, STEEPEST as f32);
+        let NonlinearTerms { quadratic, cubic, cross } = &found.std;
+        for errors in [quadratic, cubic].into_iter().chain(cross) {
+            self.within(Figures::NonlinearityStd, errors, 0.0, f32::MAX);
+        }
+        self.within(Figures::NonlinearityStd, &[found.std.slope(range)], 0.0, 1.0);
+    }
+
     fn quality(&mut self, quality: &FitQuality, gain: f32, bias: f32, rms: f32) {
         self.within(Figures::GainStd, quality.gain_std.as_flattened(), 0.0, gain);
         self.within(Figures::BiasStd, &quality.bias_std, 0.0, bias);
@@ -158,7 +202,7 @@ impl Check {
     }
 }
 
-impl TriadRecord {
+impl<O: Order> TriadRecord<O> {
     /// Can the triad be a calibration of that sensor? The one check of records that are stored, loaded or written,
     /// and of fits that are adopted.
     ///
@@ -182,6 +226,7 @@ impl TriadRecord {
             _ => most(sensor, self.unit_out),
         };
         check.quality(&self.quality, gain, bias, rms);
+        self.order.check(&mut check, bias, self.temperature.is_some());
         check.found.map_or(Ok(()), Err)
     }
 }
@@ -189,6 +234,8 @@ impl TriadRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::{FirstOrder, HigherOrder};
+    use crate::temperature::TemperatureCurvature;
     use std::string::ToString;
 
     /// A fit as it is accepted.
@@ -211,6 +258,7 @@ mod tests {
                 coverage: 1.0,
                 field_norm: None,
             },
+            order: FirstOrder,
         }
     }
 
@@ -344,6 +392,94 @@ mod tests {
             bias_slope: [0.0; 3],
             scale_slope: [0.0; 3],
         })
+    }
+
+    /// A triad with every part of higher order, each of them as sensors have it.
+    fn full() -> TriadRecord<HigherOrder> {
+        let mut linear = triad(RawUnit::MetrePerSecondSquared, RawUnit::MetrePerSecondSquared, 1.0);
+        warm(&mut linear);
+        let terms = NonlinearTerms { quadratic: [1e-4, 0.0, -1e-4], ..NonlinearTerms::none() };
+        let (nothing, range) = (TemperatureCurvature { bias: [0.0; 3], scale: [0.0; 3] }, 100.0);
+        linear.with_order(HigherOrder {
+            warmth: Some(TemperatureQuality {
+                span: [-20.0, 60.0],
+                bias_slope_std: [0.0; 3],
+                scale_slope_std: [0.0; 3],
+            }),
+            curvature: Some(CurvatureRecord { terms: nothing, std: nothing }),
+            nonlinearity: Some(NonlinearRecord { range, terms, std: NonlinearTerms::none() }),
+        })
+    }
+
+    #[test]
+    fn each_figure_of_higher_order_is_held_to_its_limits_and_named_with_them() {
+        type Spoil = fn(&mut HigherOrder, f32);
+        fn warmth(order: &mut HigherOrder) -> &mut TemperatureQuality {
+            order.warmth.as_mut().unwrap()
+        }
+        fn curvature(order: &mut HigherOrder) -> &mut CurvatureRecord {
+            order.curvature.as_mut().unwrap()
+        }
+        fn nonlinearity(order: &mut HigherOrder) -> &mut NonlinearRecord {
+            order.nonlinearity.as_mut().unwrap()
+        }
+        let spoiled: [(Figures, Spoil, &[f32], &[f32]); 14] = [
+            (Figures::TemperatureSpan, |o, x| warmth(o).span[0] = x, &[-40.0, 60.0], &[-101.0, 61.0]),
+            (Figures::TemperatureSpan, |o, x| warmth(o).span[1] = x, &[-20.0, 125.0], &[-21.0, 251.0]),
+            (Figures::BiasSlopeStd, |o, x| warmth(o).bias_slope_std[2] = x, &[0.9], &[-1e-9, 1.1]),
+            (Figures::ScaleSlopeStd, |o, x| warmth(o).scale_slope_std[1] = x, &[9e-3], &[-1e-9, 0.02]),
+            (Figures::BiasCurvature, |o, x| curvature(o).terms.bias[0] = x, &[-9e-3, 9e-3], &[-0.02, 0.02]),
+            (Figures::ScaleCurvature, |o, x| curvature(o).terms.scale[0] = x, &[-9e-5], &[-2e-4, 2e-4]),
+            (Figures::BiasCurvatureStd, |o, x| curvature(o).std.bias[1] = x, &[9e-3], &[-1e-9, 0.02]),
+            (Figures::ScaleCurvatureStd, |o, x| curvature(o).std.scale[1] = x, &[9e-5], &[-1e-9, 2e-4]),
+            (Figures::NonlinearRange, |o, x| nonlinearity(o).range = x, &[1.0, 490.0], &[-1.0, 0.0, 2e4]),
+            // 2 · 100 · 1e-4 of the quadratic term is there already.
+            (Figures::Nonlinearity, |o, x| nonlinearity(o).terms.quadratic[0] = x, &[-4.9e-4], &[5.1e-4]),
+            (Figures::Nonlinearity, |o, x| nonlinearity(o).terms.cubic[0] = x, &[2.6e-6], &[-2.8e-6]),
+            (Figures::Nonlinearity, |o, x| nonlinearity(o).terms.cross[2][1] = x, &[3.9e-4], &[-4.1e-4]),
+            (Figures::NonlinearityStd, |o, x| nonlinearity(o).std.cubic[2] = x, &[3e-5], &[-1e-9, 4e-5]),
+            (Figures::NonlinearityStd, |o, x| nonlinearity(o).std.cross[0][0] = x, &[4e-3], &[-1e-9, 6e-3]),
+        ];
+        for (figures, spoil, passing, refused) in spoiled {
+            let of = |x: f32| {
+                let mut triad = full();
+                spoil(&mut triad.order, x);
+                triad.check(Sensor::Accelerometer)
+            };
+            for x in passing {
+                assert_eq!(of(*x), Ok(()), "{figures:?} {x}");
+            }
+            for x in refused {
+                let defect = of(*x).unwrap_err();
+                assert!(
+                    matches!(defect, Defect::OutOfRange { figures: at, .. } if at == figures),
+                    "{defect}"
+                );
+                assert!(defect.to_string().contains(figures.name()), "{defect}");
+            }
+            for x in [f32::NAN, f32::INFINITY] {
+                let at = of(x).unwrap_err();
+                assert!(matches!(at, Defect::NotFinite { .. }), "{figures:?}: {at}");
+            }
+        }
+    }
+
+    #[test]
+    fn figures_of_temperature_terms_that_are_not_there_are_refused() {
+        type Spoil = fn(&mut HigherOrder);
+        let cases: [(Figures, Spoil); 2] = [
+            (Figures::TemperatureSpan, |order| order.curvature = None),
+            (Figures::BiasCurvature, |order| order.warmth = None),
+        ];
+        for (figures, spoil) in cases {
+            let mut triad = full();
+            spoil(&mut triad.order);
+            assert_eq!(triad.check(Sensor::Accelerometer), Ok(()));
+            triad.temperature = None;
+            let defect = Defect::WithoutTerms { sensor: Sensor::Accelerometer, figures };
+            assert_eq!(triad.check(Sensor::Accelerometer), Err(defect));
+            assert!(defect.to_string().contains(figures.name()), "{defect}");
+        }
     }
 
     #[test]

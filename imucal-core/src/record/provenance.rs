@@ -15,7 +15,7 @@ pub struct Provenance {
     pub date: Date,
 }
 
-impl CalibrationRecord {
+impl<O: Clone> CalibrationRecord<O> {
     /// Serial of the unit that a triad was calibrated on; empty where unknown.
     pub fn serial_of(&self, sensor: Sensor) -> &str {
         self.own(sensor).map_or(&self.sensor.serial, |own| &own.serial)
@@ -32,7 +32,7 @@ impl CalibrationRecord {
 
     /// Takes a triad that was calibrated on `unit` on `date`, in place of what there was of that sensor. The other
     /// triads keep their figures, their temperature terms and their provenance.
-    pub fn adopt(&mut self, sensor: Sensor, triad: &TriadRecord, unit: &SensorIdentity, date: Date) {
+    pub fn adopt(&mut self, sensor: Sensor, triad: &TriadRecord<O>, unit: &SensorIdentity, date: Date) {
         for (other, own) in Sensor::ALL.into_iter().zip(&mut self.provenance) {
             let kept = match other {
                 _ if other == sensor => None,

@@ -4,7 +4,7 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CalibrationRecord, RawUnit, Sensor};
+use super::{CalibrationRecord, Order, RawUnit, Sensor};
 
 /// Figures of a [`TriadRecord`](super::TriadRecord). The order of the variants is the messages' format: append only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,6 +37,26 @@ pub enum Figures {
     Coverage,
     /// Magnitude of the field.
     FieldNorm,
+    /// Least and greatest temperature of the calibration.
+    TemperatureSpan,
+    /// Standard errors of the bias slope.
+    BiasSlopeStd,
+    /// Standard errors of the scale slope.
+    ScaleSlopeStd,
+    /// Growth of the bias a kelvin².
+    BiasCurvature,
+    /// Growth of the scale a kelvin².
+    ScaleCurvature,
+    /// Standard errors of the bias curvature.
+    BiasCurvatureStd,
+    /// Standard errors of the scale curvature.
+    ScaleCurvatureStd,
+    /// Range that the nonlinear terms hold in.
+    NonlinearRange,
+    /// Nonlinear terms; out of range, their slope over that range.
+    Nonlinearity,
+    /// Standard errors of the nonlinear terms; out of range, the slope of these.
+    NonlinearityStd,
 }
 
 /// Why a record cannot be used, although it is intact. The order of the variants is the messages' format: append only.
@@ -76,6 +96,13 @@ pub enum Defect {
         /// The most that would pass.
         most: f32,
     },
+    /// Figures of temperature terms that the triad has not.
+    WithoutTerms {
+        /// Whose.
+        sensor: Sensor,
+        /// Which.
+        figures: Figures,
+    },
 }
 
 impl Defect {
@@ -85,7 +112,8 @@ impl Defect {
             Self::NotFinite { sensor, .. }
             | Self::Singular { sensor }
             | Self::ForeignUnit { sensor, .. }
-            | Self::OutOfRange { sensor, .. } => *sensor,
+            | Self::OutOfRange { sensor, .. }
+            | Self::WithoutTerms { sensor, .. } => *sensor,
         }
     }
 }
@@ -107,6 +135,16 @@ impl Figures {
             Self::Condition => "condition",
             Self::Coverage => "coverage",
             Self::FieldNorm => "field's magnitude",
+            Self::TemperatureSpan => "temperature span",
+            Self::BiasSlopeStd => "bias slope's standard error",
+            Self::ScaleSlopeStd => "scale slope's standard error",
+            Self::BiasCurvature => "bias curvature",
+            Self::ScaleCurvature => "scale curvature",
+            Self::BiasCurvatureStd => "bias curvature's standard error",
+            Self::ScaleCurvatureStd => "scale curvature's standard error",
+            Self::NonlinearRange => "range of the nonlinear terms",
+            Self::Nonlinearity => "slope of the nonlinear terms",
+            Self::NonlinearityStd => "slope of the nonlinear terms' standard errors",
         }
     }
 }
@@ -118,6 +156,9 @@ impl fmt::Display for Defect {
             Self::NotFinite { figures, .. } => write!(f, "the {} is not finite", figures.name()),
             Self::Singular { .. } => f.write_str("the gain is singular"),
             Self::ForeignUnit { unit, .. } => write!(f, "no such sensor has the unit {}", unit.symbol()),
+            Self::WithoutTerms { figures, .. } => {
+                write!(f, "there is a {}, and no temperature terms that it belongs to", figures.name())
+            }
             Self::OutOfRange { figures, value, least, most, .. } => {
                 let [value, least, most] = [value, least, most].map(|figure| Written(*figure));
                 write!(f, "the {} is {value}, expected {least} to {most}", figures.name())
@@ -142,7 +183,7 @@ impl fmt::Display for Written {
     }
 }
 
-impl CalibrationRecord {
+impl<O: Order> CalibrationRecord<O> {
     /// Can the record be used? [`encode`](super::encode) and [`decode`](super::decode) both ask.
     ///
     /// # Errors

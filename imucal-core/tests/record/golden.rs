@@ -1,13 +1,19 @@
-//! Records and their bytes, put together without the encoder: one of each minor version.
+//! Records and their bytes, put together without the encoder: one of each version.
 
+use imucal_core::nonlinearity::NonlinearTerms;
 use imucal_core::record::{
-    CalibrationRecord, Date, FitQuality, Provenance, RawUnit, SensorIdentity, TriadRecord,
+    CalibrationRecord, CurvatureRecord, Date, FirstOrder, FitQuality, HigherOrder, NonlinearRecord,
+    Provenance, RawUnit, SensorIdentity, TemperatureQuality, TriadRecord,
 };
-use imucal_core::temperature::TemperatureTerms;
+use imucal_core::temperature::{TemperatureCurvature, TemperatureTerms};
 
 pub const GOLDEN: &[u8] = include_bytes!("../golden/record-1.0.bin");
 /// The same whose magnetometer was calibrated earlier, on a unit that did not say its serial.
 pub const GOLDEN_1_1: &[u8] = include_bytes!("../golden/record-1.1.bin");
+/// The same, with what is known of the accelerometer's temperature terms.
+pub const GOLDEN_1_2: &[u8] = include_bytes!("../golden/record-1.2.bin");
+/// The same, with terms of higher order of the accelerometer, and of the magnetometer some of them.
+pub const GOLDEN_2_0: &[u8] = include_bytes!("../golden/record-2.0.bin");
 
 /// Figures of a real unit, one sensor with temperature terms and one without.
 pub fn golden_record() -> CalibrationRecord {
@@ -36,6 +42,7 @@ pub fn golden_record() -> CalibrationRecord {
                 scale_slope: [1e-4, -2e-4, 5e-5],
             }),
             quality,
+            order: FirstOrder,
         }),
         mag: Some(TriadRecord {
             gain: [[1.1, 0.01, 0.02], [0.01, 0.9, -0.03], [0.02, -0.03, 1.0123]],
@@ -45,6 +52,7 @@ pub fn golden_record() -> CalibrationRecord {
             model: "E9".parse().unwrap(),
             temperature: None,
             quality: FitQuality { held_out_rms: None, field_norm: Some(475.0), ..quality },
+            order: FirstOrder,
         }),
         ..CalibrationRecord::empty(sensor, Date::from_days(20_000))
     }
@@ -55,6 +63,52 @@ pub fn golden_record_1_1() -> CalibrationRecord {
     CalibrationRecord { provenance: [None, None, Some(earlier)], ..golden_record() }
 }
 
+/// Of a record of first order, which lacks nothing.
+pub fn raised(record: CalibrationRecord) -> CalibrationRecord<HigherOrder> {
+    let CalibrationRecord { sensor, date, acc, gyr, mag, provenance } = record;
+    let [acc, gyr, mag] =
+        [acc, gyr, mag].map(|triad| triad.map(|triad| triad.with_order(HigherOrder::default())));
+    CalibrationRecord { sensor, date, acc, gyr, mag, provenance }
+}
+
+pub fn golden_record_1_2() -> CalibrationRecord<HigherOrder> {
+    let mut record = raised(golden_record_1_1());
+    record.acc.as_mut().unwrap().order.warmth = Some(TemperatureQuality {
+        span: [-5.5, 61.25],
+        bias_slope_std: [0.125, 0.25, 0.5],
+        scale_slope_std: [1e-6, 2e-6, 0.0],
+    });
+    record
+}
+
+pub fn golden_record_2_0() -> CalibrationRecord<HigherOrder> {
+    let mut record = golden_record_1_2();
+    let acc = &mut record.acc.as_mut().unwrap().order;
+    acc.curvature = Some(CurvatureRecord {
+        terms: TemperatureCurvature { bias: [0.015, -0.02, 0.0], scale: [1e-7, -3e-7, 2e-7] },
+        std: TemperatureCurvature { bias: [0.001, 0.002, 0.003], scale: [1e-8, 2e-8, 3e-8] },
+    });
+    acc.nonlinearity = Some(NonlinearRecord {
+        range: 20_000.0,
+        terms: NonlinearTerms {
+            quadratic: [1.5e-7, -2.5e-7, 3.5e-7],
+            cubic: [1e-12, -2e-12, 3e-12],
+            cross: [[1e-8, 2e-8, 3e-8], [-4e-8, 5e-8, 6e-8], [7e-8, -8e-8, 9e-8]],
+        },
+        std: NonlinearTerms {
+            quadratic: [1e-9, 2e-9, 3e-9],
+            cubic: [1e-14, 2e-14, 3e-14],
+            cross: [[1e-10; 3], [2e-10; 3], [3e-10; 3]],
+        },
+    });
+    record.mag.as_mut().unwrap().order.nonlinearity = Some(NonlinearRecord {
+        range: 600.0,
+        terms: NonlinearTerms { cubic: [0.0, 1e-8, 0.0], ..NonlinearTerms::none() },
+        std: NonlinearTerms { cubic: [0.0, 2e-9, 0.0], ..NonlinearTerms::none() },
+    });
+    record
+}
+
 /// The bytes of minor 0, put together from the layout drawing without the library's encoder or serde.
 pub fn by_hand() -> Vec<u8> {
     framed(1, 0, &payload())
@@ -62,17 +116,57 @@ pub fn by_hand() -> Vec<u8> {
 
 /// Those of minor 1.
 pub fn by_hand_1_1() -> Vec<u8> {
+    framed(1, 1, &payload_1_1())
+}
+
+/// Those of minor 2.
+pub fn by_hand_1_2() -> Vec<u8> {
+    framed(1, 2, &payload_1_2())
+}
+
+/// Those of major 2.
+pub fn by_hand_2_0() -> Vec<u8> {
+    let mut payload = payload_1_2();
+    payload.push(1); // accelerometer's curvature: terms, errors
+    floats(&mut payload, &[0.015, -0.02, 0.0, 1e-7, -3e-7, 2e-7]);
+    floats(&mut payload, &[0.001, 0.002, 0.003, 1e-8, 2e-8, 3e-8]);
+    payload.extend([0, 0]); // nothing of the others
+    payload.push(1); // accelerometer's nonlinear terms: range, terms, errors
+    floats(&mut payload, &[20_000.0]);
+    floats(&mut payload, &[1.5e-7, -2.5e-7, 3.5e-7, 1e-12, -2e-12, 3e-12]);
+    floats(&mut payload, &[1e-8, 2e-8, 3e-8, -4e-8, 5e-8, 6e-8, 7e-8, -8e-8, 9e-8]);
+    floats(&mut payload, &[1e-9, 2e-9, 3e-9, 1e-14, 2e-14, 3e-14]);
+    floats(&mut payload, &[1e-10, 1e-10, 1e-10, 2e-10, 2e-10, 2e-10, 3e-10, 3e-10, 3e-10]);
+    payload.extend([0, 1]); // none of the gyroscope, and the magnetometer's
+    floats(&mut payload, &[600.0]);
+    floats(&mut payload, &[0.0, 0.0, 0.0, 0.0, 1e-8, 0.0]);
+    floats(&mut payload, &[0.0; 9]);
+    floats(&mut payload, &[0.0, 0.0, 0.0, 0.0, 2e-9, 0.0]);
+    floats(&mut payload, &[0.0; 9]);
+    framed(2, 0, &payload)
+}
+
+fn payload_1_1() -> Vec<u8> {
     let mut payload = payload();
     payload.extend([0, 0, 1]); // nothing of its own for accelerometer and gyroscope
     payload.push(0); // no serial
     payload.extend([0xB8, 0x94, 0x01]); // 19 000 days
-    framed(1, 1, &payload)
+    payload
+}
+
+fn payload_1_2() -> Vec<u8> {
+    let mut payload = payload_1_1();
+    payload.push(1); // accelerometer: span, errors of the bias slope, of the scale slope
+    floats(&mut payload, &[-5.5, 61.25, 0.125, 0.25, 0.5, 1e-6, 2e-6, 0.0]);
+    payload.extend([0, 0]); // nothing of the others
+    payload
+}
+
+fn floats(out: &mut Vec<u8>, figures: &[f32]) {
+    figures.iter().for_each(|f| out.extend(f.to_le_bytes()));
 }
 
 fn payload() -> Vec<u8> {
-    let floats = |out: &mut Vec<u8>, figures: &[f32]| {
-        figures.iter().for_each(|f| out.extend(f.to_le_bytes()));
-    };
     let text = |out: &mut Vec<u8>, text: &str| {
         out.push(text.len() as u8);
         out.extend(text.as_bytes());
@@ -142,4 +236,14 @@ pub fn golden_payload() -> &'static [u8] {
 /// Of minor 1.
 pub fn golden_payload_1_1() -> &'static [u8] {
     &GOLDEN_1_1[8..GOLDEN_1_1.len() - 4]
+}
+
+/// Of minor 2.
+pub fn golden_payload_1_2() -> &'static [u8] {
+    &GOLDEN_1_2[8..GOLDEN_1_2.len() - 4]
+}
+
+/// Of major 2.
+pub fn golden_payload_2_0() -> &'static [u8] {
+    &GOLDEN_2_0[8..GOLDEN_2_0.len() - 4]
 }

@@ -7,27 +7,34 @@ mod golden;
 mod properties;
 
 use golden::{
-    GOLDEN, GOLDEN_1_1, by_hand, by_hand_1_1, framed, golden_payload, golden_payload_1_1, golden_record,
-    golden_record_1_1,
+    GOLDEN, GOLDEN_1_1, GOLDEN_1_2, GOLDEN_2_0, by_hand, by_hand_1_1, by_hand_1_2, by_hand_2_0, framed,
+    golden_payload, golden_payload_1_1, golden_payload_1_2, golden_payload_2_0, golden_record,
+    golden_record_1_1, golden_record_1_2, golden_record_2_0, raised,
 };
 use imucal_core::record::{
-    CalibrationRecord, Date, DecodeError, Defect, EncodeError, Figures, FitQuality, MAX_LEN, Match,
-    Provenance, RawUnit, Sensor, SensorIdentity, TriadRecord, VERSION, decode, encode,
+    CalibrationRecord, Date, DecodeError, Defect, EncodeError, Figures, FirstOrder, FitQuality, HigherOrder,
+    MAX_LEN, Match, Order, Provenance, RawUnit, Sensor, SensorIdentity, TriadRecord, VERSION, decode,
+    decode_as, encode,
 };
 
 #[test]
 #[ignore = "writes the golden bytes of a new version"]
 fn write_golden_bytes() {
     use std::io::Write;
-    let path = format!("{}/tests/golden/record-{}.{}.bin", env!("CARGO_MANIFEST_DIR"), VERSION.0, VERSION.1);
-    let mut file = std::fs::File::create_new(path).expect("golden bytes exist and are never written again");
-    file.write_all(&by_hand_1_1()).unwrap();
+    for (version, bytes) in [("1.2", by_hand_1_2()), ("2.0", by_hand_2_0())] {
+        let path = format!("{}/tests/golden/record-{version}.bin", env!("CARGO_MANIFEST_DIR"));
+        let mut file =
+            std::fs::File::create_new(path).expect("golden bytes exist and are never written again");
+        file.write_all(&bytes).unwrap();
+    }
 }
 
 #[test]
 fn the_golden_bytes_are_those_of_the_layout_drawing() {
     assert_eq!(GOLDEN, by_hand());
     assert_eq!(GOLDEN_1_1, by_hand_1_1());
+    assert_eq!(GOLDEN_1_2, by_hand_1_2());
+    assert_eq!(GOLDEN_2_0, by_hand_2_0());
 }
 
 #[test]
@@ -36,6 +43,34 @@ fn the_golden_bytes_are_read_and_written_unchanged() {
     assert_eq!(encode(&golden_record(), &mut [0; MAX_LEN]), Ok(GOLDEN));
     assert_eq!(decode(GOLDEN_1_1), Ok(golden_record_1_1()));
     assert_eq!(encode(&golden_record_1_1(), &mut [0; MAX_LEN]), Ok(GOLDEN_1_1));
+}
+
+#[test]
+fn a_reader_of_higher_order_reads_every_version_and_writes_each_unchanged() {
+    let all = [
+        (GOLDEN, raised(golden_record())),
+        (GOLDEN_1_1, raised(golden_record_1_1())),
+        (GOLDEN_1_2, golden_record_1_2()),
+        (GOLDEN_2_0, golden_record_2_0()),
+    ];
+    for (bytes, record) in all {
+        assert_eq!(decode_as::<HigherOrder>(bytes).as_ref(), Ok(&record));
+        assert_eq!(encode(&record, &mut [0; HigherOrder::MAX_LEN]), Ok(bytes));
+    }
+}
+
+/// Without its higher terms a record would correct otherwise, so a reader of first order takes none of it.
+#[test]
+fn a_reader_of_first_order_refuses_terms_that_change_a_value_and_skips_what_changes_none() {
+    assert_eq!(decode(GOLDEN_1_2), Ok(golden_record_1_1()));
+    assert_eq!(decode(GOLDEN_2_0), Err(DecodeError::UnsupportedVersion { found: 2, supported: 1 }));
+    let mut curved = golden_record_2_0();
+    for triad in [&mut curved.acc, &mut curved.mag] {
+        triad.as_mut().unwrap().order.nonlinearity = None;
+    }
+    let mut page = [0; HigherOrder::MAX_LEN];
+    let bytes = encode(&curved, &mut page).unwrap();
+    assert_eq!(decode(bytes), Err(DecodeError::UnsupportedVersion { found: 2, supported: 1 }));
 }
 
 #[test]
@@ -83,6 +118,11 @@ fn another_major_is_refused_even_if_intact() {
         let refusal = DecodeError::UnsupportedVersion { found, supported: 1 };
         assert_eq!(decode(&framed(found, 0, golden_payload())), Err(refusal));
     }
+    for found in [0, 3, 255] {
+        let refusal = DecodeError::UnsupportedVersion { found, supported: 2 };
+        assert_eq!(decode_as::<HigherOrder>(&framed(found, 0, golden_payload())), Err(refusal));
+    }
+    assert_eq!((FirstOrder::VERSION, HigherOrder::VERSION), ((1, 1), VERSION));
 }
 
 #[test]
@@ -90,8 +130,20 @@ fn a_newer_minor_with_appended_fields_is_read() {
     let mut payload = golden_payload_1_1().to_vec();
     payload.extend([1, 2, 3, 4, 5]);
     payload.resize(3000, 0x55);
-    assert_eq!(decode(&framed(1, VERSION.1 + 1, &payload)), Ok(golden_record_1_1()));
-    assert_eq!(decode(&framed(1, 255, golden_payload_1_1())), Ok(golden_record_1_1()));
+    for minor in [2, 3, 255] {
+        assert_eq!(decode(&framed(1, minor, &payload)), Ok(golden_record_1_1()));
+        assert_eq!(decode(&framed(1, minor, golden_payload_1_1())), Ok(golden_record_1_1()));
+    }
+    let all = [
+        (1, 2, golden_payload_1_2(), golden_record_1_2()),
+        (2, 0, golden_payload_2_0(), golden_record_2_0()),
+    ];
+    for (major, minor, payload, record) in all {
+        let payload = [payload, &[0x55; 2000]].concat();
+        for minor in [minor + 1, 255] {
+            assert_eq!(decode_as::<HigherOrder>(&framed(major, minor, &payload)).as_ref(), Ok(&record));
+        }
+    }
 }
 
 #[test]
@@ -102,6 +154,30 @@ fn bytes_after_the_last_field_of_a_minor_are_a_faulty_writer() {
     }
     // What minor 1 appends is missing.
     assert_eq!(decode(&framed(1, 1, golden_payload())), Err(DecodeError::Malformed));
+
+    let of_higher = |major, minor, payload: &[u8]| decode_as::<HigherOrder>(&framed(major, minor, payload));
+    let whole = [
+        (1, 0, golden_payload()),
+        (1, 1, golden_payload_1_1()),
+        (1, 2, golden_payload_1_2()),
+        (2, 0, golden_payload_2_0()),
+    ];
+    for (major, minor, payload) in whole {
+        assert!(of_higher(major, minor, payload).is_ok());
+        assert_eq!(of_higher(major, minor, &[payload, &[0]].concat()), Err(DecodeError::Malformed));
+        let short = &payload[..payload.len() - 1];
+        assert_eq!(of_higher(major, minor, short), Err(DecodeError::Malformed));
+    }
+}
+
+#[test]
+fn a_part_of_a_triad_that_is_not_there_is_a_faulty_writer() {
+    let mut payload = golden_payload_1_2().to_vec();
+    // Accelerometer, gyroscope, magnetometer: what the first has becomes the second's, which the record lacks.
+    let from = golden_payload_1_1().len();
+    payload[from..].rotate_right(1);
+    assert_eq!(payload[from..from + 2], [0, 1]);
+    assert_eq!(decode_as::<HigherOrder>(&framed(1, 2, &payload)), Err(DecodeError::Malformed));
 }
 
 #[test]
@@ -268,10 +344,32 @@ fn max_len_is_the_length_of_the_longest_record() {
 }
 
 #[test]
+fn max_len_of_higher_order_is_the_length_of_the_longest_record_of_it() {
+    let mut record = raised(longest_record());
+    let order = golden_record_2_0().acc.unwrap().order;
+    for (triad, unit) in [
+        (&mut record.acc, RawUnit::MetrePerSecondSquared),
+        (&mut record.gyr, RawUnit::RadianPerSecond),
+        (&mut record.mag, RawUnit::MicroTesla),
+    ] {
+        let longest = triad.as_mut().unwrap();
+        (longest.order, longest.unit_out) = (order, unit);
+    }
+    let mut buffer = [0; HigherOrder::MAX_LEN];
+    assert_eq!(encode(&record, &mut buffer).unwrap().len(), HigherOrder::MAX_LEN);
+    assert_eq!(decode_as(&buffer), Ok(record));
+}
+
+#[test]
 fn a_buffer_too_small_is_told_the_exact_need() {
     let need = GOLDEN.len();
     for have in 0..need {
         let refusal = EncodeError::BufferTooSmall { have, need };
         assert_eq!(encode(&golden_record(), &mut vec![0; have]), Err(refusal));
+    }
+    let need = GOLDEN_2_0.len();
+    for have in 0..need {
+        let refusal = EncodeError::BufferTooSmall { have, need };
+        assert_eq!(encode(&golden_record_2_0(), &mut vec![0; have]), Err(refusal));
     }
 }

@@ -1,16 +1,18 @@
 //! What holds for every record and for any bytes.
 
+use imucal_core::nonlinearity::NonlinearTerms;
 use imucal_core::record::{
-    CalibrationRecord, Date, FitQuality, MAX_LEN, Provenance, RawUnit, SensorIdentity, TriadRecord, decode,
-    encode,
+    CalibrationRecord, CurvatureRecord, Date, DecodeError, FirstOrder, FitQuality, HigherOrder, MAX_LEN,
+    NonlinearRecord, Order, Provenance, RawUnit, SensorIdentity, TemperatureQuality, TriadRecord, decode,
+    decode_as, encode,
 };
-use imucal_core::temperature::TemperatureTerms;
+use imucal_core::temperature::{TemperatureCurvature, TemperatureTerms};
 use proptest::array::{uniform3, uniform9};
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
 
-use super::golden::{GOLDEN_1_1, framed, golden_payload_1_1};
+use super::golden::{GOLDEN_1_1, GOLDEN_2_0, framed, golden_payload_1_1, golden_payload_2_0, raised};
 
 /// Any size within ±`most`.
 fn figure(most: f32) -> impl Strategy<Value = f32> {
@@ -67,6 +69,69 @@ fn triad(unit_out: RawUnit) -> impl Strategy<Value = TriadRecord> {
             model: model.parse().unwrap(),
             temperature,
             quality,
+            order: FirstOrder,
+        },
+    )
+}
+
+/// Any terms of higher order that a triad of counts can have, with temperature terms or without.
+fn order(warm: bool) -> impl Strategy<Value = HigherOrder> {
+    let curvature = |bias, scale| {
+        (uniform3(bias), uniform3(scale)).prop_map(|(bias, scale)| TemperatureCurvature { bias, scale })
+    };
+    let warmth = ((-40f32..125.0, 0f32..100.0), uniform3(positive(1e5)), uniform3(positive(0.01))).prop_map(
+        |((least, width), bias_slope_std, scale_slope_std)| TemperatureQuality {
+            span: [least, least + width],
+            bias_slope_std,
+            scale_slope_std,
+        },
+    );
+    let curvature = (
+        curvature(figure(1e4).boxed(), figure(1e-4).boxed()),
+        curvature(positive(1e4).boxed(), positive(1e-4).boxed()),
+    )
+        .prop_map(|(terms, std)| CurvatureRecord { terms, std });
+    // Each of five terms of a row takes a sixth of the slope that is allowed.
+    let terms = |entry: fn(f32) -> BoxedStrategy<f32>| {
+        let share = || uniform3(entry(0.016));
+        (share(), share(), uniform3(share()))
+    };
+    let nonlinearity = (1f32..1e5, terms(|most| figure(most).boxed()), terms(|most| positive(most).boxed()))
+        .prop_map(|(range, terms, std)| {
+            let over = |(quadratic, cubic, cross): ([f32; 3], [f32; 3], [[f32; 3]; 3])| {
+                let first = |x: f32| x / (2.0 * range);
+                NonlinearTerms {
+                    quadratic: quadratic.map(first),
+                    cubic: cubic.map(|x| x / (3.0 * range * range)),
+                    cross: cross.map(|row| row.map(first)),
+                }
+            };
+            NonlinearRecord { range, terms: over(terms), std: over(std) }
+        });
+    (option::of(warmth), option::of(curvature), option::of(nonlinearity)).prop_map(
+        move |(warmth, curvature, nonlinearity)| HigherOrder {
+            warmth: warmth.filter(|_| warm),
+            curvature: curvature.filter(|_| warm),
+            nonlinearity,
+        },
+    )
+}
+
+/// Any record of higher order.
+fn higher() -> impl Strategy<Value = CalibrationRecord<HigherOrder>> {
+    let orders = |record: &CalibrationRecord| {
+        let warm = |triad: &Option<TriadRecord>| triad.as_ref().is_some_and(|t| t.temperature.is_some());
+        (order(warm(&record.acc)), order(warm(&record.gyr)), order(warm(&record.mag)))
+    };
+    record().prop_flat_map(move |record| (orders(&record), Just(record))).prop_map(
+        |((acc, gyr, mag), record)| {
+            let mut record = raised(record);
+            for (triad, order) in [(&mut record.acc, acc), (&mut record.gyr, gyr), (&mut record.mag, mag)] {
+                if let Some(triad) = triad {
+                    triad.order = order;
+                }
+            }
+            record
         },
     )
 }
@@ -98,6 +163,35 @@ proptest! {
     }
 
     #[test]
+    fn every_usable_record_of_higher_order_comes_back_as_it_was(record in higher()) {
+        let mut buffer = [0; HigherOrder::MAX_LEN];
+        let bytes = encode(&record, &mut buffer).unwrap();
+        let changes = record.triads().any(|(_, t)| t.order.curvature.is_some() || t.order.nonlinearity.is_some());
+        let refusal = DecodeError::UnsupportedVersion { found: 2, supported: 1 };
+        prop_assert_eq!(decode(bytes).err(), changes.then_some(refusal));
+        prop_assert_eq!(decode_as(bytes), Ok(record));
+    }
+
+    /// A record of first order has the same bytes, whatever the type that holds it.
+    #[test]
+    fn what_needs_nothing_newer_is_written_as_it_was(record in record()) {
+        let (mut buffer, mut longer) = ([0; MAX_LEN], [0; HigherOrder::MAX_LEN]);
+        let bytes = encode(&record, &mut buffer);
+        let raised = raised(record.clone());
+        prop_assert_eq!(encode(&raised, &mut longer), bytes);
+    }
+
+    #[test]
+    fn a_damaged_payload_of_higher_order_never_panics(at in 0..GOLDEN_2_0.len() - 12, byte in any::<u8>(), cut in 0..GOLDEN_2_0.len()) {
+        let mut payload = golden_payload_2_0().to_vec();
+        payload[at] = byte;
+        payload.truncate(cut);
+        if let Ok(record) = decode_as::<HigherOrder>(&framed(2, 0, &payload)) {
+            prop_assert!(encode(&record, &mut [0; HigherOrder::MAX_LEN]).is_ok());
+        }
+    }
+
+    #[test]
     fn arbitrary_bytes_are_refused(bytes in vec(any::<u8>(), 0..1024)) {
         prop_assert!(decode(&bytes).is_err());
     }
@@ -107,6 +201,9 @@ proptest! {
     fn an_arbitrary_payload_never_panics_and_what_is_read_can_be_written(payload in vec(any::<u8>(), 0..1024)) {
         if let Ok(record) = decode(&framed(1, 1, &payload)) {
             prop_assert!(encode(&record, &mut [0; MAX_LEN]).is_ok());
+        }
+        if let Ok(record) = decode_as::<HigherOrder>(&framed(2, 0, &payload)) {
+            prop_assert!(encode(&record, &mut [0; HigherOrder::MAX_LEN]).is_ok());
         }
     }
 

@@ -2,7 +2,7 @@
 //! a Gauss–Markov process, white noise.
 
 use imucal_core::{
-    record::{CalibrationRecord, Date, FitQuality, RawUnit, SensorIdentity, TriadRecord},
+    record::{CalibrationRecord, Date, FirstOrder, FitQuality, RawUnit, SensorIdentity, TriadRecord},
     watch::{Look, Mean, WatchSettings},
 };
 use nalgebra::{Matrix3, Vector3};
@@ -67,6 +67,7 @@ impl Grade {
                 coverage: 0.9,
                 field_norm: None,
             },
+            order: FirstOrder,
         }
     }
 

@@ -54,7 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if let Some(warning) = warning {
         warn(&warning);
     }
-    apply::apply(&recording, &stored, &record).write_into(&out, &mut files)?;
+    apply::apply(&recording, &stored, &record)?.write_into(&out, &mut files)?;
     files.commit()?;
     say!("{}: {} rows corrected into {}", recording.name, recording.rows(), out.display());
     Ok(Ending::Done)

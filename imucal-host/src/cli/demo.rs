@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use imucal_core::record::CalibrationRecord;
+use imucal_core::record::{CalibrationRecord, HigherOrder};
 
 use super::{
     Ending,
@@ -87,7 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     say!("\n4. Apply the record through the f32 core and compare with the f64 reference.\n");
     let device = stored.to_record(out)?;
     let equal = is_equal(&recording, &calibration, &stored, &device)?;
-    apply(&recording, &stored, &device).write_into(&out.join("rig-calibrated.csv.gz"), &mut files)?;
+    apply(&recording, &stored, &device)?.write_into(&out.join("rig-calibrated.csv.gz"), &mut files)?;
 
     say!("\n5. Diagnose: which effect does the model lack, and what share of the gap does it explain?\n");
     let diagnosis = diagnose(&recording, &diagnosis::Options::default(), &|_| {});
@@ -131,7 +131,7 @@ fn is_equal(
     recording: &Recording,
     calibration: &Calibration,
     stored: &StoredCalibration,
-    device: &CalibrationRecord,
+    device: &CalibrationRecord<HigherOrder>,
 ) -> anyhow::Result<bool> {
     let mut equal = true;
     for kind in SensorKind::ALL {

@@ -9,7 +9,7 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 use imucal_core::{
     link::{FitReport, Key, LastReset, RecordState, ResetCause, VERSION},
-    record::{self, Date},
+    record::{self, CalibrationRecord, Date, HigherOrder, Order},
 };
 
 use super::{
@@ -280,7 +280,7 @@ fn put(arguments: &Put) -> anyhow::Result<Ending> {
         Err(damaged) => return Ok(refuse(&damaged)),
     };
     let record = stored.to_record(&arguments.calibration)?;
-    let mut page = [0; record::MAX_LEN];
+    let mut page = [0; HigherOrder::MAX_LEN];
     let bytes = record::encode(&record, &mut page)?;
     let sequence = arguments.place.open()?.put_record(bytes, arguments.replace)?;
     say!("stored as record {sequence}");
@@ -288,9 +288,9 @@ fn put(arguments: &Put) -> anyhow::Result<Ending> {
 }
 
 /// What the device corrects with.
-fn on_device(session: &mut Session) -> anyhow::Result<Option<record::CalibrationRecord>> {
+fn on_device(session: &mut Session) -> anyhow::Result<Option<CalibrationRecord<HigherOrder>>> {
     let Some(bytes) = session.record()? else { return Ok(None) };
-    Ok(Some(record::decode(&bytes)?))
+    Ok(Some(record::decode_as(&bytes)?))
 }
 
 fn stream(arguments: &Stream) -> anyhow::Result<Ending> {

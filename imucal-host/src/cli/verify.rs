@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use imucal_core::record::{self, CalibrationRecord};
+use imucal_core::record::{self, CalibrationRecord, HigherOrder, Order};
 
 use super::{
     Ending,
@@ -93,10 +93,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
 }
 
 /// Replays fits and samples through a device; whether every bit is the same.
-fn replay(session: &mut Session, recording: &Recording, record: &CalibrationRecord) -> anyhow::Result<bool> {
+fn replay(
+    session: &mut Session,
+    recording: &Recording,
+    record: &CalibrationRecord<HigherOrder>,
+) -> anyhow::Result<bool> {
     let options = Options { rig_acc: None, rig_gyr: None, rig_mag: None, ..Options::default() };
     let fits = board::fits(session, &calibrate(recording, &options, &|_| {}))?;
-    let mut page = [0; record::MAX_LEN];
+    let mut page = [0; HigherOrder::MAX_LEN];
     let bytes = record::encode(record, &mut page)?;
     session.put_record(bytes, false)?;
     let kept = session.record()?.as_deref() == Some(bytes);

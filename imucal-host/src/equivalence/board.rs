@@ -1,8 +1,8 @@
 //! Bit by bit: a device against the core on this machine, in the same precision.
 
 use imucal_core::{
-    corrector::Corrector,
-    record::{CalibrationRecord, Date},
+    corrector::FullCorrector,
+    record::{CalibrationRecord, Date, HigherOrder},
 };
 use nalgebra::Vector3;
 
@@ -40,7 +40,7 @@ impl BoardSamples {
 pub fn samples(
     session: &mut Session,
     recording: &Recording,
-    record: &CalibrationRecord,
+    record: &CalibrationRecord<HigherOrder>,
 ) -> Result<Vec<BoardSamples>, DeviceError> {
     let mut all = Vec::new();
     for kind in SensorKind::ALL {
@@ -56,7 +56,11 @@ pub fn samples(
         let (raw, temperature): (Vec<Vector3<f32>>, Vec<f32>) =
             measured.map(|(row, sample)| (sample, warmth(row))).unzip();
         let answers = session.correct_at(kind, &raw, &temperature)?;
-        all.push(compare(kind, &Corrector::from(triad), (&raw, &temperature), &answers));
+        all.push(match FullCorrector::try_from(triad) {
+            Ok(corrector) => compare(kind, &corrector, (&raw, &temperature), &answers),
+            // Nothing can be said of it here, so nothing passes.
+            Err(_) => BoardSamples { kind, samples: raw.len(), different: raw.len(), first: Some(0) },
+        });
     }
     Ok(all)
 }
@@ -64,7 +68,7 @@ pub fn samples(
 /// Compares a device's answers with a corrector's, for raw samples with the temperature of each, °C or NaN.
 pub fn compare(
     kind: SensorKind,
-    corrector: &Corrector<f32>,
+    corrector: &FullCorrector<f32>,
     (raw, temperature): (&[Vector3<f32>], &[f32]),
     answers: &[Vector3<f32>],
 ) -> BoardSamples {
@@ -114,7 +118,7 @@ pub fn fits(
 
 #[cfg(test)]
 mod tests {
-    use imucal_core::{temperature::TemperatureTerms, triad::Triad};
+    use imucal_core::{corrector::Corrector, temperature::TemperatureTerms, triad::Triad};
     use nalgebra::Matrix3;
 
     use super::*;
@@ -123,7 +127,8 @@ mod tests {
     fn one_ulp_of_one_axis_of_one_sample_is_found() {
         let gain = Matrix3::new(1.01f32, 0.02, 0.03, 0.0, 0.99, 0.01, 0.0, 0.0, 1.02);
         let terms = TemperatureTerms { reference: 20.0, bias_slope: [0.1; 3], scale_slope: [1e-3; 3] };
-        let corrector = Corrector::new(Triad { gain, bias: Vector3::new(0.1, 0.2, 0.3) }, Some(terms));
+        let first = Corrector::new(Triad { gain, bias: Vector3::new(0.1, 0.2, 0.3) }, Some(terms));
+        let corrector = FullCorrector::from(first);
         let raw: Vec<_> = (0..100).map(|k| Vector3::new(k as f32, 0.5 * k as f32, 9.8)).collect();
         let warmth: Vec<_> =
             (0..100).map(|k| if k % 3 == 0 { f32::NAN } else { 0.4 * k as f32 + 0.1 }).collect();

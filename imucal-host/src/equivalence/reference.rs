@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::{
     observe::{motion::MotionData, turn::BiasPath},
-    store::StoredTriad,
+    store::{StoredNonlinearity, StoredTriad},
 };
 
 /// Rounds of Gauss–Newton at the most.
@@ -22,14 +22,40 @@ pub fn correct(gain: &[[f64; 3]; 3], bias: &[f64; 3], raw: [f64; 3]) -> [f64; 3]
     [0, 1, 2].map(|i| gain[i][0] * d[0] + gain[i][1] * d[1] + gain[i][2] * d[2])
 }
 
-/// The same at a temperature, `(1 + s Δ) ∘ gain · (raw − bias − β Δ)`; Δ is zero where there is no reading.
+/// The same at a temperature, `(1 + s Δ + s₂ Δ²) ∘ gain · x` with `x + n(x) = raw − bias − β Δ − β₂ Δ²`; Δ is zero where
+/// there is no reading, and n where the calibration has no nonlinear terms.
 pub fn correct_at(figures: &StoredTriad, raw: [f64; 3], temperature: f64) -> [f64; 3] {
     let terms = figures.temperature.filter(|_| temperature.is_finite());
-    let Some(terms) = terms else { return correct(&figures.gain, &figures.bias, raw) };
-    let change = temperature - terms.reference;
-    let bias = [0, 1, 2].map(|axis| figures.bias[axis] + terms.bias_slope[axis] * change);
-    let value = correct(&figures.gain, &bias, raw);
-    [0, 1, 2].map(|axis| value[axis] * (1.0 + terms.scale_slope[axis] * change))
+    let change = terms.map_or(0.0, |terms| temperature - terms.reference);
+    let drifted = |at: f64, first: [f64; 3], second: [f64; 3], axis: usize| {
+        at + first[axis] * change + second[axis] * change * change
+    };
+    let none = [0.0; 3];
+    let (beta, scale) = terms.map_or((none, none), |terms| (terms.bias_slope, terms.scale_slope));
+    let curvature = terms.and_then(|terms| terms.curvature);
+    let (beta_2, scale_2) = curvature.map_or((none, none), |second| (second.bias, second.scale));
+    let output = [0, 1, 2].map(|axis| raw[axis] - drifted(figures.bias[axis], beta, beta_2, axis));
+    let sensed = figures.nonlinearity.map_or(output, |terms| sensed(&terms, output));
+    let value = correct(&figures.gain, &none, sensed);
+    [0, 1, 2].map(|axis| value[axis] * drifted(1.0, scale, scale_2, axis))
+}
+
+/// Rounds that solve `x + n(x) = output` for terms of a tenth's slope: each takes a digit off.
+const INVERSE_ROUNDS: usize = 20;
+
+/// x of `x + n(x) = output`, by as many rounds as `f64` can show.
+fn sensed(terms: &StoredNonlinearity, output: [f64; 3]) -> [f64; 3] {
+    let mut x = output;
+    for _ in 0..INVERSE_ROUNDS {
+        let [u, v, w] = x.map(|axis| axis.clamp(-terms.range, terms.range));
+        let own = [u, v, w];
+        x = [0, 1, 2].map(|axis| {
+            let [p, q, r] = terms.cross[axis];
+            let bent = (terms.quadratic[axis] + terms.cubic[axis] * own[axis]) * own[axis] * own[axis];
+            output[axis] - bent - (p * u * v + q * v * w + r * w * u)
+        });
+    }
+    x
 }
 
 /// Distance of `m` outside the shell |A(m − b)| = norm, to first order, less `excess`.

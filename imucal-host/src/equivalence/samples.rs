@@ -4,7 +4,10 @@
 //! what these figures say, each axis of each sample to [`LIMIT`] times the bound of its own roundings
 //! ([`super::rounding`])? Both together hold a device to the calibration: what `f32` itself costs is in neither.
 
-use imucal_core::{corrector::Compensator, record::TriadRecord};
+use imucal_core::{
+    corrector::{Compensator, FullCorrector},
+    record::{HigherOrder, TriadRecord},
+};
 use nalgebra::Vector3;
 
 use super::{reference, rounding, ulp};
@@ -72,16 +75,24 @@ impl<'a> Samples<'a> {
 
 /// Compares one sensor's corrections over a recording. `stored` is what was asked for, `record` what the device
 /// holds of it.
-pub fn compare(samples: Samples<'_>, stored: &StoredTriad, record: &TriadRecord) -> SampleEquivalence {
-    let mut core = Compensator::<f32>::new(record.into());
-    compare_by(samples, stored, record, |raw, temperature| core.apply_at(raw, temperature))
+pub fn compare(
+    samples: Samples<'_>,
+    stored: &StoredTriad,
+    record: &TriadRecord<HigherOrder>,
+) -> SampleEquivalence {
+    let mut core = FullCorrector::<f32>::try_from(record).map(Compensator::new);
+    // A record that cannot be applied makes no number, and no comparison passes.
+    compare_by(samples, stored, record, |raw, temperature| match &mut core {
+        Ok(core) => core.apply_at(raw, temperature),
+        Err(_) => Vector3::repeat(f32::NAN),
+    })
 }
 
 /// The same with samples corrected by whoever is called: with a raw sample and its temperature, °C or NaN.
 pub fn compare_by(
     samples: Samples<'_>,
     stored: &StoredTriad,
-    record: &TriadRecord,
+    record: &TriadRecord<HigherOrder>,
     mut device: impl FnMut(&Vector3<f32>, f32) -> Vector3<f32>,
 ) -> SampleEquivalence {
     let Samples { kind, triple, temperature } = samples;
@@ -132,7 +143,13 @@ fn of_bound(device: f64, exact: rounding::Bounded) -> f64 {
 fn is_nearest(held: &StoredTriad, stored: &StoredTriad) -> bool {
     let figures = |triad: &StoredTriad| -> Vec<f32> {
         let terms = triad.temperature.map(|t| [[t.reference; 3], t.bias_slope, t.scale_slope]);
+        let curvature = triad.temperature.and_then(|t| t.curvature).map(|c| [c.bias, c.scale]);
+        let bent = triad.nonlinearity.map(|n| {
+            let [i, j, k] = n.cross;
+            [[n.range; 3], n.quadratic, n.cubic, i, j, k]
+        });
         let all = triad.gain.into_iter().chain([triad.bias]).chain(terms.into_iter().flatten());
+        let all = all.chain(curvature.into_iter().flatten()).chain(bent.into_iter().flatten());
         all.flatten().map(|figure| figure as f32).collect()
     };
     figures(held) == figures(stored)

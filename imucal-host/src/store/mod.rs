@@ -2,12 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use imucal_core::record::{self, DecodeError, Defect, EncodeError};
+use imucal_core::record::{self, DecodeError, Defect, EncodeError, HigherOrder, Order};
 use serde::{Deserialize, Serialize};
 
 pub mod form;
+pub mod higher_order;
 pub mod record_form;
 pub mod watch_file;
+
+pub use higher_order::{StoredCurvature, StoredNonlinearity, StoredTemperatureQuality};
 
 use crate::{
     calibrate::{Calibration, FitSummary, SensorOutcome},
@@ -93,9 +96,12 @@ pub struct StoredTriad {
     /// Serial of the unit and day of the calibration, where they are not the file's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub provenance: Option<StoredProvenance>,
-    /// Linear temperature terms, where they were calibrated.
+    /// Temperature terms, where they were calibrated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<StoredTemperature>,
+    /// Quadratic, cubic and cross terms, where they were calibrated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nonlinearity: Option<StoredNonlinearity>,
 }
 
 /// Where a triad comes from; see [`imucal_core::record::Provenance`].
@@ -110,7 +116,7 @@ pub struct StoredProvenance {
     pub date: record::Date,
 }
 
-/// Linear temperature terms; see [`imucal_core::temperature`].
+/// Temperature terms; see [`imucal_core::temperature`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StoredTemperature {
@@ -120,6 +126,12 @@ pub struct StoredTemperature {
     pub bias_slope: [f64; 3],
     /// Per kelvin.
     pub scale_slope: [f64; 3],
+    /// How well they are known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quality: Option<StoredTemperatureQuality>,
+    /// The second order.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curvature: Option<StoredCurvature>,
 }
 
 /// Why a calibration could not be read.
@@ -286,7 +298,7 @@ impl StoredCalibration {
         if is_toml(path, &bytes) {
             Self::from_toml(path, &bytes)
         } else {
-            let record = record::decode(&bytes).map_err(|cause| match cause {
+            let record = record::decode_as::<HigherOrder>(&bytes).map_err(|cause| match cause {
                 DecodeError::BadMagic => LoadError::Foreign { path: path.into() },
                 DecodeError::Unusable(defect) => LoadError::Unusable { path: path.into(), defect },
                 cause => LoadError::Record { path: path.into(), cause },
@@ -338,7 +350,7 @@ impl StoredCalibration {
     /// [`SaveError`] names the file and why it cannot be written.
     pub fn write_record(&self, path: &Path, files: &mut OutputSet) -> Result<(), SaveError> {
         let record = self.to_record(path)?;
-        let mut buffer = [0; record::MAX_LEN];
+        let mut buffer = [0; HigherOrder::MAX_LEN];
         let bytes = record::encode(&record, &mut buffer)
             .map_err(|cause| SaveError::Encode { path: path.into(), cause })?;
         Ok(files.add(path, bytes)?)
@@ -378,6 +390,7 @@ impl StoredTriad {
             field_norm: fit.field_norm,
             provenance: None,
             temperature: None,
+            nonlinearity: None,
         }
     }
 }

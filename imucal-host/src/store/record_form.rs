@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use imucal_core::{
-    record::{CalibrationRecord, FitQuality, Provenance, RawUnit, Sensor, SensorIdentity, TriadRecord},
+    record::{
+        CalibrationRecord, FitQuality, HigherOrder, Provenance, RawUnit, Sensor, SensorIdentity, TriadRecord,
+    },
     temperature::TemperatureTerms,
 };
 
@@ -12,11 +14,11 @@ use super::{
 };
 use crate::recording::{SensorKind, Unit};
 
-fn narrow<const N: usize>(values: [f64; N]) -> [f32; N] {
+pub(super) fn narrow<const N: usize>(values: [f64; N]) -> [f32; N] {
     values.map(|v| v as f32)
 }
 
-fn widen<const N: usize>(values: [f32; N]) -> [f64; N] {
+pub(super) fn widen<const N: usize>(values: [f32; N]) -> [f64; N] {
     values.map(f64::from)
 }
 
@@ -52,7 +54,7 @@ impl StoredCalibration {
     ///
     /// # Errors
     /// [`SaveError::TooLong`] for a name, serial or model that the record has no room for.
-    pub fn to_record(&self, path: &Path) -> Result<CalibrationRecord, SaveError> {
+    pub fn to_record(&self, path: &Path) -> Result<CalibrationRecord<HigherOrder>, SaveError> {
         let triad = |stored: &Option<StoredTriad>| stored.as_ref().map(|t| t.to_record(path)).transpose();
         let provenance = |stored: &Option<StoredTriad>| {
             let own = stored.as_ref().and_then(|t| t.provenance.as_ref());
@@ -75,7 +77,7 @@ impl StoredCalibration {
     }
 
     /// What a record holds.
-    pub fn from_record(record: &CalibrationRecord) -> Self {
+    pub fn from_record(record: &CalibrationRecord<HigherOrder>) -> Self {
         let [acc, gyr, mag] = Sensor::ALL.map(|sensor| {
             let own = record.provenance[sensor as usize].as_ref();
             let provenance =
@@ -98,7 +100,7 @@ impl StoredCalibration {
 }
 
 impl StoredTriad {
-    fn to_record(&self, path: &Path) -> Result<TriadRecord, SaveError> {
+    fn to_record(&self, path: &Path) -> Result<TriadRecord<HigherOrder>, SaveError> {
         Ok(TriadRecord {
             gain: self.gain.map(narrow),
             bias: narrow(self.bias),
@@ -121,11 +123,12 @@ impl StoredTriad {
                 coverage: self.coverage as f32,
                 field_norm: self.field_norm.map(|norm| norm as f32),
             },
+            order: self.order(),
         })
     }
 
     /// What a record's triad holds, exactly.
-    pub fn from_record(record: &TriadRecord) -> Self {
+    pub fn from_record(record: &TriadRecord<HigherOrder>) -> Self {
         let quality = &record.quality;
         Self {
             model: record.model.as_str().into(),
@@ -147,7 +150,10 @@ impl StoredTriad {
                 reference: t.reference.into(),
                 bias_slope: widen(t.bias_slope),
                 scale_slope: widen(t.scale_slope),
+                quality: record.order.warmth.as_ref().map(Into::into),
+                curvature: record.order.curvature.as_ref().map(Into::into),
             }),
+            nonlinearity: record.order.nonlinearity.as_ref().map(Into::into),
         }
     }
 }
@@ -210,6 +216,7 @@ mod tests {
                 field_norm: None,
                 provenance: Some(StoredProvenance { serial: String::new(), date: Date::from_days(20_000) }),
                 temperature: None,
+                nonlinearity: None,
             }),
             gyr: None,
             mag: None,

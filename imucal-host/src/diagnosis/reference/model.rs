@@ -118,6 +118,7 @@ mod tests {
             coverage: 1.0,
             field_norm: None,
             provenance: None,
+            nonlinearity: None,
             temperature: None,
         }
     }
