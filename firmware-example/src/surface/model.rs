@@ -8,6 +8,7 @@ use imucal_core::{
         norm::NormModel,
         parameterisation::{FULL, FULL_WITH_SENSITIVITY, UPPER_TRIANGULAR},
         rig::{Axis, GimbalPose, Pose, ReferencePose, RigAxes},
+        thermal::{Side, ThermalForm, UPPER_TRIANGULAR_LINEAR},
         turn::TurnModel,
         unified::{Terms, UNIFIED, UnifiedModel, UnifiedParameters},
     },
@@ -22,6 +23,7 @@ use crate::scene;
 pub(super) fn reach_all() {
     forms();
     norm();
+    thermal();
     let block = block();
     turns(&block);
     attitudes(&block);
@@ -58,6 +60,17 @@ fn norm() {
     reach!(model::norm::NormModel::independent_rows(&shell));
     reach!(model::norm::curvature_excess(&Triad::identity(), 9.8f32, &Vector3::new(0.0, 0.0, 9.0), 1e-4));
     reach!(model::SquaredSum::row(&mut sum, 0.5f32, &theta));
+}
+
+#[inline(never)]
+fn thermal() {
+    let form: ThermalForm<12, 15> =
+        reach!(model::thermal::ThermalForm::new(*UPPER_TRIANGULAR_LINEAR.entries(), Side::Gain));
+    reach!(model::thermal::ThermalForm::entries(&form));
+    let cold = FULL.theta(&scene::gyroscope().truth);
+    let theta: SVector<f32, 15> = reach!(model::thermal::ThermalForm::theta(&form, &cold));
+    let _cold: SVector<f32, 12> = reach!(model::thermal::ThermalForm::cold(&form, &theta));
+    reach!(model::thermal::ThermalForm::terms(&form, &theta, 25.0));
 }
 
 fn block() -> Block<f32> {

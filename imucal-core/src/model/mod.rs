@@ -5,6 +5,7 @@
 //! | [`dip`] | cosine between gravity and field, against one value for all poses | – |
 //! | [`norm`] | distance of a point from the shell that calibration maps to a sphere | raw (nominal SI) |
 //! | [`attitude`] | attitude that the gyroscope integrates, against a rig's encoders | rad |
+//! | [`thermal`] | that of any of these, at the triad of each observation's temperature | its own |
 //! | [`turn`] | gravity's direction carried through a turn by the gyroscope, against the accelerometer's | rad |
 //! | [`unified`] | output of a triad on a rig, against what it put out | raw (nominal SI) |
 //!
@@ -21,6 +22,7 @@ pub mod dip;
 pub mod norm;
 pub mod parameterisation;
 pub mod rig;
+pub mod thermal;
 pub mod turn;
 pub mod unified;
 

@@ -18,6 +18,7 @@ use super::{
     known_attitudes,
     outcome::{Calibration, FitSummary, SensorOutcome},
     segmentation::{self, Cut},
+    temperature::{Thermometry, WarmTriad},
     thresholds::{self, SegmentationReport, ThresholdTrial},
     usable,
 };
@@ -36,11 +37,12 @@ pub(crate) fn calibrate(
     progress: &(dyn Fn(&str) + Sync),
     calibration: &mut Calibration,
 ) -> Option<Directions> {
+    let thermometry = options.temperature.then(|| Thermometry::of(recording)).flatten();
     let wanted = recording.gyr.as_ref().filter(|_| !options.skip.contains(&SensorKind::Gyr));
     let usable_gyr = usable(integrity, SensorKind::Gyr, recording.rows());
     let by_attitudes = wanted.and_then(|gyr| {
         progress("fitting the gyroscope");
-        gyr::rig::gyroscope(recording, gyr, &usable_gyr, options, calibration)
+        gyr::rig::gyroscope(recording, gyr, &usable_gyr, options, (calibration, thermometry.as_ref()))
     });
     let (gyr_on_rig, motions) = by_attitudes.unzip();
     let motions = motions.flatten().filter(|_| options.compare);
@@ -55,7 +57,9 @@ pub(crate) fn calibrate(
         return None;
     };
     progress("finding rests");
-    let at_rest = Rests::new(recording, acc, integrity, gravity(recording, calibration));
+    let gravity = gravity(recording, calibration);
+    let at_rest =
+        Rests { thermometry: thermometry.as_ref(), ..Rests::new(recording, acc, integrity, gravity) };
     let detector = at_rest.detector();
     let cuts = segmentation::cuts(&detector, &options.multipliers, at_rest.gravity);
     let Some(chosen) = segmentation::choose(&cuts) else {
@@ -74,10 +78,11 @@ pub(crate) fn calibrate(
         usable: &usable_gyr,
         interval: at_rest.interval,
         directions: directions.as_ref(),
+        thermometry: thermometry.as_ref(),
     };
     compare_gyr(calibration, &|until| {
         let (gyr, acc) = (wanted?, acc_outcome.passed()?);
-        shared.before(gyr, until.unwrap_or(usize::MAX), chosen, &acc.triad, &used)
+        shared.before(gyr, until.unwrap_or(usize::MAX), chosen, &acc.warm(), &used)
     });
     let gyr_outcome = gyr_on_rig.or_else(|| {
         let gyr = wanted?;
@@ -132,6 +137,7 @@ struct Rests<'a> {
     usable: Vec<bool>,
     interval: f64,
     gravity: f64,
+    thermometry: Option<&'a Thermometry<'a>>,
 }
 
 impl<'a> Rests<'a> {
@@ -139,7 +145,8 @@ impl<'a> Rests<'a> {
         let of = |kind: SensorKind| usable(integrity, kind, recording.rows());
         let both = of(SensorKind::Acc).into_iter().zip(of(SensorKind::Gyr));
         let usable = both.map(|(acc, gyr)| acc && gyr).collect();
-        Self { recording, acc, usable, interval: recording.median_interval().unwrap_or(1.0), gravity }
+        let interval = recording.median_interval().unwrap_or(1.0);
+        Self { recording, acc, usable, interval, gravity, thermometry: None }
     }
 
     fn detector(&self) -> RestDetector<'_> {
@@ -167,14 +174,20 @@ impl<'a> Rests<'a> {
         options: &Options,
         calibration: &mut Calibration,
     ) -> AccResult {
-        let Self { recording, acc, usable, gravity, .. } = self;
-        let on_rig =
-            known_attitudes::rig::accelerometer(recording, acc, usable, *gravity, options, calibration);
+        let Self { recording, acc, usable, gravity, thermometry, .. } = self;
+        let known = (&mut *calibration, *thermometry);
+        let on_rig = known_attitudes::rig::accelerometer(recording, acc, usable, *gravity, options, known);
         let mut result = match on_rig {
             Some(outcome) => AccResult { outcome, used: (0..chosen.rests.len()).collect(), noise: None },
             None if never_moved(&chosen.rows, recording.rows()) => acc::rests::never_moved(options.acc),
             None => {
-                let input = AccInput { rests: &chosen.rests, noise: shown, sensor: acc, gravity: *gravity };
+                let input = AccInput {
+                    rests: &chosen.rests,
+                    noise: shown,
+                    sensor: acc,
+                    gravity: *gravity,
+                    thermometry: *thermometry,
+                };
                 acc::rests::calibrate(&input, options.acc)
             }
         };
@@ -195,11 +208,12 @@ impl<'a> Rests<'a> {
 
 /// How an accelerometer's directions err. Where its fit says nothing of the rests' noise, by what they show of it.
 fn directions(fit: &FitSummary, cut: &Cut, shown: RestNoise, noise: Option<Noise>) -> Directions {
+    let warm = fit.warm();
     Directions {
         triad: fit.triad,
         covariance: fit.covariance.clone(),
         covariance_of: fit.covariance_of.clone(),
-        means: cut.rests.iter().map(|rest| rest.acc.mean()).collect(),
+        means: cut.rests.iter().map(|rest| warm.reduced(&rest.acc.mean(), rest.temperature)).collect(),
         noise: noise.unwrap_or(Noise { density: shown.density, white: 1.0, drift: 0.0 }),
         spans: shown.spans,
     }
@@ -220,6 +234,7 @@ struct GyrShared<'a> {
     usable: &'a [bool],
     interval: f64,
     directions: Option<&'a Directions>,
+    thermometry: Option<&'a Thermometry<'a>>,
 }
 
 impl GyrShared<'_> {
@@ -227,7 +242,7 @@ impl GyrShared<'_> {
         &'b self,
         gyr: &'b Triple,
         cut: &'b Cut,
-        acc: &'b Triad<f64>,
+        acc: &'b WarmTriad,
         used: &'b [usize],
     ) -> gyr::turns::GyrInput<'b> {
         gyr::turns::GyrInput {
@@ -241,6 +256,7 @@ impl GyrShared<'_> {
             acc,
             directions: None,
             vertical_rate: vertical_rate(self.recording),
+            thermometry: None,
         }
     }
 
@@ -250,7 +266,7 @@ impl GyrShared<'_> {
         gyr: &Triple,
         row: usize,
         cut: &Cut,
-        acc: &Triad<f64>,
+        acc: &WarmTriad,
         used: &[usize],
     ) -> Option<Triad<f64>> {
         let count = cut.rows.partition_point(|rest| rest.end <= row);
@@ -269,12 +285,15 @@ impl GyrShared<'_> {
         trials: &mut [ThresholdTrial],
     ) -> SensorOutcome {
         let acc = match (&acc.verdict, &acc.fit) {
-            (Ok(()), Some(fit)) => &fit.triad,
+            (Ok(()), Some(fit)) => fit.warm(),
             (Err(refused), _) => return without_accelerometer(refused.refusal),
             (Ok(()), None) => return without_accelerometer(Refusal::NoRest),
         };
-        let input =
-            gyr::turns::GyrInput { directions: self.directions, ..self.input(gyr, chosen, acc, used) };
+        let input = gyr::turns::GyrInput {
+            directions: self.directions,
+            thermometry: self.thermometry,
+            ..self.input(gyr, chosen, &acc, used)
+        };
         let mut outcome = gyr::turns::calibrate(&input);
         let Some(fit) = &mut outcome.fit else {
             return outcome;
@@ -285,7 +304,11 @@ impl GyrShared<'_> {
             .par_iter()
             .map(|cut| {
                 let all: Vec<usize> = (0..cut.rows.len()).collect();
-                let own = cut.fit.map_or(*acc, |(triad, _)| triad);
+                let own = match cut.fit {
+                    // A quick fit knows nothing of temperature.
+                    Some((triad, _)) if acc.terms.is_none() => WarmTriad { triad, terms: None },
+                    _ => acc,
+                };
                 gyr::turns::trial(&self.input(gyr, cut, &own, &all), &start)
             })
             .collect();

@@ -22,6 +22,7 @@ pub mod mag;
 pub mod outcome;
 pub mod segmentation;
 pub mod suspicion;
+pub mod temperature;
 pub mod thresholds;
 
 pub use outcome::{Calibration, FitSummary, Refused, SensorOutcome};
@@ -51,6 +52,8 @@ pub struct Options {
     pub rig_mag: Option<&'static str>,
     /// Climb the ladders and say which rung to use.
     pub compare: bool,
+    /// Estimate how bias and scale follow the temperature, where the recording has one.
+    pub temperature: bool,
 }
 
 impl Default for Options {
@@ -63,6 +66,7 @@ impl Default for Options {
             rig_gyr: Some(gyr::rig::G12),
             rig_mag: Some("X21"),
             compare: false,
+            temperature: true,
         }
     }
 }

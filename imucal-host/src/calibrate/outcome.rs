@@ -5,6 +5,7 @@ use imucal_core::{
     model::{Parameterisation, rig::ReferencePose},
     observation::ShellPoint,
     solver::Termination,
+    temperature::TemperatureTerms,
     triad::Triad,
 };
 use nalgebra::{DMatrix, Matrix3, SMatrix, SVector, Vector3};
@@ -15,6 +16,7 @@ use super::{
         report::FitReport, rig_fit::RigFit, search::Search,
     },
     suspicion::{Status, Suspicion},
+    temperature::{TemperatureFinding, Terms, WarmTriad},
     thresholds::SegmentationReport,
 };
 use crate::{
@@ -103,6 +105,8 @@ pub struct KnownTurn {
     pub before: Vector3<f64>,
     /// And after it.
     pub after: Vector3<f64>,
+    /// What its rates were multiplied by, to be those of the reference temperature; the identity without terms.
+    pub stretch: Matrix3<f64>,
 }
 
 /// A refusal and what to do about it.
@@ -167,6 +171,8 @@ pub struct FitSummary {
     pub alignment: Option<Alignment>,
     /// How a gyroscope's fit was reached.
     pub search: Option<Search>,
+    /// How bias and scale follow the temperature; `None` where the recording has none, or it was not asked for.
+    pub temperature: Option<TemperatureFinding>,
 }
 
 /// What a fit on a rig found of the machine: reported, and never stored in a sensor's record.
@@ -272,7 +278,38 @@ impl FitSummary {
             rig: None,
             alignment: None,
             search: None,
+            temperature: None,
         }
+    }
+
+    /// Terms of temperature and their standard errors, nominal SI, where some are kept.
+    pub fn terms(&self) -> Option<(Terms, Terms)> {
+        self.temperature.as_ref()?.terms
+    }
+
+    /// The triad with its terms of temperature, nominal SI.
+    pub fn warm(&self) -> WarmTriad {
+        WarmTriad { triad: self.triad, terms: self.terms().map(|(terms, _)| terms) }
+    }
+
+    /// Parameters of temperature that were estimated with the others.
+    pub fn warm_parameters(&self) -> usize {
+        let parts = self.temperature.iter().flat_map(|finding| &finding.parts);
+        3 * parts.flat_map(|part| &part.tried).filter(|tried| tried.kept).count()
+    }
+
+    /// Terms of temperature of raw values in the recording's own unit, and their standard errors.
+    pub fn raw_terms(&self) -> Option<(Terms, Terms)> {
+        let per = self.nominal.per_unit;
+        let scaled = |terms: Terms, per: f64| Terms {
+            linear: TemperatureTerms {
+                bias_slope: terms.linear.bias_slope.map(|slope| slope * per),
+                ..terms.linear
+            },
+            bias_quadratic: terms.bias_quadratic * per,
+            ..terms
+        };
+        self.terms().map(|(terms, std)| (scaled(terms, per), scaled(std, per.abs())))
     }
 
     /// The calibration of raw values in the recording's own unit.

@@ -53,6 +53,9 @@ pub(super) struct Arguments {
     /// Fit every model, score each on data left out of its fit, and recommend one
     #[arg(long)]
     compare: bool,
+    /// Do not estimate how bias and scale follow the temperature, where the recording has a column temp
+    #[arg(long)]
+    no_temperature: bool,
     /// Also write suspect sensors: their fit is within all limits, but its residual is not the noise
     #[arg(long)]
     accept_suspect: bool,
@@ -140,7 +143,8 @@ fn json_file(arguments: &Arguments) -> Option<PathBuf> {
 }
 
 fn options(arguments: &Arguments) -> Options {
-    let mut options = Options { compare: arguments.compare, ..Options::default() };
+    let mut options =
+        Options { compare: arguments.compare, temperature: !arguments.no_temperature, ..Options::default() };
     for choice in &arguments.model {
         match *choice {
             (SensorKind::Acc, ModelChoice::Acc(field)) => (options.acc, options.rig_acc) = (field, None),

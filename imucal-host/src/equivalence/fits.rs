@@ -104,6 +104,7 @@ fn gyroscope(recording: &Recording, turns: &[KnownTurn], summary: &FitSummary) -
             bias: turn.data.bias,
             before: turn.before,
             after: turn.after,
+            stretch: turn.stretch,
         })
         .collect();
     let gyr = &recording.gyr.as_ref()?.values;

@@ -97,6 +97,8 @@ pub struct SampledTurn {
     pub before: Vector3<f64>,
     /// Direction after.
     pub after: Vector3<f64>,
+    /// What rates less the bias are multiplied by, to be those of the reference temperature.
+    pub stretch: Matrix3<f64>,
 }
 
 /// Carries a direction through a turn sample by sample under a full gain by rows.
@@ -107,7 +109,8 @@ fn carry(theta: &[f64], turn: &SampledTurn, time: &[f64], gyr: &[Vector3<f64>]) 
     for (index, k) in measured.iter().copied().enumerate() {
         let since = if index > 0 { time[k] - time[measured[index - 1]] } else { 0.0 };
         let until = measured.get(index + 1).map_or(0.0, |next| time[*next] - time[k]);
-        let rate = correct(&gain, &turn.bias.at(time[k]).into(), gyr[k].into());
+        let rate = turn.stretch * (gyr[k] - turn.bias.at(time[k]));
+        let rate = correct(&gain, &[0.0; 3], rate.into());
         attitude *= UnitQuaternion::from_scaled_axis(Vector3::from(rate) * (0.5 * (since + until)));
     }
     attitude.inverse_transform_vector(&turn.before)

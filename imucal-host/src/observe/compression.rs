@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use imucal_core::observation::{Block, BlockBuilder};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Rates across a gap longer than this many usual intervals are not known.
 const GAP: f64 = 5.0;
@@ -19,6 +19,18 @@ pub struct Compressed {
     pub rows: Vec<Range<usize>>,
     /// Each sample's rate, rad/s, how long it is held, s, and the block it is in.
     pub samples: Vec<(Vector3<f64>, f64, usize)>,
+}
+
+/// The block of the same rates multiplied by a matrix M: M s0, M s1, and cof(M) c.
+pub fn stretched(block: &Block<f64>, by: &Matrix3<f64>) -> Block<f64> {
+    let [x, y, z] = [0, 1, 2].map(|row| by.row(row).transpose());
+    let cofactor = Matrix3::from_rows(&[y.cross(&z), z.cross(&x), x.cross(&y)].map(|row| row.transpose()));
+    Block { s0: by * block.s0, s1: by * block.s1, c: cofactor * block.c }
+}
+
+/// The block of the same rates with a constant one added for its duration, s.
+pub fn shifted(block: &Block<f64>, rate: &Vector3<f64>, duration: f64) -> Block<f64> {
+    Block { s0: block.s0 + rate * duration, s1: block.s1, c: block.c + block.s1.cross(rate) }
 }
 
 /// The row after the first gap in time.

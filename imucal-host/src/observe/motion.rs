@@ -124,6 +124,17 @@ impl MotionData {
         self.span.end - self.span.start
     }
 
+    /// The same motion with its rates, `bias` taken off, multiplied by a matrix.
+    #[must_use]
+    pub fn stretched(mut self, stretch: &Matrix3<f64>, bias: &Vector3<f64>) -> Self {
+        for (block, duration) in self.blocks.iter_mut().zip(&self.durations) {
+            let still = compression::shifted(block, &-bias, *duration);
+            *block = compression::shifted(&compression::stretched(&still, stretch), bias, *duration);
+        }
+        self.samples.iter_mut().for_each(|(rate, _, _)| *rate = stretch * (*rate - bias) + bias);
+        self
+    }
+
     /// The motion as the model takes it.
     pub fn motion(&self) -> Motion<'_, f64> {
         Motion {

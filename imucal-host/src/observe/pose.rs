@@ -175,6 +175,15 @@ pub fn poses(recording: &Recording, sensor: &Triple, usable: &[bool]) -> Result<
 }
 
 impl Poses {
+    /// Some of them.
+    pub fn of_those(&self, poses: &[usize]) -> Self {
+        Self {
+            poses: poses.iter().map(|k| self.poses[*k]).collect(),
+            spans: poses.iter().map(|k| self.spans[*k].clone()).collect(),
+            ..*self
+        }
+    }
+
     /// Poses in which the outer and the inner gimbal turn about one axis.
     pub fn in_gimbal_lock(&self) -> usize {
         let axis = |axis: Axis| Vector3::ith(axis as usize, 1.0);

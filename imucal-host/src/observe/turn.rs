@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use imucal_core::observation::{Block, Durations, Turn};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::{
     compression,
@@ -38,6 +38,12 @@ impl TurnData {
     /// The turn between two known directions, calibrated axes.
     pub fn between(&self, before: Vector3<f64>, after: Vector3<f64>) -> Turn<'_, f64> {
         Turn { blocks: &self.blocks, durations: Durations::Each(&self.durations), before, after }
+    }
+
+    /// The same turn with its rates, bias taken off, multiplied: s0 and s1 by the matrix, c by its cofactors.
+    pub fn stretched(mut self, stretch: &Matrix3<f64>) -> Self {
+        self.blocks.iter_mut().for_each(|block| *block = compression::stretched(block, stretch));
+        self
     }
 
     /// Blocks and durations as a device holds them.

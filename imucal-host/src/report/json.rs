@@ -8,6 +8,7 @@ use crate::{
         Calibration, FitSummary, SegmentationReport, SensorOutcome,
         fit::{alignment::Alignment, compare::Comparison, search::Search},
         outcome::{HigherOrder, RigFindings, entry_name},
+        temperature::{TemperatureFinding, Terms, finding::Part},
     },
     recording::SensorKind,
     store::FORMAT,
@@ -100,6 +101,7 @@ fn fit_value(kind: SensorKind, fit: &FitSummary) -> Value {
         "bias_interpolated": fit.bias_wander.map(|w| w.interpolated),
         "alignment": fit.alignment.as_ref().map(alignment),
         "search": fit.search.as_ref().map(search),
+        "temperature": fit.temperature.as_ref().map(|found| temperature(found, fit.raw_terms())),
         "rig": rig,
     })
 }
@@ -116,6 +118,56 @@ fn alignment(found: &Alignment) -> Value {
         "rests": found.rests,
         "unit": "rad",
     })
+}
+
+/// How bias and scale follow the temperature; `terms` are those of raw values, with their standard errors.
+fn temperature(found: &TemperatureFinding, terms: Option<(Terms, Terms)>) -> Value {
+    let parts: Vec<Value> = found.parts.iter().map(part).collect();
+    json!({
+        "status": found.status(),
+        "reason": found.refusal.map(|refusal| refusal.reason()),
+        "detail": found.refusal.map(|refusal| refusal.to_string()),
+        "advice": found.refusal.map(|refusal| refusal.advice()),
+        "span": [finite(found.span.0), finite(found.span.1)],
+        "reference": finite(found.reference),
+        "bias_slope": terms.map(|(value, _)| value.linear.bias_slope),
+        "bias_slope_std": terms.map(|(_, std)| std.linear.bias_slope),
+        "scale_slope": terms.map(|(value, _)| value.linear.scale_slope),
+        "scale_slope_std": terms.map(|(_, std)| std.linear.scale_slope),
+        "bias_quadratic": terms.map(|(value, _)| vector(&value.bias_quadratic)),
+        "bias_quadratic_std": terms.map(|(_, std)| vector(&std.bias_quadratic)),
+        "scale_quadratic": terms.map(|(value, _)| vector(&value.scale_quadratic)),
+        "scale_quadratic_std": terms.map(|(_, std)| vector(&std.scale_quadratic)),
+        "tried_on": parts,
+    })
+}
+
+/// Terms tried on one kind of observation.
+fn part(part: &Part) -> Value {
+    let groups: Vec<Value> = part
+        .tried
+        .iter()
+        .map(|tried| {
+            json!({
+                "group": tried.group.name(),
+                "p_value": tried.chance,
+                "held_out_rms": tried.held_out,
+                "kept": tried.kept,
+            })
+        })
+        .collect();
+    json!({
+        "observations": part.of,
+        "unit": part.unit,
+        "groups": groups,
+        "held_out_rms_without": part.held_out.0,
+        "held_out_rms": part.held_out.1,
+    })
+}
+
+/// A number; null where it is none.
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
 }
 
 /// How a gyroscope's fit was reached.

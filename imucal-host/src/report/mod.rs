@@ -7,4 +7,5 @@ pub mod measure;
 pub mod model;
 pub mod prose;
 pub mod table;
+pub mod temperature;
 pub mod watch;

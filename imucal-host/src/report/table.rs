@@ -6,6 +6,7 @@ use super::{
     measure::{degrees, measure, measured_degrees, percent, plain, rounded},
     model,
     prose::hanging,
+    temperature,
 };
 use crate::{
     calibrate::{
@@ -208,6 +209,7 @@ fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {
             measured_degrees(alignment.dip.0, alignment.dip.1)
         )?;
     }
+    temperature::write(text, fit)?;
     if let Some(rig) = &fit.rig {
         write_rig(text, rig)?;
     }

@@ -389,8 +389,33 @@ impl StoredTriad {
             coverage: fit.coverage,
             field_norm: fit.field_norm,
             provenance: None,
-            temperature: None,
+            temperature: StoredTemperature::of(fit),
             nonlinearity: None,
         }
+    }
+}
+
+impl StoredTemperature {
+    /// What a fit found of raw values' dependence on temperature; `None` where nothing is kept.
+    fn of(fit: &FitSummary) -> Option<Self> {
+        let (terms, std) = fit.raw_terms()?;
+        let (low, high) = fit.temperature.as_ref()?.span;
+        let bent = std.bias_quadratic.iter().chain(&std.scale_quadratic).any(|error| *error > 0.0);
+        Some(Self {
+            reference: terms.linear.reference,
+            bias_slope: terms.linear.bias_slope,
+            scale_slope: terms.linear.scale_slope,
+            quality: Some(StoredTemperatureQuality {
+                span: [low, high],
+                bias_slope_std: std.linear.bias_slope,
+                scale_slope_std: std.linear.scale_slope,
+            }),
+            curvature: bent.then(|| StoredCurvature {
+                bias: terms.bias_quadratic.into(),
+                scale: terms.scale_quadratic.into(),
+                bias_std: std.bias_quadratic.into(),
+                scale_std: std.scale_quadratic.into(),
+            }),
+        })
     }
 }

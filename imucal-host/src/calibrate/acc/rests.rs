@@ -22,6 +22,10 @@ use crate::{
             shell_errors::ShellErrors,
         },
         outcome::{Estimates, Evidence, FitSummary, Refused, SensorOutcome},
+        temperature::{
+            TemperatureFinding, Thermometry,
+            rests::{self, Kept, WarmRests},
+        },
     },
     noise::Noise,
     recording::{SensorKind, Triple, Unit},
@@ -138,6 +142,8 @@ pub struct AccInput<'a> {
     pub sensor: &'a Triple,
     /// Local gravity, m/s².
     pub gravity: f64,
+    /// The thermometer, where terms of temperature are asked for.
+    pub thermometry: Option<&'a Thermometry<'a>>,
 }
 
 /// Calibrates from rests.
@@ -165,31 +171,109 @@ fn with_form<const P: usize>(input: &AccInput<'_>, model: AccModel, form: Parame
     }
     let problem = NormProblem { points: &points, norm: gravity, form, serial: false };
     let fit = problem.fit(&Triad::identity());
-    let coverage = problem.coverage(&fit);
-    let errors = ShellErrors::of_rests(&problem, &fit, input.noise);
-    let (bend, verdict) = problem.judge(&fit, &coverage, &errors.stated(&problem.form, &fit), true, &limits);
-    let summary = summary(&problem, &fit, input, &errors, (coverage.share, bend));
-    match verdict {
-        Err(refusal) => refuse(refusal, Some(summary)),
-        Ok(()) => AccResult {
-            outcome: SensorOutcome {
-                suspicions: Vec::new(),
-                kind: SensorKind::Acc,
-                model: model.name(),
-                verdict: Ok(()),
-                evidence: Some(Evidence::Shell {
-                    points: fit.points,
-                    places: fit.used.clone(),
-                    norm: gravity,
-                    diagonal: model == AccModel::T6,
-                    triad: summary.triad,
-                    std: Box::new(Triad { gain: summary.gain_std, bias: summary.bias_std }),
-                }),
-                fit: Some(summary),
-            },
-            used: fit.used,
-            noise: errors.noise,
+    let (finding, kept) = warm(input, &points, &form.triad(fit.solver.theta()), model);
+    let summary =
+        |(summary, verdict): (FitSummary, _)| (FitSummary { temperature: finding, ..summary }, verdict);
+    let Some(kept) = kept else {
+        let errors = ShellErrors::of_rests(&problem, &fit, input.noise);
+        let (summary, verdict) = summary(judged(&problem, &fit, input, &errors, None, &limits));
+        return result(model, gravity, fit, summary, verdict, errors.noise);
+    };
+    let reduced = kept.reduced(input, &points, &form);
+    let problem = NormProblem { points: &reduced, ..problem };
+    let mut fit = problem.fit(&kept.triad(&form));
+    let errors = ShellErrors::of_rests(&problem, &fit, &input.noise.of_those(&kept.fit.used));
+    let errors = errors.with_covariance(kept.fit.first::<P>());
+    fit.used = fit.used.iter().map(|k| kept.fit.used[*k]).collect();
+    fit.left_out = fit.left_out.iter().map(|(k, size)| (kept.fit.used[*k], *size)).collect();
+    fit.left_out.extend(&kept.left_out);
+    let (summary, verdict) = summary(judged(&problem, &fit, input, &errors, Some(&kept), &limits));
+    result(model, gravity, fit, summary, verdict, errors.noise)
+}
+
+/// What the rests say of temperature, where that is asked for.
+fn warm(
+    input: &AccInput<'_>,
+    points: &[ShellPoint<f64>],
+    near: &Triad<f64>,
+    model: AccModel,
+) -> (Option<TemperatureFinding>, Option<Kept>) {
+    let Some(thermometry) = input.thermometry else { return (None, None) };
+    let of = |value: fn(&Rest<f64>) -> f64| -> Vec<f64> { input.rests.iter().map(value).collect() };
+    let rests = WarmRests {
+        points,
+        times: &of(|rest| rest.time),
+        temperatures: &of(|rest| rest.temperature),
+        gravity: input.gravity,
+        noise: input.noise,
+        diagonal: model == AccModel::T6,
+    };
+    let (finding, kept) = rests::estimate(&rests, thermometry, near);
+    (Some(finding), kept)
+}
+
+impl Kept {
+    /// The triad at the reference temperature, of a form whose entries come first.
+    fn triad<const P: usize>(&self, form: &Parameterisation<P>) -> Triad<f64> {
+        form.triad(&nalgebra::SVector::from_fn(|k, _| self.fit.fitted.theta[k]))
+    }
+
+    /// The points used, as they would be at the reference temperature.
+    fn reduced<const P: usize>(
+        &self,
+        input: &AccInput<'_>,
+        points: &[ShellPoint<f64>],
+        form: &Parameterisation<P>,
+    ) -> Vec<ShellPoint<f64>> {
+        let triad = self.triad(form);
+        let at = |k: &usize| self.terms.reduced(&triad, &points[*k].value, input.rests[*k].temperature);
+        self.fit.used.iter().map(|k| ShellPoint::new(at(k))).collect()
+    }
+}
+
+/// A fit's figures and whether it is accepted.
+fn judged<const P: usize>(
+    problem: &NormProblem<'_, P>,
+    fit: &NormFit<P>,
+    input: &AccInput<'_>,
+    errors: &ShellErrors<P>,
+    kept: Option<&Kept>,
+    limits: &Limits,
+) -> (FitSummary, Result<(), Refusal>) {
+    let coverage = problem.coverage(fit);
+    let (bend, verdict) = problem.judge(fit, &coverage, &errors.stated(&problem.form, fit), true, limits);
+    (summary(problem, fit, input, errors, (coverage.share, bend), kept), verdict)
+}
+
+fn result<const P: usize>(
+    model: AccModel,
+    gravity: f64,
+    fit: NormFit<P>,
+    summary: FitSummary,
+    verdict: Result<(), Refusal>,
+    noise: Option<Noise>,
+) -> AccResult {
+    if let Err(refusal) = verdict {
+        return refused(refusal, Some(summary), model);
+    }
+    AccResult {
+        outcome: SensorOutcome {
+            suspicions: Vec::new(),
+            kind: SensorKind::Acc,
+            model: model.name(),
+            verdict: Ok(()),
+            evidence: Some(Evidence::Shell {
+                points: fit.points,
+                places: fit.used.clone(),
+                norm: gravity,
+                diagonal: model == AccModel::T6,
+                triad: summary.triad,
+                std: Box::new(Triad { gain: summary.gain_std, bias: summary.bias_std }),
+            }),
+            fit: Some(summary),
         },
+        used: fit.used,
+        noise,
     }
 }
 
@@ -199,13 +283,13 @@ fn summary<const P: usize>(
     input: &AccInput<'_>,
     errors: &ShellErrors<P>,
     (coverage, nonlinearity): (f64, f64),
+    kept: Option<&Kept>,
 ) -> FitSummary {
-    let report = FitReport {
-        held_out_rms: problem.leave_one_out_rms(fit),
-        nonlinearity,
-        inflation: errors.inflation.max(),
-        ..fit.report()
+    let report = match kept {
+        None => FitReport { held_out_rms: problem.leave_one_out_rms(fit), ..fit.report() },
+        Some(kept) => kept.fit.report(&fit.report(), 1),
     };
+    let report = FitReport { nonlinearity, inflation: errors.inflation.max(), ..report };
     let estimates = Estimates::of(&problem.form, fit.solver.theta(), &errors.covariance);
     FitSummary {
         left_out: fit

@@ -118,7 +118,7 @@ impl Scene<'_> {
         let Some(fit) = &outcome.fit else { return Vec::new() };
         match &outcome.evidence {
             Some(Evidence::Shell { points, places, norm, diagonal, triad, std }) => {
-                let shell = Shell { points, places, norm: *norm, triad, std };
+                let shell = Shell { points, places, norm: *norm, triad, std, warm: fit.warm_parameters() };
                 if *diagonal {
                     self.of_norm(outcome.kind, &shell, DIAGONAL)
                 } else {
@@ -157,7 +157,9 @@ impl Scene<'_> {
         let rows = Rows::of(&model, &form.theta(shell.triad));
         let count = rows.residuals.len();
         let all: Vec<usize> = (0..P).collect();
-        let Some(test) = ScoreTest::new(&rows.residuals, rows.derivatives(count, &all), count) else {
+        // The residual has nothing of the terms of temperature left, and their freedom is gone.
+        let independent = count.saturating_sub(shell.warm);
+        let Some(test) = ScoreTest::new(&rows.residuals, rows.derivatives(count, &all), independent) else {
             return Vec::new();
         };
         let at: Vec<usize> = match kind {
@@ -185,7 +187,7 @@ impl Scene<'_> {
             tests.extend(
                 self.single(&test, 1, count, &|k| format!("the rest at {:.0} s", self.recording.time[at[k]])),
             );
-            excess = self.excess_of_rests(shell, &directions, &rows.residuals, P);
+            excess = self.excess_of_rests(shell, &directions, &rows.residuals, P + shell.warm);
             turning =
                 self.turning(shell.norm).and_then(|t| t.of_accelerometer(shell.std.gain.diagonal().min()));
         }
@@ -292,8 +294,8 @@ impl Scene<'_> {
         let rows = gyr_residual::rows(turns, &theta);
         let count = rows.residuals.len();
         let all: Vec<usize> = (0..9).collect();
-        let Some(test) = ScoreTest::new(&rows.residuals, rows.derivatives(count, &all), 2 * turns.len())
-        else {
+        let independent = (2 * turns.len()).saturating_sub(fit.parameters.saturating_sub(9));
+        let Some(test) = ScoreTest::new(&rows.residuals, rows.derivatives(count, &all), independent) else {
             return Vec::new();
         };
         let at: Vec<usize> =
@@ -381,6 +383,8 @@ struct Shell<'a> {
     norm: f64,
     triad: &'a Triad<f64>,
     std: &'a Triad<f64>,
+    /// Parameters of temperature that were estimated with it.
+    warm: usize,
 }
 
 fn entry_of(gain: &Matrix3<f64>, bias: &Vector3<f64>, entry: u8) -> f64 {

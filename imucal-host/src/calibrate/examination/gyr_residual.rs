@@ -96,7 +96,9 @@ fn column(
     let again = |turn: &KnownTurn| {
         let ends = (turn.data.rest_before, turn.data.rest_after);
         let rows = turn.data.rows.clone();
-        compress_rows(rates.time, &values, rates.usable, rates.interval, rows, ends, &turn.data.bias).ok()
+        let data =
+            compress_rows(rates.time, &values, rates.usable, rates.interval, rows, ends, &turn.data.bias);
+        Some(data.ok()?.stretched(&turn.stretch))
     };
     let data: Option<Vec<TurnData>> = turns.iter().map(again).collect();
     let data = data?;

@@ -13,7 +13,7 @@
 //! | [`held_out`] | residuals of observations that the fit has not seen |
 //! | [`report`] | the figures of any of these fits |
 //! | [`autocorrelation`] | by how much serial correlation of residuals inflates standard errors |
-//! | [`rest_noise`], [`rest_bias`], [`shell_errors`] | errors of the observations |
+//! | [`rest_noise`], [`rest_covariance`], [`rest_bias`], [`shell_errors`] | errors of the observations |
 //! | [`alignment`], [`directions`] | the rotation between two triads, from directions that both see at rest |
 //! | [`lag`] | the latency of a reference |
 //! | [`score_test`] | Rao's score test of a residual against a covariate |
@@ -33,6 +33,7 @@ pub mod outlier;
 pub mod reference_fit;
 pub mod report;
 pub mod rest_bias;
+pub mod rest_covariance;
 pub mod rest_noise;
 pub mod rig_fit;
 pub mod rows;

@@ -41,6 +41,16 @@ pub struct RestNoise {
 }
 
 impl RestNoise {
+    /// Of some of the rests; what moves within rests is that of all.
+    #[must_use]
+    pub fn of_those(&self, rests: &[usize]) -> Self {
+        Self {
+            spans: rests.iter().map(|k| self.spans[*k].clone()).collect(),
+            steps: rests.iter().map(|k| self.steps[*k]).collect(),
+            ..self.clone()
+        }
+    }
+
     /// Variances of the drift over the white noise, 1/s, with prior weights, for rests of these spans.
     pub fn drifts(&self, spans: &[Span]) -> Vec<(f64, f64)> {
         drifts(&self.within, spans)

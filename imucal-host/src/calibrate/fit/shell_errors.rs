@@ -28,6 +28,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::{
     norm_fit::{NormFit, NormProblem, Stated},
+    rest_covariance::RestCovariance,
     rest_noise::RestNoise,
     rows::{Rows, influence, weakest_inflation},
 };
@@ -68,6 +69,13 @@ impl<const P: usize> ShellErrors<P> {
         Self { covariance, inflation, noise: None }
     }
 
+    /// With the covariance of a fit that has further parameters.
+    #[must_use]
+    pub fn with_covariance(self, covariance: SMatrix<f64, P, P>) -> Self {
+        let factor = covariance.diagonal().component_div(&self.covariance.diagonal()).map(f64::sqrt);
+        Self { inflation: self.inflation.component_mul(&factor), covariance, ..self }
+    }
+
     /// For whoever judges the fit.
     pub fn stated(&self, form: &Parameterisation<P>, fit: &NormFit<P>) -> Stated {
         let std = form.triad(&self.covariance.diagonal().map(f64::sqrt));
@@ -76,38 +84,17 @@ impl<const P: usize> ShellErrors<P> {
 
     /// Of rests, with what they show of the noise of their means.
     pub fn of_rests(problem: &NormProblem<'_, P>, fit: &NormFit<P>, shown: &RestNoise) -> Self {
-        let spans: Vec<Span> = fit.used.iter().map(|k| shown.spans[*k].clone()).collect();
-        let count = fit.points.len();
-        let length = |k: usize| spans[k].end - spans[k].start;
-        let own = |k: usize| shown.density / length(k) + shown.steps[fit.used[k]];
-        // Steps as white noise: what differs from one mean to the next.
-        let density = (0..count).map(|k| own(k) * length(k)).sum::<Vector3<f64>>() / count as f64;
-        if density.iter().any(|axis| axis.is_nan() || *axis <= 0.0) {
-            return Self::new(fit.solver.covariance(), None);
-        }
-        let rows = rows(problem, fit);
         let normals = normals(&problem.form.triad(fit.solver.theta()), &fit.points);
-        let alike = |k: usize, l: usize, of: &Vector3<f64>| normals[k].component_mul(&normals[l]).dot(of);
-        let white = DMatrix::from_fn(count, count, |k, l| if k == l { alike(k, k, &own(k)) } else { 0.0 });
-        let drift = flicker::covariance_of(&spans, &flicker::processes(&spans, 1.0))
-            .map_with_location(|k, l, f| f * alike(k, l, &shown.density));
-        let jacobian = DMatrix::from_fn(count, P, |row, k| rows.jacobian[row][k]);
-        let ratios = shown.drifts(&spans);
-        let parts = Parts {
-            parts: [&white, &drift],
-            ratios: &ratios,
-            scale: Scale::AtLeastOne,
-            five: !shown.within.is_empty(),
+        let Some(noise) = RestCovariance::along(shown, &fit.used, &normals) else {
+            return Self::new(fit.solver.covariance(), None);
         };
+        let rows = rows(problem, fit);
+        let jacobian = DMatrix::from_fn(fit.points.len(), P, |row, k| rows.jacobian[row][k]);
         let errors = influence(&jacobian).and_then(|influence| {
-            parts.errors(&DVector::from_column_slice(&rows.residuals), &jacobian, &influence)
+            noise.errors(&DVector::from_column_slice(&rows.residuals), &jacobian, &influence)
         });
-        let noise = errors.as_ref().map(|errors| Noise {
-            density,
-            white: errors.scale,
-            drift: errors.scale * errors.ratio * shown.density.mean() / density.mean(),
-        });
-        Self { noise, ..Self::new(fit.solver.covariance(), errors.as_ref()) }
+        let of_means = errors.as_ref().map(|errors| noise.of_means(errors));
+        Self { noise: of_means, ..Self::new(fit.solver.covariance(), errors.as_ref()) }
     }
 
     /// Of a cloud; `at` says for each point when, s, and `shown` what rests among them show of the noise.
@@ -129,7 +116,7 @@ fn rows<const P: usize>(problem: &NormProblem<'_, P>, fit: &NormFit<P>) -> Rows<
 }
 
 /// Unit normals of the shell at points, raw axes.
-fn normals(triad: &Triad<f64>, points: &[ShellPoint<f64>]) -> Vec<Vector3<f64>> {
+pub fn normals(triad: &Triad<f64>, points: &[ShellPoint<f64>]) -> Vec<Vector3<f64>> {
     let normal = |point: &ShellPoint<f64>| triad.gain.tr_mul(&triad.correct(&point.value)).normalize();
     points.iter().map(normal).collect()
 }

@@ -32,7 +32,7 @@ pub struct Still {
 
 impl Still {
     /// Middle of it, s.
-    fn time(&self) -> f64 {
+    pub fn time(&self) -> f64 {
         0.5 * (self.span.start + self.span.end)
     }
 }
@@ -66,6 +66,11 @@ impl Wander {
         }
         let nodes = stills.iter().map(Still::time).zip(path).collect();
         (Self { nodes }, mean, BiasWander { spread, expected, interpolated })
+    }
+
+    /// The path through some values, one a still stretch; nothing without any.
+    pub fn through(stills: &[Still], values: &[Vector3<f64>]) -> Self {
+        Self { nodes: stills.iter().map(Still::time).zip(values.iter().copied()).collect() }
     }
 
     /// The bias less its mean at a time, rad/s.

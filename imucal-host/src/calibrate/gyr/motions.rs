@@ -8,8 +8,12 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use super::bias_smoother::{Still, Wander};
 use crate::{
     calibrate::{
-        fit::{gyr_rig_fit, lag::Lag},
+        fit::{gyr_rig_fit, lag::Lag, rest_noise::AtRest},
         outcome::BiasWander,
+        temperature::{
+            TemperatureFinding, Thermometry,
+            rest_rates::{self, WarmRates},
+        },
     },
     noise::{self, Noise, Span, white},
     observe::{
@@ -41,6 +45,8 @@ pub struct Observations {
     pub left_out: Vec<String>,
     /// How the motions were made, in words.
     pub notes: Vec<String>,
+    /// How the bias follows the temperature, where that is asked for, with the variance of its terms' fit.
+    pub temperature: Option<TemperatureFinding>,
 }
 
 /// Motions between the still stretches of the encoders.
@@ -51,6 +57,7 @@ pub fn on_encoders(
     gimbal: &[[f64; 3]],
     attitudes: &Attitudes,
     axes: &imucal_core::model::rig::RigAxes,
+    thermometry: Option<&Thermometry<'_>>,
 ) -> Observations {
     let input = input(recording, sensor, usable, attitudes);
     let stretches: Vec<(Range<usize>, Matrix3<f64>)> = pose::still_stretches(&recording.time, gimbal)
@@ -60,8 +67,17 @@ pub fn on_encoders(
             Some((rows, attitude))
         })
         .collect();
-    let stills: Vec<Still> =
-        stretches.iter().filter_map(|(rows, attitude)| still(&input, rows, attitude)).collect();
+    let measured = |(rows, attitude): &(Range<usize>, Matrix3<f64>)| {
+        Some((rows.clone(), still(&input, rows, attitude)?))
+    };
+    let (rows, mut stills): (Vec<Range<usize>>, Vec<Still>) = stretches.iter().filter_map(measured).unzip();
+    let warm = thermometry.map(|thermometry| warm_bias(&input, &rows, &stills, thermometry));
+    let (temperature, growth) = warm.unzip();
+    let growth = growth.flatten();
+    if let Some(growth) = &growth {
+        stills.iter_mut().zip(growth).for_each(|(still, growth)| still.mean -= growth);
+    }
+    let grown = Wander::through(&stills, growth.as_deref().unwrap_or_default());
     let (path, bias, wander) = Wander::of(&stills);
     let mut found = Observations {
         data: Vec::new(),
@@ -70,11 +86,12 @@ pub fn on_encoders(
         noise: noise(&input, &stretches, &stills),
         left_out: Vec::new(),
         notes: vec!["against the encoders' attitude, from one still stretch of the table to the next".into()],
+        temperature,
     };
     for (k, pair) in stretches.windows(2).enumerate() {
         let [(before, start), (after, end)] = pair else { continue };
         let rows = leave(input.time, before)..arrive(input.time, after);
-        match input.compress(rows, [start, end], &|time| path.at(time)) {
+        match input.compress(rows, [start, end], &|time| path.at(time) + grown.at(time)) {
             Ok(data) => found.data.push(data),
             Err(gap) => {
                 found.left_out.push(format!("motion from still stretch {} to {}: {gap}", k + 1, k + 2));
@@ -82,6 +99,30 @@ pub fn on_encoders(
         }
     }
     found
+}
+
+/// How the bias follows the temperature, and by how much it has grown at each still stretch, rad/s, where terms are kept.
+fn warm_bias(
+    input: &MotionInput<'_>,
+    rows: &[Range<usize>],
+    stills: &[Still],
+    thermometry: &Thermometry<'_>,
+) -> (TemperatureFinding, Option<Vec<Vector3<f64>>>) {
+    let temperatures: Vec<f64> = rows.iter().map(|rows| thermometry.mean(rows)).collect();
+    let mut finding = TemperatureFinding::new(&temperatures);
+    if let Err(refusal) = thermometry.check(&temperatures) {
+        return (finding.refused(refusal), None);
+    }
+    let MotionInput { time, rates, usable, interval, .. } = *input;
+    let rates = WarmRates {
+        means: &stills.iter().map(|still| still.mean).collect::<Vec<_>>(),
+        times: &stills.iter().map(Still::time).collect::<Vec<_>>(),
+        temperatures: &temperatures,
+        noise: &AtRest { time, values: rates, usable, interval, rows }.noise(),
+    };
+    let kept = rest_rates::estimate(&rates, &mut finding);
+    let growth = kept.map(|kept| temperatures.iter().map(|t| kept.terms.drift(*t)).collect());
+    (finding, growth)
 }
 
 /// Row at which a motion leaves a still stretch.
@@ -148,6 +189,7 @@ pub fn on_reference(
             "against the reference attitude, {OPTICAL} s a motion; {valid} of {} rows have one",
             attitudes.len()
         )],
+        temperature: None,
     };
     let next = |from: usize| (from..attitudes.len()).find_map(|k| Some((k, attitudes[k].as_ref()?)));
     let mut from = 0;

@@ -24,11 +24,15 @@ use super::{
 use crate::{
     calibrate::{
         Options,
-        fit::{gyr_rig_fit, gyr_rig_fit::MotionFit},
+        fit::{gyr_rig_fit, gyr_rig_fit::MotionFit, report::FitReport},
         outcome::{Calibration, Estimates, Evidence, FitSummary, Refused, RigFindings, SensorOutcome},
+        temperature::{Thermometry, motions as warm_motions},
     },
     noise::Span,
-    observe::{motion, pose},
+    observe::{
+        motion::{self, MotionData},
+        pose,
+    },
     recording::{Recording, SensorKind, Triple, Unit},
 };
 
@@ -50,13 +54,14 @@ pub fn gyroscope(
     sensor: &Triple,
     usable: &[bool],
     options: &Options,
-    calibration: &mut Calibration,
+    (calibration, thermometry): (&mut Calibration, Option<&Thermometry<'_>>),
 ) -> Option<(SensorOutcome, Option<Observations>)> {
     let name = options.rig_gyr?;
-    let observations = if recording.gimbal.is_some() {
+    let mut observations = if recording.gimbal.is_some() {
         match pose::axes_and_encoders(recording) {
             Ok((axes, gimbal)) => {
-                on_encoders(recording, sensor, usable, gimbal, &motion::of_encoders(gimbal, &axes), &axes)
+                let attitudes = motion::of_encoders(gimbal, &axes);
+                on_encoders(recording, sensor, usable, gimbal, &attitudes, &axes, thermometry)
             }
             Err(why) => {
                 let warning = format!("the rig is not used: {why}");
@@ -78,7 +83,7 @@ pub fn gyroscope(
     if let Err(refusal) = check(&observations, name) {
         return Some((refused(name, refusal, None), None));
     }
-    Some((outcome(name, sensor, &observations), Some(observations)))
+    Some((outcome(name, sensor, &mut observations, thermometry), Some(observations)))
 }
 
 /// Motions that turn, and enough of them.
@@ -101,9 +106,20 @@ pub(crate) fn fit(name: &str, observations: &Observations) -> MotionFit {
     }
 }
 
-fn outcome(name: &'static str, sensor: &Triple, observations: &Observations) -> SensorOutcome {
-    let fit = fit(name, observations);
+fn outcome(
+    name: &'static str,
+    sensor: &Triple,
+    observations: &mut Observations,
+    thermometry: Option<&Thermometry<'_>>,
+) -> SensorOutcome {
+    let mut fit = fit(name, observations);
+    if let Some(thermometry) = thermometry.filter(|_| name == G12)
+        && let Some(warm) = warm(&fit, observations, thermometry)
+    {
+        fit = warm;
+    }
     let summary = summarise(&fit, sensor, observations);
+    let summary = FitSummary { temperature: observations.temperature.clone(), ..summary };
     match judge(&fit.report.solver, &summary, LEAST_MOTIONS) {
         Ok(()) => SensorOutcome {
             suspicions: Vec::new(),
@@ -139,6 +155,31 @@ fn refused(model: &'static str, refusal: Refusal, fit: Option<FitSummary>) -> Se
     };
     let verdict = Err(Refused { refusal, advice: advice.into() });
     SensorOutcome { suspicions: Vec::new(), kind: SensorKind::Gyr, model, verdict, fit, evidence: None }
+}
+
+/// Where the motions bear out that the scale follows the temperature: the fit to motions as they would be at the reference
+/// temperature, with the errors of the fit of all parameters together. The motions are then these.
+fn warm(
+    cold: &MotionFit,
+    observations: &mut Observations,
+    thermometry: &Thermometry<'_>,
+) -> Option<MotionFit> {
+    let finding = observations.temperature.as_mut().filter(|finding| finding.refusal.is_none())?;
+    let used: Vec<&MotionData> = observations.data.iter().collect();
+    let temperatures: Vec<f64> = used.iter().map(|data| thermometry.mean(&data.rows)).collect();
+    let kept = warm_motions::estimate(&used, &temperatures, &cold.triad, finding)?;
+    let at = |k: usize| kept.fit.fitted.theta[k];
+    let (gain, bias) = (Matrix3::from_fn(|i, j| at(3 * i + j)), Vector3::from_fn(|axis, _| at(9 + axis)));
+    let reduced = |k: &usize| {
+        let stretch = kept.terms.stretch(&gain, temperatures[*k]);
+        observations.data[*k].clone().stretched(&stretch, &bias)
+    };
+    observations.data = kept.fit.used.iter().map(reduced).collect();
+    let fit = gyr_rig_fit::fit(&observations.data, FULL, bias);
+    let size = kept.fit.model;
+    let covariance = kept.fit.covariance.view((0, 0), (size, size)).into_owned();
+    let parameters = fit.report.parameters + kept.fit.free.len() - size;
+    Some(MotionFit { covariance, report: FitReport { parameters, ..fit.report }, ..fit })
 }
 
 /// Of a fit to motions whose errors are independent, and of the bias's drift: that from one motion to the next is a

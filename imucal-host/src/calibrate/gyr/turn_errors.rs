@@ -90,7 +90,7 @@ fn linear(between: &Between<'_>, gain: &Matrix3<f64>) -> Linear {
 }
 
 /// Two unit vectors across a direction, as rows.
-fn across(direction: &Vector3<f64>) -> MatrixXx3<f64> {
+pub fn across(direction: &Vector3<f64>) -> MatrixXx3<f64> {
     let least = direction.iamin();
     let one = direction.cross(&Vector3::ith(least, 1.0)).normalize();
     let other = direction.cross(&one);
@@ -104,29 +104,67 @@ pub fn errors(
     directions: &Directions,
     rates: &RateNoise,
 ) -> Option<Errors> {
+    let noise = TurnCovariance::of(turns, gain, directions, rates);
     let turns: Vec<Linear> = turns.iter().map(|turn| linear(turn, gain)).collect();
     let rows = 2 * turns.len();
-    let mut rests: Vec<usize> = turns.iter().flat_map(|turn| [turn.rests.0, turn.rests.1]).collect();
-    rests.sort_unstable();
-    rests.dedup();
     let (mut jacobian, mut residuals) = (DMatrix::zeros(rows, 9), DVector::zeros(rows));
-    let mut by_direction: Vec<(usize, MatrixXx3<f64>)> =
-        rests.iter().map(|rest| (*rest, MatrixXx3::zeros(rows))).collect();
     for (k, turn) in turns.iter().enumerate() {
         jacobian.rows_mut(2 * k, 2).copy_from(&turn.by_gain);
         residuals.rows_mut(2 * k, 2).copy_from_slice(&turn.residual);
-        for (rest, by) in [(turn.rests.0, &turn.by_before), (turn.rests.1, &turn.by_after)] {
-            if let Ok(at) = rests.binary_search(&rest) {
-                let mut there = by_direction[at].1.rows_mut(2 * k, 2);
-                there += by;
+    }
+    noise.errors(&residuals, &jacobian, &influence(&jacobian)?)
+}
+
+/// V_a and V_g of turns, two rows each.
+#[derive(Clone, Debug)]
+pub struct TurnCovariance {
+    of_directions: DMatrix<f64>,
+    of_rates: DMatrix<f64>,
+}
+
+impl TurnCovariance {
+    /// Of turns near a gain.
+    pub fn of(
+        turns: &[Between<'_>],
+        gain: &Matrix3<f64>,
+        directions: &Directions,
+        rates: &RateNoise,
+    ) -> Self {
+        let turns: Vec<Linear> = turns.iter().map(|turn| linear(turn, gain)).collect();
+        let rows = 2 * turns.len();
+        let mut rests: Vec<usize> = turns.iter().flat_map(|turn| [turn.rests.0, turn.rests.1]).collect();
+        rests.sort_unstable();
+        rests.dedup();
+        let mut by_direction: Vec<(usize, MatrixXx3<f64>)> =
+            rests.iter().map(|rest| (*rest, MatrixXx3::zeros(rows))).collect();
+        for (k, turn) in turns.iter().enumerate() {
+            for (rest, by) in [(turn.rests.0, &turn.by_before), (turn.rests.1, &turn.by_after)] {
+                if let Ok(at) = rests.binary_search(&rest) {
+                    let mut there = by_direction[at].1.rows_mut(2 * k, 2);
+                    there += by;
+                }
             }
         }
+        let of_directions = directions.propagated(&by_direction);
+        let of_rates = of_rates(&turns, &rests, directions, rates);
+        Self { of_directions, of_rates }
     }
-    let of_directions = directions.propagated(&by_direction);
-    let of_rates = of_rates(&turns, &rests, directions, rates);
-    let parts =
-        Parts { parts: [&of_directions, &of_rates], ratios: &RATIOS, scale: Scale::Near, five: false };
-    parts.errors(&residuals, &jacobian, &influence(&jacobian)?)
+
+    /// Errors of what follows from the rows by `influence`; see [`Parts::errors`].
+    pub fn errors(
+        &self,
+        residuals: &DVector<f64>,
+        jacobian: &DMatrix<f64>,
+        influence: &DMatrix<f64>,
+    ) -> Option<Errors> {
+        let parts = Parts {
+            parts: [&self.of_directions, &self.of_rates],
+            ratios: &RATIOS,
+            scale: Scale::Near,
+            five: false,
+        };
+        parts.errors(residuals, jacobian, influence)
+    }
 }
 
 /// V_g.

@@ -35,6 +35,12 @@ use crate::{
             search::{SWARM_OBSERVATIONS, Search, Searched},
         },
         outcome::{BiasWander, Estimates, Evidence, FitSummary, KnownTurn, Refused, SensorOutcome},
+        temperature::{
+            TemperatureFinding, Thermometry, WarmTriad,
+            rest_rates::{self, WarmRates},
+            rests,
+            turns::{self as warm_turns, WarmTurns},
+        },
     },
     observe::{
         quantum::quantum,
@@ -70,11 +76,13 @@ pub struct GyrInput<'a> {
     /// Rests whose direction is to be trusted.
     pub used: &'a [usize],
     /// The accelerometer's calibration, nominal SI in.
-    pub acc: &'a Triad<f64>,
+    pub acc: &'a WarmTriad,
     /// How its directions err, where that is asked for.
     pub directions: Option<&'a Directions>,
     /// Part of Earth's rotation along the vertical, rad/s, upwards positive; 0 where the latitude is not known.
     pub vertical_rate: f64,
+    /// The thermometer, where terms of temperature are asked for.
+    pub thermometry: Option<&'a Thermometry<'a>>,
 }
 
 /// Turns and the bias they are counted from.
@@ -83,17 +91,24 @@ struct Turns {
     bias: Vector3<f64>,
     wander: BiasWander,
     left_out: Vec<String>,
+    /// What the rates of each were multiplied by; none where nothing was.
+    stretches: Vec<Matrix3<f64>>,
 }
 
 impl GyrInput<'_> {
-    fn turns(&self) -> Turns {
-        let means = self.rest_means();
-        let (bias, wander) = wander(self.rests, &means);
-        let mut turns = Turns { data: Vec::new(), bias, wander, left_out: Vec::new() };
+    /// Turns, less the bias of their temperature where `warm` has its terms.
+    fn turns(&self, warm: Option<&rests::Kept>) -> Turns {
+        let raw = self.rest_means();
+        let drift =
+            |k: usize| warm.map_or_else(Vector3::zeros, |kept| kept.terms.drift(self.rests[k].temperature));
+        let means: Vec<Vector3<f64>> = raw.iter().enumerate().map(|(k, mean)| mean - drift(k)).collect();
+        let (mean, wander) = wander(self.rests, &means);
+        let bias = warm.map_or(mean, rests::Kept::rest_bias);
+        let mut turns = Turns { data: Vec::new(), bias, wander, left_out: Vec::new(), stretches: Vec::new() };
         for pair in self.used.windows(2) {
             let (i, j) = (pair[0], pair[1]);
             let mean = |k: usize| {
-                if wander.interpolated { means[k] } else { bias }
+                if wander.interpolated { raw[k] } else { bias + drift(k) }
             };
             let path =
                 BiasPath { before: (self.rests[i].time, mean(i)), after: (self.rests[j].time, mean(j)) };
@@ -123,7 +138,8 @@ impl GyrInput<'_> {
     }
 
     fn direction(&self, rest: usize) -> Vector3<f64> {
-        self.acc.correct(&self.rests[rest].acc.mean()).normalize()
+        let rest = &self.rests[rest];
+        self.acc.correct(&rest.acc.mean(), rest.temperature).normalize()
     }
 
     fn with_directions<'a>(&self, data: &'a [TurnData]) -> Vec<Turn<'a, f64>> {
@@ -185,7 +201,7 @@ fn rms(errors: &[f64]) -> f64 {
 /// One Gauss–Newton step from `near`, the gain at the chosen segmentation: segmentations differ by parts in a
 /// thousand, so what a second step would add is a part in a million.
 pub fn trial(input: &GyrInput<'_>, near: &Matrix3<f64>) -> Option<Vector3<f64>> {
-    let turns = input.turns();
+    let turns = input.turns(None);
     if turns.data.len() < LEAST_TURNS {
         return None;
     }
@@ -213,29 +229,28 @@ pub fn without_accelerometer(refusal: Refusal) -> SensorOutcome {
 
 /// Calibrates from turns between rests.
 pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
-    let mut turns = input.turns();
+    let (mut finding, of_bias) = warm_bias(input);
+    let mut turns = input.turns(of_bias.as_ref());
     if let Err(refusal) = check_turns(input, &turns) {
         return refuse(refusal, None);
     }
-    let known = input.with_directions(&turns.data);
-    let fitted = leaving_out(known.len(), 1, &mut |used, _| {
-        let known: Vec<_> = used.iter().map(|k| known[*k]).collect();
-        let (solver, search) = solve(&known);
-        let errors = turn_errors(&known, solver.theta());
-        ((solver, search), errors)
+    let mut fitted = fit(&input.with_directions(&turns.data));
+    let bias = bias_errors(input, of_bias.as_ref());
+    let of_scale = finding.as_mut().and_then(|finding| {
+        warm_scale(input, &turns, &FULL_GAIN.triad(fitted.fit.0.theta()).gain, &bias, finding)
     });
+    if let Some(kept) = &of_scale {
+        turns.reduce(kept);
+        turns.left_out.extend(kept.left_out.iter().map(|(k, size)| turns.data[*k].left_out(*size)));
+        turns.keep(&kept.fit.used);
+        fitted = fit(&input.with_directions(&turns.data));
+    }
     let Kept { fit: (solver, search), used, left_out } = fitted;
-    turns.left_out.extend(left_out.iter().map(|(index, size)| {
-        let TurnData { rest_before, rest_after, .. } = turns.data[*index];
-        format!(
-            "turn from rest {} to {}: {size:.1} robust standard deviations",
-            rest_before + 1,
-            rest_after + 1
-        )
-    }));
-    turns.data = used.iter().map(|k| turns.data[*k].clone()).collect();
+    turns.left_out.extend(left_out.iter().map(|(index, size)| turns.data[*index].left_out(*size)));
+    turns.keep(&used);
     let known = input.with_directions(&turns.data);
-    let summary = summarise(input, &turns, &known, (&solver, search));
+    let summary = summarise(input, &turns, &known, (&solver, search), (&bias, of_scale.as_ref()));
+    let summary = FitSummary { temperature: finding, ..summary };
     match judge(&solver.report(), &summary, LEAST_TURNS) {
         Ok(()) => SensorOutcome {
             suspicions: Vec::new(),
@@ -243,19 +258,106 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
             model: MODEL,
             verdict: Ok(()),
             fit: Some(summary),
-            evidence: Some(Evidence::Turns(
-                known
-                    .iter()
-                    .zip(&turns.data)
-                    .map(|(turn, data)| KnownTurn {
-                        data: data.clone(),
-                        before: turn.before,
-                        after: turn.after,
-                    })
-                    .collect(),
-            )),
+            evidence: Some(Evidence::Turns(turns.known(&known))),
         },
         Err(refusal) => refuse(refusal, Some(summary)),
+    }
+}
+
+/// A fit to turns, without gross outliers.
+fn fit(known: &[Turn<'_, f64>]) -> Kept<(LevenbergMarquardt<f64, 9>, Search)> {
+    leaving_out(known.len(), 1, &mut |used, _| {
+        let known: Vec<_> = used.iter().map(|k| known[*k]).collect();
+        let (solver, search) = solve(&known);
+        let errors = turn_errors(&known, solver.theta());
+        ((solver, search), errors)
+    })
+}
+
+/// What the rests say of the bias' temperature, where that is asked for.
+fn warm_bias(input: &GyrInput<'_>) -> (Option<TemperatureFinding>, Option<rests::Kept>) {
+    let Some(thermometry) = input.thermometry else { return (None, None) };
+    let of = |value: fn(&Rest<f64>) -> f64| -> Vec<f64> { input.rests.iter().map(value).collect() };
+    let temperatures = of(|rest| rest.temperature);
+    let mut finding = TemperatureFinding::new(&temperatures);
+    if let Err(refusal) = thermometry.check(&temperatures) {
+        return (Some(finding.refused(refusal)), None);
+    }
+    let rates = WarmRates {
+        means: &input.rest_means(),
+        times: &of(|rest| rest.time),
+        temperatures: &temperatures,
+        noise: &input.at_rest().noise(),
+    };
+    let kept = rest_rates::estimate(&rates, &mut finding);
+    (Some(finding), kept)
+}
+
+/// The bias' error, of the fit with its terms of temperature where there is one.
+fn bias_errors(input: &GyrInput<'_>, warm: Option<&rests::Kept>) -> BiasErrors {
+    let bias = rest_bias::errors(input.rests, &input.rest_means(), &input.at_rest());
+    let Some(kept) = warm else { return bias };
+    let variance = kept.fit.first::<3>().diagonal();
+    BiasErrors { std: (variance + bias.steps).map(f64::sqrt), ..bias }
+}
+
+/// What the turns say of the scale's temperature; nothing where that of the rests says nothing.
+fn warm_scale(
+    input: &GyrInput<'_>,
+    turns: &Turns,
+    near: &Matrix3<f64>,
+    bias: &BiasErrors,
+    finding: &mut TemperatureFinding,
+) -> Option<rests::Kept> {
+    if finding.refusal.is_some() {
+        return None;
+    }
+    let (thermometry, directions) = (input.thermometry?, input.directions?);
+    let known = input.with_directions(&turns.data);
+    let middle =
+        |turn: &TurnData| 0.5 * (input.rests[turn.rest_before].time + input.rests[turn.rest_after].time);
+    let warm = WarmTurns {
+        turns: &between(&turns.data, &known),
+        times: &turns.data.iter().map(middle).collect::<Vec<_>>(),
+        temperatures: &turns.data.iter().map(|turn| thermometry.mean(&turn.rows)).collect::<Vec<_>>(),
+        directions,
+        rates: &rate_noise(input, turns, bias),
+    };
+    warm_turns::estimate(&warm, near, finding)
+}
+
+impl Turns {
+    /// Takes the scale's terms off: rates as they would be at the reference temperature.
+    fn reduce(&mut self, kept: &rests::Kept) {
+        let gain = Matrix3::from_fn(|i, j| kept.fit.fitted.theta[3 * i + j]);
+        self.stretches = kept.temperatures.iter().map(|t| kept.terms.stretch(&gain, *t)).collect();
+        for (data, stretch) in self.data.iter_mut().zip(&self.stretches) {
+            *data = data.clone().stretched(stretch);
+        }
+    }
+
+    /// Keeps some of the turns.
+    fn keep(&mut self, used: &[usize]) {
+        self.data = used.iter().map(|k| self.data[*k].clone()).collect();
+        self.stretches = used.iter().filter_map(|k| self.stretches.get(*k).copied()).collect();
+    }
+
+    /// The turns as evidence.
+    fn known(&self, known: &[Turn<'_, f64>]) -> Vec<KnownTurn> {
+        let one = |(k, turn): (usize, &Turn<'_, f64>)| KnownTurn {
+            data: self.data[k].clone(),
+            before: turn.before,
+            after: turn.after,
+            stretch: self.stretches.get(k).copied().unwrap_or_else(Matrix3::identity),
+        };
+        known.iter().enumerate().map(one).collect()
+    }
+}
+
+impl TurnData {
+    fn left_out(&self, size: f64) -> String {
+        let (before, after) = (self.rest_before + 1, self.rest_after + 1);
+        format!("turn from rest {before} to {after}: {size:.1} robust standard deviations")
     }
 }
 
@@ -311,11 +413,13 @@ fn summarise(
     turns: &Turns,
     known: &[Turn<'_, f64>],
     (solver, search): (&LevenbergMarquardt<f64, 9>, Search),
+    (bias, of_scale): (&BiasErrors, Option<&rests::Kept>),
 ) -> FitSummary {
     let gain = FULL_GAIN.triad(solver.theta()).gain;
     let classical = least_squares::covariance(solver);
-    let bias = rest_bias::errors(input.rests, &input.rest_means(), &input.at_rest());
-    let covariance = gain_covariance(input, turns, known, &gain, &bias).unwrap_or(classical);
+    let covariance = of_scale.map(|kept| kept.fit.first::<9>());
+    let covariance =
+        covariance.or_else(|| gain_covariance(input, turns, known, &gain, bias)).unwrap_or(classical);
     let report = FitReport {
         rms: rms(&turn_errors(known, solver.theta())),
         held_out_rms: held_out_rms(known, solver.theta()),
@@ -327,6 +431,8 @@ fn summarise(
         inflation: covariance.diagonal().component_div(&classical.diagonal()).map(f64::sqrt).max(),
         ..FitReport::of(solver, known.len(), 3)
     };
+    let terms = of_scale.map_or(0, |kept| kept.fit.free.len() - kept.fit.model);
+    let report = FitReport { parameters: report.parameters + terms, ..report };
     let estimates = Estimates {
         triad: Triad { gain, bias: turns.bias },
         std: Triad { gain: FULL_GAIN.triad(&covariance.diagonal().map(f64::sqrt)).gain, bias: bias.std },
@@ -350,21 +456,28 @@ fn gain_covariance(
     gain: &Matrix3<f64>,
     bias: &BiasErrors,
 ) -> Option<SMatrix<f64, 9, 9>> {
-    let between: Vec<Between<'_>> = known
-        .iter()
-        .zip(&turns.data)
-        .map(|(turn, data)| Between { turn: *turn, rests: (data.rest_before, data.rest_after) })
-        .collect();
+    let (between, rates) = (between(&turns.data, known), rate_noise(input, turns, bias));
+    turn_errors::errors(&between, gain, input.directions?, &rates).map(|errors| turn_errors::fixed(&errors))
+}
+
+fn between<'a>(data: &[TurnData], known: &[Turn<'a, f64>]) -> Vec<Between<'a>> {
+    let one = |(turn, data): (&Turn<'a, f64>, &TurnData)| Between {
+        turn: *turn,
+        rests: (data.rest_before, data.rest_after),
+    };
+    known.iter().zip(data).map(one).collect()
+}
+
+fn rate_noise(input: &GyrInput<'_>, turns: &Turns, bias: &BiasErrors) -> RateNoise {
     // In motion the steps of the converter are noise, whatever they are at rest.
     let rounding =
         quantum(&input.sensor.values, input.usable).map(|step| step * step / 12.0) * input.interval;
     let interpolated = turns.wander.interpolated;
-    let rates = RateNoise {
+    RateNoise {
         density: input.at_rest().density().zip_map(&rounding, f64::max).mean(),
         bias: if interpolated { bias.steps } else { bias.std.map(|std| std * std) },
         interpolated,
-    };
-    turn_errors::errors(&between, gain, input.directions?, &rates).map(|errors| turn_errors::fixed(&errors))
+    }
 }
 
 /// The axis that carries one direction of gravity to the next, both senses: a turn and its reverse say the same.

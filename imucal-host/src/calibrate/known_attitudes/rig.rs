@@ -17,6 +17,7 @@ use crate::{
             Calibration, Estimates, Evidence, FitSummary, HigherOrder, Refused, RigFindings, SensorOutcome,
             entry_name,
         },
+        temperature::{TemperatureFinding, Thermometry, poses as warm_poses},
     },
     observe::pose::{self, Poses},
     recording::{Recording, SensorKind, Triple, Unit},
@@ -37,7 +38,7 @@ pub fn accelerometer(
     usable: &[bool],
     gravity: f64,
     options: &Options,
-    calibration: &mut Calibration,
+    (calibration, thermometry): (&mut Calibration, Option<&Thermometry<'_>>),
 ) -> Option<SensorOutcome> {
     let name = options.rig_acc?;
     let poses = poses(recording, sensor, usable, calibration)?;
@@ -59,7 +60,42 @@ pub fn accelerometer(
         ));
         rung = lower;
     }
-    Some(outcome(SensorKind::Acc, &rung, &poses, sensor, gravity))
+    let found = thermometry.map(|thermometry| warm(&mut rung, &poses, thermometry, down));
+    let (finding, reduced) = found.unzip();
+    let poses = reduced.flatten().unwrap_or(poses);
+    let mut outcome = outcome(SensorKind::Acc, &rung, &poses, sensor, gravity);
+    if let Some(fit) = &mut outcome.fit {
+        fit.temperature = finding;
+    }
+    Some(outcome)
+}
+
+/// What the poses say of temperature. Where terms are kept, the poses as they would be at the reference temperature, and
+/// the rung fitted to these, with the errors of the fit of all parameters together.
+fn warm(
+    rung: &mut Rung,
+    poses: &Poses,
+    thermometry: &Thermometry<'_>,
+    down: Vector3<f64>,
+) -> (TemperatureFinding, Option<Poses>) {
+    let base = UnifiedParameters::nominal(down);
+    let (finding, kept) = warm_poses::estimate(poses, thermometry, (rung.name, &rung.fit), &base);
+    let Some(kept) = kept else { return (finding, None) };
+    let all = UnifiedParameters::from_vector(&nalgebra::SVector::from_fn(|k, _| {
+        if k < kept.fit.model { kept.fit.fitted.theta[k] } else { 0.0 }
+    }));
+    let Some(gain) = all.sensitivity.try_inverse() else { return (finding, None) };
+    let triad = Triad { gain, bias: all.bias };
+    let mut reduced = poses.of_those(&kept.fit.used);
+    for (pose, k) in reduced.poses.iter_mut().zip(&kept.fit.used) {
+        pose.value = kept.terms.reduced(&triad, &pose.value, kept.temperatures[*k]);
+    }
+    let Some(mut fitted) = ladder::rung(rung.name, &reduced, down) else { return (finding, None) };
+    let size = kept.fit.model;
+    fitted.fit.covariance = kept.fit.covariance.view((0, 0), (size, size)).into_owned();
+    fitted.fit.report = kept.fit.report(&fitted.fit.report, 3);
+    *rung = fitted;
+    (finding, Some(reduced))
 }
 
 /// The poses determine the base's tilt, where it was asked for. Held is the exact case; noise, scatter of the stops and a

@@ -161,7 +161,7 @@ fn from_a_start_far_off_the_swarm_ends_where_the_static_bias_does() {
     let usable = integrity::inspect(&recording).sensor(SensorKind::Gyr).unwrap().usable.clone();
     let (axes, gimbal) = pose::axes_and_encoders(&recording).unwrap();
     let attitudes = motion::of_encoders(gimbal, &axes);
-    let found = on_encoders(&recording, sensor, &usable, gimbal, &attitudes, &axes);
+    let found = on_encoders(&recording, sensor, &usable, gimbal, &attitudes, &axes, None);
     let near = gyr_rig_fit::fit(&found.data, FULL, found.bias);
     let far = gyr_rig_fit::search(&found.data, FULL, found.bias + Vector3::new(0.12, -0.1, 0.15)).unwrap();
     assert!(near.search.swarm.is_none() && far.search.swarm.is_some_and(|swarm| swarm.kept));
