@@ -1,54 +1,26 @@
 //! What a session on a device makes of raw samples, against what the host makes of the whole recording.
 
 use imucal_core::{
-    observer::Sample,
     record::Sensor,
-    session::{Session, SessionSettings, estimate::Estimate},
+    session::{SessionSettings, estimate::Estimate},
     triad::Triad,
 };
 use imucal_host::{
     calibrate::{Calibration, Options, calibrate, outcome::FitSummary},
-    recording::{Recording, SensorKind, check::integrity, unit::STANDARD_GRAVITY},
+    capture::{self, Capture, settings},
+    recording::{Recording, SensorKind},
 };
 use imucal_tests::{data, simulated};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-type Device = Session<38, 4, 64>;
-
 fn read(name: &str) -> Option<Recording> {
     Some(Recording::read(&data::real(name)?).expect("a good recording"))
 }
 
-/// A session over a whole recording: single precision, sample by sample.
-fn session(recording: &Recording, settings: SessionSettings) -> Device {
-    let integrity = integrity::inspect(recording);
-    let usable =
-        |kind: SensorKind, row: usize| integrity.sensor(kind).is_none_or(|sensor| sensor.usable[row]);
-    let value = |kind: SensorKind, row: usize| -> Option<Vector3<f32>> {
-        let missed = Vector3::repeat(f32::NAN);
-        let value = recording.sensor(kind)?.values[row].cast();
-        Some(if usable(kind, row) { value } else { missed })
-    };
-    let mut session = Device::new(settings);
-    for (row, time) in recording.time.iter().enumerate() {
-        let temperature = recording.temperature.as_ref().map(|rows| rows[row] as f32);
-        let acc = value(SensorKind::Acc, row).unwrap_or(Vector3::repeat(f32::NAN));
-        let time = ((time - recording.time[0]) * 1e6).round() as u64;
-        session.push(&Sample { time, acc, gyr: value(SensorKind::Gyr, row), temperature });
-        if let Some(field) = value(SensorKind::Mag, row) {
-            session.push_field(&field);
-        }
-        while session.work() {}
-    }
-    session.finish();
-    while session.work() {}
-    session
-}
-
-fn settings(recording: &Recording) -> SessionSettings {
-    let gravity = recording.manifest.site.gravity().unwrap_or(STANDARD_GRAVITY) as f32;
-    SessionSettings { gravity, ..Default::default() }
+/// A session over a whole recording.
+fn session(recording: &Recording, settings: SessionSettings) -> Box<Capture> {
+    capture::replay(recording, settings, &mut |_, _| {})
 }
 
 /// Differences of gain and bias in standard errors of the device.
@@ -75,7 +47,7 @@ fn fit(calibration: &Calibration, kind: SensorKind) -> Option<&FitSummary> {
 }
 
 /// Differences of one sensor in standard errors of the device, where both accept it. They must agree on that.
-fn compared(name: &str, calibration: &Calibration, device: &Device, kind: SensorKind) -> Vec<f64> {
+fn compared(name: &str, calibration: &Calibration, device: &Capture, kind: SensorKind) -> Vec<f64> {
     let sensor = Sensor::ALL[kind as usize];
     let host = fit(calibration, kind);
     let own = device.estimate(sensor).filter(|estimate| estimate.verdict.is_ok());

@@ -27,6 +27,7 @@
 //! | [`simulator`] | a movement, effects | what ideal or afflicted sensors put out |
 //! | [`noise`], [`observe`], [`ellipsoid`] | samples | rests, motions, turns, and the noise of their means |
 //! | [`calibrate`] | observations | triads with standard errors; accepted, suspect or refused |
+//! | [`capture`] | samples as they arrive | what to do next, until a session has calibrated its sensors |
 //! | [`store`], [`apply`], [`device`] | triads | records, corrected recordings, answers of a device |
 //! | [`equivalence`] | a calibration | how far the core in `f32` is from a reference in `f64` |
 //! | [`diagnosis`] | a recording, effects | where the gap lies, its causes, what to record next |
@@ -66,6 +67,8 @@ pub mod calibrate;
 pub mod store;
 
 pub mod apply;
+
+pub mod capture;
 
 pub mod device;
 

@@ -9,6 +9,7 @@ use imucal_tests::simulated;
 use tempfile::TempDir;
 
 mod applying;
+mod capturing;
 mod end_to_end;
 mod exit_status;
 mod importing;

@@ -32,6 +32,7 @@ pub(super) fn reach_all() {
     reach!(session::Session::finish(&mut session));
     while reach!(session::Session::work(&mut session)) {}
     reach!(session::Session::guide(&session));
+    reach!(session::Session::settings(&session));
     reach!(session::Session::cloud(&session));
     let poses = reach!(session::Session::poses(&session));
     reach!(session::poses::Poses::forgotten(poses));

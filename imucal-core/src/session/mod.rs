@@ -51,7 +51,7 @@ use fitting::Fit;
 use guide::Thrown;
 use poses::Poses;
 
-/// What a session is told before it begins.
+/// What a session needs to know before it begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SessionSettings {
     /// Local gravity, m/s².
@@ -192,6 +192,11 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     /// What is known of a sensor so far.
     pub fn estimate(&self, sensor: Sensor) -> Option<&Estimate> {
         self.estimates.get(sensor as usize)?.as_ref()
+    }
+
+    /// What it was given.
+    pub fn settings(&self) -> &SessionSettings {
+        &self.settings
     }
 
     /// Rests and turns so far.

@@ -15,6 +15,7 @@ use crate::{
 mod apply;
 mod blind;
 mod calibrate;
+mod capture;
 mod demo;
 mod device;
 mod diagnose;
@@ -42,6 +43,8 @@ struct Cli {
 enum Command {
     /// Fit all models that a recording supports, with standard errors; refuse what it does not determine.
     Calibrate(calibrate::Arguments),
+    /// Guide through a calibration session of a device: what to do next, how sure each sensor is, when it is enough.
+    Capture(capture::Arguments),
     /// Correct a recording with the core's code, as a device does.
     Apply(apply::Arguments),
     /// Print a calibration, its quality, and whether it is intact.
@@ -79,6 +82,7 @@ pub fn run() -> ExitCode {
     interrupt::watch();
     let result = match command {
         Command::Calibrate(arguments) => calibrate::run(&arguments),
+        Command::Capture(arguments) => capture::run(&arguments),
         Command::Apply(arguments) => apply::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),

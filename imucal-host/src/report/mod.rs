@@ -1,5 +1,6 @@
 //! Reports: for people (text) and for programs (JSON).
 
+pub mod capture;
 pub mod catalogue;
 pub mod diagnosis;
 pub mod json;

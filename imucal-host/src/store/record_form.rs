@@ -23,7 +23,7 @@ pub(super) fn widen<const N: usize>(values: [f32; N]) -> [f64; N] {
 }
 
 /// Both lists spell their units as the contract does, so the symbol carries one to the other.
-fn raw_unit(unit: Unit) -> RawUnit {
+pub(crate) fn raw_unit(unit: Unit) -> RawUnit {
     RawUnit::from_symbol(&unit.to_string()).unwrap_or(RawUnit::Arbitrary)
 }
 

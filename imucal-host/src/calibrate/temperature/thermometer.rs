@@ -2,8 +2,8 @@
 //!
 //! | fault | criterion |
 //! | --- | --- |
-//! | it jumps | one reading differs from the one before by more than [`LEAP`] and [`FASTEST`] times the time between them |
-//! | it is stuck | one reading is repeated for longer than [`LONG`] and [`LONGER`] times as long as any other, and it is left by a leap of [`STEPS`] of its steps, or not at all |
+//! | it jumps | one reading differs from the one before by more than `LEAP` and `FASTEST` times the time between them |
+//! | it is stuck | one reading is repeated for longer than `LONG` and `LONGER` times as long as any other, and it is left by a leap of `STEPS` of its steps, or not at all |
 //!
 //! A sensor has a thermal mass: a package of a few grams warms by some tenths of a kelvin a second. A soak at a constant
 //! temperature is not stuck where the thermometer's last digit moves, or where it goes on by single steps. Source: ours.

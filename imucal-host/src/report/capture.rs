@@ -1,0 +1,114 @@
+//! The guide of a session, in sentences.
+
+use imucal_core::{coverage::Coverage, session::guide::Advice};
+use nalgebra::Vector3;
+
+use super::{
+    measure::{plain, rounded},
+    table::words,
+};
+use crate::{capture::Capture, recording::SensorKind};
+
+/// An axis whose share of a direction is below this does not belong to it.
+const SHARE: f32 = 0.3;
+
+/// What to do next.
+pub fn advice(advice: &Advice, hold: f32) -> String {
+    match advice {
+        Advice::HoldStill => "lay the sensor down and leave it still".into(),
+        Advice::HoldOn => "keep it still".into(),
+        Advice::Turn(to) => {
+            format!("turn it until {} up, then keep it still for {hold:.0} s", pointing(to))
+        }
+        Advice::TurnAbout(to) => {
+            format!("turn it about until the magnetometer's {} along the field", pointing(to))
+        }
+        Advice::Enough => "enough: every sensor has reached its target".into(),
+    }
+}
+
+/// `x points`, `x and −z point`.
+fn pointing(direction: &Vector3<f32>) -> String {
+    let axes: Vec<String> = ["x", "y", "z"]
+        .into_iter()
+        .zip(direction.iter())
+        .filter(|(_, share)| share.abs() > SHARE)
+        .map(|(name, share)| format!("{}{name}", if *share < 0.0 { "−" } else { "+" }))
+        .collect();
+    match axes.as_slice() {
+        [one] => format!("{one} points"),
+        [first, second] => format!("{first} and {second} point"),
+        all => format!("{} point", all.join(", ")),
+    }
+}
+
+/// One line: when, what there is so far, what to do next.
+pub fn line(time: f64, session: &Capture, recorded: &[SensorKind]) -> String {
+    let guide = session.guide();
+    let sure: String = recorded
+        .iter()
+        // An error as large as the vector itself says no more than that there is none yet.
+        .filter_map(|kind| Some((kind, guide.error[*kind as usize].filter(|error| *error < 1.0)?)))
+        .map(|(kind, error)| format!(", {kind} {} %", percent(error)))
+        .collect();
+    let never = if guide.never_still { " (it has moved since the beginning)" } else { "" };
+    let next = advice(&guide.advice, session.settings().hold);
+    format!("{:>8} s  {}{sure}: {next}{never}", rounded(time, 1), counted(guide.rests, "pose"))
+}
+
+fn counted(count: u16, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
+}
+
+/// How sure each recorded sensor is, what is covered, and what was thrown away; ends its lines.
+pub fn state(session: &Capture, recorded: &[SensorKind]) -> String {
+    let guide = session.guide();
+    let settings = session.settings();
+    let mut text = String::new();
+    for kind in recorded {
+        let at = *kind as usize;
+        let (error, target) = (guide.error[at], settings.target[at]);
+        let sure = error.filter(|error| *error < 1.0).map_or("no fit yet".into(), |error| {
+            let accepted = if guide.accepted[at] { "accepted" } else { "not accepted yet" };
+            format!("{accepted}, expected error {} %", percent(error))
+        });
+        text += &format!("  {:<14} {sure}; target {} %\n", words(*kind), percent(target));
+    }
+    let directions = session.poses().list().iter().map(|pose| pose.acc / pose.acc.norm());
+    let covered = Coverage::of(directions).share;
+    text += &format!(
+        "  coverage       {:.0} % of the directions by {}; {}, {} of the field\n",
+        100.0 * covered,
+        counted(guide.rests, "pose"),
+        counted(guide.turns, "turn"),
+        counted(guide.points, "place")
+    );
+    let thrown = guide.thrown;
+    let reasons = [
+        (thrown.rests, "rest", "too short or too noisy"),
+        (thrown.turns, "turn", "with a gap or a clipped sample"),
+        (thrown.clipped, "sample", "beyond the sensor's range"),
+        (thrown.forgotten, "pose", "for want of room"),
+    ];
+    for (count, what, why) in reasons.into_iter().filter(|(count, ..)| *count > 0) {
+        text += &format!("  left out       {}, {why}\n", counted(count, what));
+    }
+    text
+}
+
+fn percent(share: f32) -> String {
+    plain(100.0 * f64::from(share))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_direction_is_said_by_the_axes_that_point_there() {
+        let said = |x: f32, y: f32, z: f32| advice(&Advice::Turn(Vector3::new(x, y, z).normalize()), 2.0);
+        assert_eq!(said(0.0, 0.0, -1.0), "turn it until −z points up, then keep it still for 2 s");
+        assert_eq!(said(1.0, 0.0, -1.0), "turn it until +x and −z point up, then keep it still for 2 s");
+        assert_eq!(said(1.0, 1.0, -1.0), "turn it until +x, +y, −z point up, then keep it still for 2 s");
+    }
+}
