@@ -20,7 +20,7 @@ struct Machine {
     stack: u32,
 }
 
-/// True of the machines; of the Arm ones no more than the nRF52840 and the micro:bit have beside the record's pages.
+/// True of the machines; of the Arm ones no more than the nRF52840 and the micro:bit have without the record's pages.
 const MACHINES: [Machine; 4] = [
     Machine {
         cfgs: &["cortex_m", "mps2", "an386"],

@@ -51,12 +51,14 @@ impl Thresholds {
 /// The threshold of a table at a run length.
 fn threshold(table: &[f32], run_length: f32) -> f32 {
     let at = libm::log10f(run_length) - FIRST_DECADE as f32;
-    // A run length that is not a number is the shortest.
+    // A run length that is not a number is the shortest, and one beyond the table its last.
+    let most = table.len().saturating_sub(1);
     let at = if at > 0.0 { at } else { 0.0 };
+    let at = if at < most as f32 { at } else { most as f32 };
     let below = at as usize;
     let last = table.last().copied().unwrap_or(0.0);
     let low = table.get(below).copied().unwrap_or(last);
-    let high = table.get(below + 1).copied().unwrap_or(last);
+    let high = table.get(below.saturating_add(1)).copied().unwrap_or(last);
     low + (at - below as f32) * (high - low)
 }
 

@@ -99,7 +99,7 @@ fn write_part(text: &mut String, part: &Part) -> fmt::Result {
 /// Why a group is not kept.
 fn why(tried: &Tried, part: &Part) -> String {
     match (tried.chance, tried.held_out) {
-        (None, _) => format!("the {} do not tell it from the other parameters and from time", part.of),
+        (None, _) => format!("the {} do not distinguish it from the other parameters and from time", part.of),
         (Some(p), _) if p >= CHANCE => format!("chance explains it, p = {p:.1e}"),
         (_, None) => "without some temperatures the others do not determine it".into(),
         (_, Some(rms)) => {

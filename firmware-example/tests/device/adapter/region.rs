@@ -27,8 +27,8 @@ fn a_device_keeps_its_record_in_the_region_and_touches_nothing_beside_it() {
         region.read(0, &mut kept).expect("inside");
         let flash = region.into_inner();
         assert!(kept == flash.bytes[start..start + 2 * PAGE] && kept.iter().any(|byte| *byte != 0xFF));
-        let beside = flash.bytes[..start].iter().chain(&flash.bytes[start + 2 * PAGE..]);
-        assert!(beside.into_iter().all(|byte| *byte == 0x5A), "page {page}");
+        let others = flash.bytes[..start].iter().chain(&flash.bytes[start + 2 * PAGE..]);
+        assert!(others.into_iter().all(|byte| *byte == 0x5A), "page {page}");
     }
 }
 

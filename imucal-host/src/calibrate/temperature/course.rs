@@ -1,11 +1,11 @@
-//! Whether temperatures can be told from time, and are far enough apart.
+//! Whether temperatures can be distinguished from time, and are far enough apart.
 //!
 //! ```text
 //! apart = min over monotone m of  Σ (θ_k − m(t_k))² / Σ (θ_k − θ̄)²
 //! ```
 //!
 //! What drifts with time, an ageing bias or one that settles, is most often a monotone function of it. Temperatures that
-//! are one as well cannot be told from it, whatever their span; those that come back can. The share that no rising and no
+//! are one as well cannot be distinguished from it, whatever their span; those that come back can. The share that no rising and no
 //! falling function of time explains is 0 for a ramp and for two plateaus, 0.69 for a ramp up and down, and near 1 for
 //! temperatures in any order. Source: isotonic regression by pooling neighbours (Ayer et al. 1955). Not modelled: a drift
 //! that turns back when the temperature does.

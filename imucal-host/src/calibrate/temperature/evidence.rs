@@ -28,7 +28,7 @@ use crate::calibrate::fit::{rows::influence, score_test::upper_tail};
 pub const CHANCE: f64 = 1e-3;
 
 /// Probability of so large a part of the residuals where the terms are zero: the larger of the two. `None` where they
-/// cannot be told from the other parameters or from time.
+/// cannot be distinguished from the other parameters or from time.
 pub fn chance(problem: &dyn ThermalProblem, fitted: &Fitted, added: Groups) -> Option<f64> {
     let rows = problem.rows(fitted);
     let free = problem.free(fitted.groups);
@@ -36,8 +36,8 @@ pub fn chance(problem: &dyn ThermalProblem, fitted: &Fitted, added: Groups) -> O
         problem.free(fitted.groups.and(added)).into_iter().filter(|k| !free.contains(k)).collect();
     let (j, z) = (rows.jacobian.select_columns(&free), rows.jacobian.select_columns(&tested));
     let n = problem.drift(fitted, fitted.groups.and(added));
-    let without = beside(&j, &n);
-    let with = beside(&without, &z);
+    let without = side_by_side(&j, &n);
+    let with = side_by_side(&without, &z);
     let left = (problem.independent()).checked_sub(with.ncols()).filter(|left| *left > 0)? as f64;
     let before = unexplained(&rows.residuals, &without)?;
     let influence = influence(&with)?;
@@ -69,7 +69,7 @@ fn unexplained(residuals: &DVector<f64>, columns: &DMatrix<f64>) -> Option<DVect
 }
 
 /// Two matrices next to each other.
-pub fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+pub fn side_by_side(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, first) = left.shape();
     DMatrix::from_fn(rows, first + right.ncols(), |row, k| {
         if k < first { left[(row, k)] } else { right[(row, k - first)] }

@@ -49,7 +49,7 @@ impl TemperatureFinding {
         Self { span, reference, refusal: None, parts: Vec::new(), terms: None }
     }
 
-    /// Takes terms of the scale, and their standard errors, beside those of the bias.
+    /// Takes terms of the scale, and their standard errors, next to those of the bias.
     pub fn add_scale(&mut self, terms: Terms, std: Terms) {
         let none = Terms::none(self.reference);
         let (of_bias, std_of_bias) = self.terms.unwrap_or((none, none));

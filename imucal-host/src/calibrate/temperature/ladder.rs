@@ -28,7 +28,7 @@ pub const BLOCK: f64 = 5.0;
 pub struct Tried {
     /// The group.
     pub group: Group,
-    /// Probability of as much evidence where there is none; `None` where it cannot be told from the rest.
+    /// Probability of as much evidence where there is none; `None` where it cannot be distinguished from the rest.
     pub chance: Option<f64>,
     /// Rms residual at temperatures held out, with it; `None` where a fit to the others does not end.
     pub held_out: Option<f64>,

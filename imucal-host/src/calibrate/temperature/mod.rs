@@ -2,7 +2,7 @@
 //!
 //! | file | what |
 //! | --- | --- |
-//! | [`thermometer`], [`course`], [`thermometry`] | whether temperatures are measured, far enough apart, and told from time |
+//! | [`thermometer`], [`course`], [`thermometry`] | whether temperatures are measured, far enough apart, and distinct from time |
 //! | [`refusal`] | why not |
 //! | [`groups`], [`problem`] | the terms, and a triad's model at the temperatures of its observations |
 //! | [`evidence`], [`ladder`] | which terms are kept |

@@ -33,7 +33,7 @@ const OF_T12: ThermalForm<12, 24> =
 const OF_I14: ThermalForm<14, 26> =
     form(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13], &Group::ALL, Side::Sensitivity);
 
-/// What became of the terms beside a rung of the ladder, and these where some are kept. `fit` is the rung's without them,
+/// What became of the terms next to a rung of the ladder, and these where some are kept. `fit` is the rung's without them,
 /// from `base`.
 pub fn estimate(
     poses: &Poses,
