@@ -162,16 +162,18 @@ fn the_numbers_of_the_document_are_those_of_the_code() {
         let (fault, _) = postcard::take_from_bytes::<Fault>(&bytes).expect("a fault");
         assert_eq!(&name(format!("{fault:?}")), expected);
     }
-    for number in 0..4 {
+    for number in 0..5 {
         let bytes = [&[number][..], &[0; 20]].concat();
         let (defect, _) = postcard::take_from_bytes::<Defect>(&bytes).expect("a defect");
         let expected = format!("{number} {} (", name(format!("{defect:?}")));
         assert!(document().contains(&expected), "{expected}");
     }
     // And the next number is none.
-    assert!(postcard::take_from_bytes::<Defect>(&[4, 0, 0, 0]).is_err());
-    assert!(postcard::take_from_bytes::<Figures>(&[12]).is_ok_and(|(last, _)| last == Figures::FieldNorm));
-    assert!(postcard::take_from_bytes::<Figures>(&[13]).is_err());
+    assert!(postcard::take_from_bytes::<Defect>(&[5, 0, 0, 0]).is_err());
+    assert!(
+        postcard::take_from_bytes::<Figures>(&[22]).is_ok_and(|(last, _)| last == Figures::NonlinearityStd)
+    );
+    assert!(postcard::take_from_bytes::<Figures>(&[23]).is_err());
     assert!(postcard::take_from_bytes::<RecordState>(&[7]).is_ok_and(|(last, _)| last == RecordState::Lost));
     assert!(postcard::take_from_bytes::<RecordState>(&[8]).is_err());
     assert!(
