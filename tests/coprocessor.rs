@@ -11,7 +11,7 @@ use imucal_tests::{
     coprocessor::{address, drilled, session},
     data,
     firmware::{BOARDS, ready},
-    program,
+    program, simulated,
 };
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_imucal-under-test");
@@ -117,4 +117,44 @@ fn shorten(recording: &mut Recording, rows: usize) {
     if let Some(temperature) = &mut recording.temperature {
         temperature.truncate(rows);
     }
+}
+
+#[test]
+fn a_session_on_board_stores_what_this_machine_finds_and_gives_up_what_is_less_sure() {
+    if !ready() {
+        return;
+    }
+    let scratch = tempfile::tempdir().expect("a scratch folder");
+    let recording = simulated::write_small(scratch.path()).display().to_string();
+    let flash = scratch.path().join("unit.flash").display().to_string();
+    let (device, out) = (address(BOARDS[0]), scratch.path().join("unit.bin").display().to_string());
+    let run = |command: &[&str]| {
+        let arguments = [command, &["--device", &device, "--flash", &flash]].concat();
+        program::run(PROGRAM, &[], &arguments.into_iter().map(str::to_owned).collect::<Vec<_>>())
+    };
+    run(&["capture", &recording, "--target", "1,1,1", "--record", &out]).with(0).printing(&[
+        "point up, then keep it still for 2 s",
+        "enough: every sensor has reached its target",
+        "accelerometer is calibrated",
+        "magnetometer is calibrated",
+        "stored as record 1",
+        "equal bit for bit",
+    ]);
+    assert!(std::fs::read(&out).is_ok_and(|bytes| imucal_core::record::decode(&bytes).is_ok()));
+    // It starts again with that record: the same data are no surer.
+    let again = run(&["capture", &recording, "--target", "1,1,1"]);
+    again.with(1).printing(&["accelerometer is not calibrated: the one in use is surer"]);
+    run(&["device", "restore"]).with(1).telling(&["no record is stored before the last one"]);
+    run(&["device", "watch"]).with(1).telling(&["nothing was watched yet"]);
+}
+
+#[test]
+fn a_board_without_the_memory_for_a_session_says_so() {
+    if !ready() {
+        return;
+    }
+    let scratch = tempfile::tempdir().expect("a scratch folder");
+    let recording = simulated::write_small(scratch.path()).display().to_string();
+    let arguments = ["capture", &recording, "--device", &address(BOARDS[1])].map(str::to_owned);
+    program::run(PROGRAM, &[], &arguments).with(1).telling(&["no memory for that"]);
 }

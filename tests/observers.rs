@@ -1,13 +1,9 @@
 //! What a session on a device makes of raw samples, against what the host makes of the whole recording.
 
-use imucal_core::{
-    record::Sensor,
-    session::{SessionSettings, estimate::Estimate},
-    triad::Triad,
-};
+use imucal_core::{record::Sensor, session::estimate::Estimate, triad::Triad};
 use imucal_host::{
     calibrate::{Calibration, Options, calibrate, outcome::FitSummary},
-    capture::{self, Capture, settings},
+    capture::{self, Capture},
     recording::{Recording, SensorKind},
 };
 use imucal_tests::{data, simulated};
@@ -19,8 +15,9 @@ fn read(name: &str) -> Option<Recording> {
 }
 
 /// A session over a whole recording.
-fn session(recording: &Recording, settings: SessionSettings) -> Box<Capture> {
-    capture::replay(recording, settings, &mut |_, _| {})
+fn session(recording: &Recording) -> Box<Capture> {
+    let task = capture::task(&recording.manifest, capture::targets(recording)).expect("units");
+    capture::replay(recording, &task, &mut |_, _| {}).expect("figures that can be")
 }
 
 /// Differences of gain and bias in standard errors of the device.
@@ -67,7 +64,7 @@ fn a_session_s_accelerometer_and_gyroscope_are_the_host_s_within_a_standard_erro
     for name in ["xsens-mti.csv.gz", "mpu9150-0.csv.gz", "mpu9150-1.csv.gz"] {
         let Some(recording) = read(name) else { return };
         let calibration = calibrate(&recording, &Options::default(), &|_| {});
-        let device = session(&recording, settings(&recording));
+        let device = session(&recording);
         let found = calibration.segmentation.as_ref().expect("rests").rests.len();
         println!("{name}: {} rests, the host {found}", device.guide().rests);
         assert!(device.poses().list().len().abs_diff(found) <= 4, "{name}");
@@ -94,7 +91,7 @@ fn a_session_accepts_and_refuses_clouds_as_the_host_does() {
         let Some(recording) = read(name) else { return };
         let recording = cloud_alone(&recording);
         let calibration = calibrate(&recording, &Options::default(), &|_| {});
-        let device = session(&recording, settings(&recording));
+        let device = session(&recording);
         let apart = compared(name, &calibration, &device, SensorKind::Mag);
         // Of 64 slots instead of all samples: apart by what the device itself states, and not by the host's errors.
         let square = apart.iter().map(|off| off * off).sum::<f64>() / apart.len().max(1) as f64;
@@ -105,7 +102,7 @@ fn a_session_accepts_and_refuses_clouds_as_the_host_does() {
 #[test]
 fn a_session_refuses_what_cannot_be_observed() {
     let Some(recording) = read("mpu6050-unobservable.csv.gz") else { return };
-    let device = session(&recording, settings(&recording));
+    let device = session(&recording);
     let accepted = device.guide().accepted;
     println!("{:?}", device.guide());
     assert_eq!(accepted, [false; 3]);
@@ -136,7 +133,7 @@ fn a_hundred_simulated_sessions_agree_with_the_host_and_their_intervals_cover() 
         .map(|seed| {
             let recording = simulated::tumbled(20, 1000 + 7 * seed);
             let calibration = calibrate(&recording, &Options::default(), &|_| {});
-            let device = session(&recording, settings(&recording));
+            let device = session(&recording);
             let mut all = [const { Vec::new() }; 4];
             for (k, kind) in [SensorKind::Acc, SensorKind::Gyr].into_iter().enumerate() {
                 let own = device.estimate(Sensor::ALL[k]).filter(|own| own.verdict.is_ok());

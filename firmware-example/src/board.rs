@@ -25,6 +25,8 @@ pub struct Sample {
     pub raw: [Option<[f32; 3]>; 3],
     /// °C; NaN where it is not known.
     pub temperature: f32,
+    /// When it was taken, µs on a clock of its own; `None`: when it comes, by the board's clock in whole ms.
+    pub time: Option<u64>,
 }
 
 /// The sensors.

@@ -65,6 +65,12 @@ impl<T: Scalar> Moments<T> {
         self.count
     }
 
+    /// Sum of the squared deviations from the mean on each axis.
+    #[inline]
+    pub fn squares(&self) -> Vector3<T> {
+        self.squares
+    }
+
     /// Mean of the samples; zero before the first.
     pub fn mean(&self) -> Vector3<T> {
         self.mean
@@ -175,6 +181,7 @@ impl<T: Scalar> Default for BlockBuilder<T> {
 
 impl<T: Scalar> BlockBuilder<T> {
     /// Takes in a rate `w_ns_s`, rad/s, that held for `duration`, s.
+    #[inline]
     pub fn push(&mut self, rate: &Vector3<T>, duration: T) {
         // By components, for the same reason as in `Moments::push`.
         let (x, y, z) = (rate.x * duration, rate.y * duration, rate.z * duration);
@@ -194,8 +201,15 @@ impl<T: Scalar> BlockBuilder<T> {
     }
 
     /// Samples taken in since the last block.
+    #[inline]
     pub fn count(&self) -> u16 {
         self.count
+    }
+
+    /// How long they held, s.
+    #[inline]
+    pub fn duration(&self) -> T {
+        self.duration
     }
 
     /// The block and its duration, s; the builder is empty afterwards.

@@ -42,7 +42,7 @@ pub fn sample(data: &[u8; DATA_LEN]) -> Sample {
     let counts = |first: usize| {
         [0, 1, 2].map(|k| words.get(first + k).map_or(0.0, |word| f32::from(i16::from_le_bytes(*word))))
     };
-    Sample { raw: [Some(counts(3)), Some(counts(0)), None], temperature: f32::NAN }
+    Sample { raw: [Some(counts(3)), Some(counts(0)), None], temperature: f32::NAN, time: None }
 }
 
 /// Why a BMI160 does not start.
@@ -95,7 +95,7 @@ where
     pub fn read(&mut self) -> Result<Sample, Error<E>> {
         let Data { accel, gyro, .. } = self.driver.data(SensorSelector::new().accel().gyro())?;
         let counts = |axes: Sensor3DData| [axes.x, axes.y, axes.z].map(f32::from);
-        Ok(Sample { raw: [accel.map(counts), gyro.map(counts), None], temperature: f32::NAN })
+        Ok(Sample { raw: [accel.map(counts), gyro.map(counts), None], temperature: f32::NAN, time: None })
     }
 
     /// Reads that failed, each of which is a sample left out; up to `u32::MAX`.

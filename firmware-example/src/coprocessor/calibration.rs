@@ -131,4 +131,22 @@ impl Calibration {
         let corrector = self.correctors.get_mut(sensor as usize)?.as_mut()?;
         Some(corrector.apply_at(&Vector3::from(raw), temperature).into())
     }
+
+    /// Corrects a sample of all sensors.
+    pub(super) fn correct_all(
+        &mut self,
+        raw: &[Option<[f32; 3]>; 3],
+        temperature: f32,
+    ) -> [Option<[f32; 3]>; 3] {
+        let mut values = [None; 3];
+        for ((value, sensor), raw) in values.iter_mut().zip(Sensor::ALL).zip(raw) {
+            *value = raw.and_then(|raw| self.correct(sensor, raw, temperature));
+        }
+        values
+    }
+
+    /// The record in use.
+    pub(super) fn record(&self) -> &CalibrationRecord {
+        &self.record
+    }
 }

@@ -1,7 +1,7 @@
 //! Work that takes many turns, and the answers that wait for it.
 
 use imucal_core::{
-    link::{Asked, Fault},
+    link::{Asked, Fault, RawSamples},
     record::Date,
 };
 
@@ -16,10 +16,16 @@ pub(super) enum Job {
     None,
     /// A record on its way into flash.
     Storing(Asked, Writing),
+    /// The record before the stored one on its way back.
+    Restoring(Asked),
     /// Slices of the fit that are left; `None`: to its end.
     Stepping(Asked, Option<u16>),
     /// A fit that has stopped, and the day.
     Judging(Asked, Date),
+    /// Samples for the session or the watch, the last first.
+    Sampling(Asked, RawSamples),
+    /// The last fits of a session, and the day.
+    Closing(Asked, Date),
 }
 
 /// An answer that waits until the link is free.
@@ -28,6 +34,9 @@ pub(super) enum Due {
     Stored(u32),
     Progress,
     Report,
+    Capture,
+    Captured,
+    Done,
     Fault(Fault),
 }
 

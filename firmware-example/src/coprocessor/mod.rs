@@ -10,18 +10,24 @@
 //! A slice is one flash operation of [`crate::storage`] or one slice of [`crate::fitting`]. A request that takes many
 //! slices is answered when it is done; until then one that would need its result is [`Fault::Busy`], and samples are
 //! corrected, from the sensors and from the host alike. The rules of the link stand in [`imucal_core::link`].
+//!
+//! With memory for it ([`Alone`]) raw samples also go into a calibration session, where one was begun, and otherwise
+//! into the drift watch. A session is lost with the power; its host sees that by [`Fault::NotReady`], and the record
+//! that was stored before is in use.
 
+mod alone;
 mod calibration;
 mod job;
 mod outgoing;
 mod requests;
+mod sampling;
 
 use embedded_storage::nor_flash::NorFlash;
 use imucal_core::{
     link::{
         Asked, Fault, FitProgress, Frame, FrameError, Guard, LastReset, Receiver, RecordState, Reply, split,
     },
-    record::{self, Date, Sensor, SensorIdentity},
+    record::{self, Date, SensorIdentity},
 };
 
 use crate::{
@@ -29,6 +35,7 @@ use crate::{
     fitting::{Finished, Fitting, Memory},
     storage::{Slots, StorageError},
 };
+pub use alone::Alone;
 use calibration::Calibration;
 use job::{Due, Job, Stream};
 use outgoing::Outgoing;
@@ -52,11 +59,12 @@ pub struct Coprocessor<
     const TURNS: usize,
     const BLOCKS: usize,
     const PARTICLES: usize,
+    const ALONE: usize = 0,
 > {
     link: L,
     receiver: Receiver,
     /// Apart from the receiver, whose bytes a request borrows.
-    device: Device<'a, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
+    device: Device<'a, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES, ALONE>,
 }
 
 /// All but the way in.
@@ -71,6 +79,7 @@ struct Device<
     const TURNS: usize,
     const BLOCKS: usize,
     const PARTICLES: usize,
+    const ALONE: usize,
 > {
     clock: C,
     sensors: S,
@@ -81,6 +90,7 @@ struct Device<
     outgoing: Outgoing,
     calibration: Calibration,
     fitting: Fitting<'a, POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
+    alone: Option<&'a mut Alone<ALONE>>,
     job: Job,
     /// Turns that bytes or samples have kept the work waiting.
     waited: u8,
@@ -105,7 +115,7 @@ impl<
     const TURNS: usize,
     const BLOCKS: usize,
     const PARTICLES: usize,
-> Coprocessor<'a, L, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES>
+> Coprocessor<'a, L, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES, 0>
 {
     /// Looks for the record in the flash; the first turn reads it. `guard` is of this start alone.
     pub fn new(
@@ -113,6 +123,42 @@ impl<
         unit: SensorIdentity,
         guard: Guard<'a>,
         memory: &'a mut Memory<POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
+    ) -> Self {
+        Self::start(board, unit, guard, memory, None)
+    }
+}
+
+impl<
+    'a,
+    L: ByteLink,
+    F: NorFlash,
+    C: Clock,
+    S: SampleSource,
+    const POINTS: usize,
+    const POSES: usize,
+    const TURNS: usize,
+    const BLOCKS: usize,
+    const PARTICLES: usize,
+    const ALONE: usize,
+> Coprocessor<'a, L, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES, ALONE>
+{
+    /// The same with memory for a session and a watch.
+    pub fn with_sessions(
+        board: Board<L, F, C, S>,
+        unit: SensorIdentity,
+        guard: Guard<'a>,
+        memory: &'a mut Memory<POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
+        alone: &'a mut Alone<ALONE>,
+    ) -> Self {
+        Self::start(board, unit, guard, memory, Some(alone))
+    }
+
+    fn start(
+        board: Board<L, F, C, S>,
+        unit: SensorIdentity,
+        guard: Guard<'a>,
+        memory: &'a mut Memory<POINTS, POSES, TURNS, BLOCKS, PARTICLES>,
+        alone: Option<&'a mut Alone<ALONE>>,
     ) -> Self {
         let Board { link, flash, clock, sensors, stack, last_reset } = board;
         let slots = Slots::open(flash).ok();
@@ -126,6 +172,7 @@ impl<
             outgoing: Outgoing::new(),
             calibration,
             fitting: Fitting::new(memory),
+            alone,
             job: Job::Booting,
             waited: 0,
             due: None,
@@ -186,7 +233,8 @@ impl<
     const TURNS: usize,
     const BLOCKS: usize,
     const PARTICLES: usize,
-> Device<'_, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES>
+    const ALONE: usize,
+> Device<'_, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES, ALONE>
 {
     /// Uses what the flash holds.
     #[inline(never)]
@@ -223,6 +271,9 @@ impl<
             Due::Progress => self.progress(),
             Due::Fault(fault) => Reply::Fault(fault),
             Due::Report => return self.answer_report(asked),
+            Due::Capture => self.capture_state(),
+            Due::Captured => self.captured(),
+            Due::Done => Reply::Done,
         };
         self.send(asked, &reply);
         true
@@ -240,6 +291,7 @@ impl<
         self.finished = self.fitting.finish().ok();
         let accepted = self.finished.as_ref().and_then(|finished| finished.accepted.as_ref());
         let adopted = accepted.map_or(Ok(()), |(sensor, triad)| self.calibration.adopt(*sensor, triad, date));
+        self.forget_watch();
         self.end(asked, adopted.map_or_else(Due::Fault, |()| Due::Report));
     }
 
@@ -284,26 +336,30 @@ impl<
     fn take_sample(&mut self) -> bool {
         let Some(sample) = self.sensors.sample() else { return false };
         self.number = self.number.wrapping_add(1);
-        let mut values = [None; 3];
-        for ((value, sensor), raw) in values.iter_mut().zip(Sensor::ALL).zip(sample.raw) {
-            *value = raw.and_then(|raw| self.calibration.correct(sensor, raw, sample.temperature));
-        }
+        let mut values = self.calibration.correct_all(&sample.raw, sample.temperature);
         self.corrected = self.corrected.saturating_add(1);
-        let number = self.number;
+        self.observe_own(&sample, &values);
+        if let Some(alone) = &self.alone {
+            alone.take_bias_of_the_day_off(&mut values);
+        }
+        self.pass_on(&values);
+        true
+    }
+
+    /// Sends a corrected sample, if its turn in a stream has come.
+    fn pass_on(&mut self, values: &[Option<[f32; 3]>; 3]) {
         // A session that is over takes its stream along.
         self.stream = self.stream.filter(|stream| self.guard.is_current(&stream.asked));
-        if let Some(stream) = &mut self.stream {
-            stream.left = stream.left.saturating_sub(1);
-            // A stream never waits: what the link does not take is left out, and the number shows it.
-            if stream.left == 0 {
-                stream.left = stream.every;
-                let asked = stream.asked;
-                if self.outgoing.is_free() {
-                    self.send(asked, &Reply::Sample { number, values });
-                }
+        let Some(stream) = &mut self.stream else { return };
+        stream.left = stream.left.saturating_sub(1);
+        // A stream never waits: what the link does not take is left out, and the number shows it.
+        if stream.left == 0 {
+            stream.left = stream.every;
+            let (asked, number) = (stream.asked, self.number);
+            if self.outgoing.is_free() {
+                self.send(asked, &Reply::Sample { number, values: *values });
             }
         }
-        true
     }
 
     /// A slice, unless something came, and not too often.
@@ -320,7 +376,8 @@ impl<
     #[inline(never)]
     fn work(&mut self) -> bool {
         match &mut self.job {
-            Job::Booting | Job::None => return false,
+            Job::Booting => return false,
+            Job::None => return self.work_at_capture(),
             Job::Storing(asked, writing) => {
                 let asked = *asked;
                 let done = match &mut self.slots {
@@ -347,6 +404,17 @@ impl<
                 let (asked, date) = (*asked, *date);
                 self.judge(asked, date);
             }
+            Job::Restoring(asked) => {
+                let asked = *asked;
+                if let Err(fault) = self.restore(asked) {
+                    self.end(asked, Due::Fault(fault));
+                }
+            }
+            Job::Sampling(..) => self.take_next(),
+            Job::Closing(asked, date) => {
+                let (asked, date) = (*asked, *date);
+                self.close_capture(asked, date);
+            }
         }
         true
     }
@@ -363,6 +431,7 @@ impl<
         let bytes = self.slots.as_mut().and_then(|slots| slots.read(&mut buffer).ok());
         self.calibration.state = bytes.map_or(RecordState::Unusable, |bytes| self.calibration.load(bytes));
         self.calibration.unsaved = false;
+        self.forget_watch();
         self.end(asked, Due::Stored(sequence));
     }
 }

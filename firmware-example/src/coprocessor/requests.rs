@@ -27,7 +27,8 @@ impl<
     const TURNS: usize,
     const BLOCKS: usize,
     const PARTICLES: usize,
-> Device<'_, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES>
+    const ALONE: usize,
+> Device<'_, F, C, S, POINTS, POSES, TURNS, BLOCKS, PARTICLES, ALONE>
 {
     /// Does what a request asks for, or says why not.
     pub(super) fn handle(&mut self, asked: Asked, request: Request<'_>) {
@@ -47,6 +48,13 @@ impl<
             }
             Request::AbortFit => self.abort(asked),
             Request::Lock | Request::Unlock => self.done(asked),
+            Request::Capture => self.capture(asked),
+            Request::Watch => self.watch(asked),
+            Request::BiasOfTheDay => {
+                let bias = self.alone.as_ref().and_then(|alone| alone.bias_of_the_day());
+                self.send(asked, &Reply::BiasOfTheDay(bias));
+                Ok(())
+            }
             _ if self.is_busy() => Err(Fault::Busy),
             Request::PutRecord { record, replace } => self.put_record(asked, record, replace),
             Request::Store { replace } => self.store(asked, replace),
@@ -54,6 +62,11 @@ impl<
             Request::Feed { index, observations } => self.feed(asked, index, &observations),
             Request::StepFit { slices } => self.step_fit(asked, slices),
             Request::FinishFit { date } => self.finish_fit(asked, date),
+            Request::StartCapture(task) => self.start_capture(asked, task),
+            Request::Samples { index, samples } => self.samples(asked, index, samples),
+            Request::FinishCapture { date } => self.finish_capture(asked, date),
+            Request::AbortCapture => self.abort_capture(asked),
+            Request::RestorePrevious { of } => self.restore_previous(asked, of),
             _ => Err(Fault::Malformed),
         };
         if let Err(fault) = done {
@@ -65,7 +78,7 @@ impl<
         !matches!(self.job, Job::None) || self.due.is_some()
     }
 
-    fn done(&mut self, asked: Asked) -> Result<(), Fault> {
+    pub(super) fn done(&mut self, asked: Asked) -> Result<(), Fault> {
         self.send(asked, &Reply::Done);
         Ok(())
     }
@@ -161,6 +174,33 @@ impl<
         })?;
         self.job = Job::Storing(asked, writing);
         Ok(())
+    }
+
+    /// Goes back in the next turn, from the bottom of the stack.
+    fn restore_previous(&mut self, asked: Asked, of: u32) -> Result<(), Fault> {
+        let slots = self.slots.as_ref().ok_or(Fault::Flash)?;
+        let sequence = slots.newest().ok_or(Fault::NoRecord)?.sequence;
+        if sequence == of {
+            self.job = Job::Restoring(asked);
+        } else {
+            self.send(asked, &Reply::Stored { sequence });
+        }
+        Ok(())
+    }
+
+    /// The record before the stored one takes its place, as a new one: the stored one is then the one before.
+    #[inline(never)]
+    pub(super) fn restore(&mut self, asked: Asked) -> Result<(), Fault> {
+        let mut buffer = [0; record::MAX_LEN];
+        let slots = self.slots.as_mut().ok_or(Fault::Flash)?;
+        let bytes = slots.read_previous(&mut buffer).map_err(|error| match error {
+            StorageError::TooLong => Fault::NewerFormat,
+            _ => Fault::Flash,
+        })?;
+        if bytes.is_empty() {
+            return Err(Fault::NoRecord);
+        }
+        self.put_record(asked, bytes, false)
     }
 
     fn start_fit(&mut self, asked: Asked, task: FitTask) -> Result<(), Fault> {

@@ -45,7 +45,7 @@ pub use ticks::Ticks;
 
 use crate::{
     board::{Board, NoSensor},
-    coprocessor::Coprocessor,
+    coprocessor::{Alone, Coprocessor},
     fitting::Memory,
 };
 
@@ -54,7 +54,14 @@ use crate::{
 pub type MachineMemory = Memory<256, 64, 48, 2048, 40>;
 /// The fits that there is memory for.
 #[cfg(microbit)]
-pub type MachineMemory = Memory<40, 12, 8, 48, 3>;
+pub type MachineMemory = Memory<40, 10, 8, 48, 3>;
+
+/// Sessions and watches that there is memory for.
+#[cfg(mps2)]
+pub type MachineAlone = Alone<1>;
+/// Sessions and watches that there is memory for.
+#[cfg(microbit)]
+pub type MachineAlone = Alone<0>;
 
 /// A run that does not feed the watchdog for so long is ended, ms: many times the longest slice of work, and the longest
 /// that [`idle`] lasts.
@@ -62,10 +69,10 @@ pub const PATIENCE: u32 = 10_000;
 
 /// The co-processor on this machine.
 #[cfg(mps2)]
-type Whole = Coprocessor<'static, Uart, Flash, Uptime, NoSensor, 256, 64, 48, 2048, 40>;
+type Whole = Coprocessor<'static, Uart, Flash, Uptime, NoSensor, 256, 64, 48, 2048, 40, 1>;
 /// See above.
 #[cfg(microbit)]
-type Whole = Coprocessor<'static, Uart, Flash, Uptime, NoSensor, 40, 12, 8, 48, 3>;
+type Whole = Coprocessor<'static, Uart, Flash, Uptime, NoSensor, 40, 10, 8, 48, 3, 0>;
 
 /// Runs the co-processor on this machine, for ever.
 pub fn run(name: &str, serial: &str, key: Option<&'static Key>) -> ! {
@@ -84,9 +91,11 @@ pub fn run(name: &str, serial: &str, key: Option<&'static Key>) -> ! {
 #[inline(never)]
 fn start(name: &str, serial: &str, guard: Guard<'static>, last_reset: LastReset) -> &'static mut Whole {
     static mut MEMORY: MachineMemory = MachineMemory::new();
+    static mut ALONE: MachineAlone = MachineAlone::new();
     static mut WHOLE: MaybeUninit<Whole> = MaybeUninit::uninit();
     // SAFETY: `run` is called once, and nothing else knows the variables.
-    let (memory, whole) = unsafe { (&mut *(&raw mut MEMORY), &mut *(&raw mut WHOLE)) };
+    let (memory, alone, whole) =
+        unsafe { (&mut *(&raw mut MEMORY), &mut *(&raw mut ALONE), &mut *(&raw mut WHOLE)) };
     let unit = imucal_core::record::SensorIdentity {
         name: name.parse().unwrap_or_default(),
         serial: serial.parse().unwrap_or_default(),
@@ -99,7 +108,7 @@ fn start(name: &str, serial: &str, guard: Guard<'static>, last_reset: LastReset)
         stack: || u32::try_from(crate::stack::deepest().0).ok(),
         last_reset,
     };
-    whole.write(Coprocessor::new(board, unit, guard, memory))
+    whole.write(Coprocessor::with_sessions(board, unit, guard, memory, alone))
 }
 
 /// A register.

@@ -3,10 +3,12 @@
 use imucal_core::record::SensorIdentity;
 
 use super::Register;
-use crate::fitting::Memory;
+use crate::{coprocessor::Alone, fitting::Memory};
 
 /// The fits that there is memory for.
 pub type BoardMemory = Memory<256, 64, 48, 2048, 40>;
+/// One session, and one watch.
+pub type BoardAlone = Alone<1>;
 
 /// Start and length of the record's region, bytes: the last four pages, beyond what memory.x gives to code.
 pub const REGION: (u32, u32) = (0x000F_C000, 0x4000);

@@ -80,6 +80,8 @@ pub struct Newest {
 pub struct Slots<F> {
     flash: F,
     newest: Option<Newest>,
+    /// The whole slot before it.
+    previous: Option<Newest>,
     lost: Option<u32>,
     newer: Option<u32>,
 }
@@ -96,7 +98,7 @@ impl<F: NorFlash> Slots<F> {
     ///
     /// [`StorageError::Unsuited`], and the flash's.
     pub fn open(flash: F) -> Result<Self, StorageError> {
-        let mut slots = Self { flash, newest: None, lost: None, newer: None };
+        let mut slots = Self { flash, newest: None, previous: None, lost: None, newer: None };
         if slots.blocks() < 2 || F::WRITE_SIZE == 0 || !PIECE.is_multiple_of(F::WRITE_SIZE) {
             return Err(StorageError::Unsuited);
         }
@@ -143,11 +145,32 @@ impl<F: NorFlash> Slots<F> {
     ///
     /// [`StorageError::TooLong`] for a record of newer firmware, and the flash's.
     pub fn read<'b>(&mut self, buffer: &'b mut [u8; record::MAX_LEN]) -> Result<&'b [u8], StorageError> {
-        let Some(newest) = self.newest else { return Ok(&[]) };
-        let bytes = buffer.get_mut(..newest.length).ok_or(StorageError::TooLong)?;
+        self.read_slot(self.newest, buffer)
+    }
+
+    /// The bytes stored before those, into a buffer; empty where nothing was. Where a block has several slots or there are
+    /// three blocks, a cut while the next record is stored leaves them too.
+    ///
+    /// # Errors
+    ///
+    /// As of [`read`](Self::read).
+    pub fn read_previous<'b>(
+        &mut self,
+        buffer: &'b mut [u8; record::MAX_LEN],
+    ) -> Result<&'b [u8], StorageError> {
+        self.read_slot(self.previous, buffer)
+    }
+
+    fn read_slot<'b>(
+        &mut self,
+        slot: Option<Newest>,
+        buffer: &'b mut [u8; record::MAX_LEN],
+    ) -> Result<&'b [u8], StorageError> {
+        let Some(slot) = slot else { return Ok(&[]) };
+        let bytes = buffer.get_mut(..slot.length).ok_or(StorageError::TooLong)?;
         let mut piece = [0; PIECE];
-        for from in (0..HEADER + newest.length).step_by(PIECE) {
-            self.flash.read((newest.at + from) as u32, &mut piece).map_err(of_flash)?;
+        for from in (0..HEADER + slot.length).step_by(PIECE) {
+            self.flash.read((slot.at + from) as u32, &mut piece).map_err(of_flash)?;
             // Of the first piece the header is left out.
             let (own, to) = (piece.get(HEADER.saturating_sub(from)..), from.saturating_sub(HEADER));
             for (slot, byte) in bytes.iter_mut().skip(to).zip(own.unwrap_or_default()) {
@@ -230,7 +253,7 @@ impl<F: NorFlash> Slots<F> {
 
     /// The record counts from now on; its sequence number.
     fn count(&mut self, writing: &Writing) -> u32 {
-        self.newest = Some(Newest {
+        self.previous = self.newest.replace(Newest {
             sequence: writing.sequence,
             length: writing.length() - HEADER - CHECKSUM,
             at: writing.at,
@@ -296,14 +319,22 @@ impl<F: NorFlash> Slots<F> {
                 Found::Nothing => {}
                 Found::Damaged(sequence) => self.lost = self.lost.max(Some(sequence)),
                 Found::Whole(sequence, length) => {
-                    if self.newest.is_none_or(|newest| sequence > newest.sequence) {
-                        let next = if own { Self::next_slot(at) } else { None };
-                        self.newest = Some(Newest { sequence, length, at, end: at + row.slot.size, next });
-                    }
+                    let next = if own { Self::next_slot(at) } else { None };
+                    self.rank(Newest { sequence, length, at, end: at + row.slot.size, next });
                 }
             }
         }
         Ok(())
+    }
+
+    /// Keeps a whole slot if it is one of the two newest.
+    fn rank(&mut self, slot: Newest) {
+        let above = |other: &Option<Newest>| other.is_none_or(|other| slot.sequence > other.sequence);
+        if above(&self.newest) {
+            self.previous = self.newest.replace(slot);
+        } else if above(&self.previous) {
+            self.previous = Some(slot);
+        }
     }
 
     /// Looks at the slots of layout 1, where no block of a later one begins.

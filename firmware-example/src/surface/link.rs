@@ -2,10 +2,12 @@
 
 use imucal_core::{
     link::{
-        self, Asked, FitModel, Frame, Guard, Header, MAX_FRAME, Nonces, Origin, Receiver, Reply, Request,
-        Seal,
+        self, Asked, CaptureSensor, CaptureTask, FitModel, Frame, Guard, Header, MAX_FRAME, Nonces, Origin,
+        RawSample, Receiver, Reply, Request, Seal,
     },
     observation::BlockBuilder,
+    record::{RawUnit, Sensor},
+    session::Session,
 };
 
 const NONCES: Nonces = Nonces { host: 1, device: 2 };
@@ -13,6 +15,7 @@ const NONCES: Nonces = Nonces { host: 1, device: 2 };
 #[inline(never)]
 pub(super) fn reach_all() {
     fits();
+    captures();
     frames();
     let mut guard = reach!(link::Guard::new(None, 7));
     asked(&mut guard, &Request::Identify { nonce: 1 }, None);
@@ -29,6 +32,27 @@ fn fits() {
     }
     let (block, duration) = BlockBuilder::default().finish();
     reach!(link::Observation::block(&block, duration));
+}
+
+/// A session by its messages.
+#[inline(never)]
+fn captures() {
+    let sensor = CaptureSensor {
+        target: 0.01,
+        full_scale: 100.0,
+        unit_in: RawUnit::Counts,
+        offset: 0.0,
+        per_unit: 100.0,
+    };
+    let task = CaptureTask { gravity: 9.8, field: None, hold: 2.0, sensors: [sensor; 3] };
+    let Some(settings) = reach!(link::CaptureTask::settings(&task)) else { return };
+    reach!(link::CaptureSensor::nominal(&sensor, [1.0; 3]));
+    reach!(link::CaptureSensor::units(&sensor, Sensor::Gyroscope));
+    let mut session: Session<8, 2, 16> = Session::new(settings);
+    let sample = RawSample { time: 0, raw: [Some([1.0; 3]); 3], temperature: 25.0 };
+    reach!(link::CaptureTask::push(&task, &mut session, &sample));
+    let state = reach!(link::CaptureState::of(&session.guide(), 1));
+    reach!(link::CaptureState::guide(&state));
 }
 
 /// What a device that cannot read a frame says.

@@ -17,6 +17,7 @@ pub(super) fn reach_all() {
     reach!(observation::Moments::count(&moments));
     reach!(observation::Moments::mean(&moments));
     reach!(observation::Moments::variance(&moments));
+    reach!(observation::Moments::squares(&moments));
     let _point: ShellPoint<f32> = reach!(observation::ShellPoint::new(sample));
     reach!(coverage::Coverage::of((0..20).map(|k| scene::spiral(k, 20))));
     blocks(&sample);
@@ -27,6 +28,7 @@ fn blocks(sample: &Vector3<f32>) {
     let mut builder: BlockBuilder<f32> = reach!(observation::BlockBuilder::default());
     reach!(observation::BlockBuilder::push(&mut builder, sample, 0.01));
     reach!(observation::BlockBuilder::count(&builder));
+    reach!(observation::BlockBuilder::duration(&builder));
     let (block, duration): (Block<f32>, f32) = reach!(observation::BlockBuilder::finish(&mut builder));
     reach!(observation::Block::join(&block, duration, &block, duration));
     reach!(observation::Block::less(&block, &Vector3::repeat(0.01), duration));

@@ -4,7 +4,7 @@ use std::{cell::RefCell, collections::VecDeque, rc::Rc};
 
 use firmware_example::{
     board::{Board, ByteLink, Clock, Sample, SampleSource},
-    coprocessor::Coprocessor,
+    coprocessor::{Alone, Coprocessor},
     fitting::Memory,
 };
 use imucal_core::{
@@ -73,7 +73,7 @@ impl SampleSource for Counting {
     fn sample(&mut self) -> Option<Sample> {
         self.count += 1.0;
         let raw = [Some([self.count; 3]), Some([self.count; 3]), None];
-        self.on.then_some(Sample { raw, temperature: 25.0 })
+        self.on.then_some(Sample { raw, temperature: 25.0, time: None })
     }
 
     fn units(&self) -> [Option<RawUnit>; 3] {
@@ -83,7 +83,7 @@ impl SampleSource for Counting {
 
 /// The sizes of the bench's fits.
 pub type BenchMemory = Memory<256, 64, 48, 512, 10>;
-type Device<'a> = Coprocessor<'a, Wire, Nor, Ticks, Counting, 256, 64, 48, 512, 10>;
+type Device<'a, S> = Coprocessor<'a, Wire, Nor, Ticks, S, 256, 64, 48, 512, 10, 1>;
 
 /// A request's frame.
 pub fn framed(session: u32, id: u32, request: &Request<'_>) -> Vec<u8> {
@@ -101,8 +101,8 @@ pub fn unit(serial: &str) -> SensorIdentity {
     SensorIdentity { name: "bench".parse().expect("short"), serial: serial.parse().expect("short") }
 }
 
-pub struct Bench<'a> {
-    pub device: Device<'a>,
+pub struct Bench<'a, S: SampleSource = Counting> {
+    pub device: Device<'a, S>,
     pub wire: Wire,
     receiver: Receiver,
     /// The session that requests are sent in.
@@ -110,9 +110,9 @@ pub struct Bench<'a> {
     next: u32,
 }
 
-impl<'a> Bench<'a> {
+impl<'a, S: SampleSource> Bench<'a, S> {
     /// With a session begun.
-    pub fn new(nor: Nor, serial: &str, sensors: Counting, memory: &'a mut BenchMemory) -> Self {
+    pub fn new(nor: Nor, serial: &str, sensors: S, memory: &'a mut BenchMemory) -> Self {
         let mut bench = Self::started(nor, serial, sensors, Guard::new(None, 1), memory);
         bench.identify(1);
         bench
@@ -122,7 +122,7 @@ impl<'a> Bench<'a> {
     pub fn started(
         nor: Nor,
         serial: &str,
-        sensors: Counting,
+        sensors: S,
         guard: Guard<'a>,
         memory: &'a mut BenchMemory,
     ) -> Self {
@@ -135,7 +135,9 @@ impl<'a> Bench<'a> {
             stack: || None,
             last_reset: LAST_RESET,
         };
-        let device = Coprocessor::new(board, unit(serial), guard, memory);
+        // For as long as the test lasts.
+        let alone = Box::leak(Box::new(Alone::new()));
+        let device = Coprocessor::with_sessions(board, unit(serial), guard, memory, alone);
         Self { device, wire, receiver: Receiver::default(), session: 0, next: 1 }
     }
 

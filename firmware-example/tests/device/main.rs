@@ -3,6 +3,7 @@
 mod adapter;
 mod bad_link;
 mod bench;
+mod capture;
 mod hostile_line;
 mod nor;
 mod rate;

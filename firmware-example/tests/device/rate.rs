@@ -166,7 +166,7 @@ fn no_sample_of_the_board_s_sensor_is_lost_during_a_fit() {
         stand.settle();
         let requests = stand.run(|stand| {
             let raw = [Some([33_000.0; 3]), Some([32_000.0; 3]), None];
-            stand.sensors.0.borrow_mut().push_back(Sample { raw, temperature: 25.0 });
+            stand.sensors.0.borrow_mut().push_back(Sample { raw, temperature: 25.0, time: None });
         });
         let replies = stand.settle();
         let sent = replies.iter().filter(|(id, reply)| *id == stream && reply.starts_with("Sample")).count();

@@ -273,3 +273,49 @@ fn a_block_of_a_newer_layout_is_known_to_be_newer_and_kept() {
     assert!(!Slots::open(&mut nor).expect("it opens").is_newer());
     assert_eq!(stored(&mut nor), b"after the downgrade");
 }
+
+#[test]
+fn the_record_before_the_last_one_is_kept_whole_through_every_block_and_power_cycle() {
+    let mut rng = ChaCha8Rng::seed_from_u64(19);
+    let mut nor = Nor::new(3);
+    let mut before: Option<Vec<u8>> = None;
+    for _ in 0..40 {
+        let now = record(&mut rng);
+        store(&mut nor, &now).expect("it is stored");
+        let mut buffer = [0; MAX_LEN];
+        let mut slots = Slots::open(&mut nor).expect("it opens");
+        let previous = slots.read_previous(&mut buffer).expect("it reads").to_vec();
+        assert_eq!(previous, before.unwrap_or_default());
+        before = Some(now);
+    }
+}
+
+#[test]
+fn a_cut_while_a_record_is_stored_loses_neither_the_last_one_nor_the_one_before() {
+    let mut rng = ChaCha8Rng::seed_from_u64(20);
+    let records: Vec<Vec<u8>> = (0..12).map(|_| record(&mut rng)).collect();
+    let mut nor = Nor::new(2);
+    for (index, now) in records.iter().enumerate() {
+        // The power goes after each operation of the next record in turn; what counts is as before.
+        for cut in 0.. {
+            let mut torn = nor.clone();
+            let mut slots = Slots::open(&mut torn).expect("it opens");
+            let mut writing = slots.begin(now).expect("room");
+            let stored = (0..=cut).any(|_| slots.step(&mut writing).expect("flash").is_some());
+            drop(slots);
+            let mut slots = Slots::open(&mut torn).expect("it opens");
+            let (mut buffer, mut other) = ([0; MAX_LEN], [0; MAX_LEN]);
+            let newest = slots.read(&mut buffer).expect("it reads").to_vec();
+            let previous = slots.read_previous(&mut other).expect("it reads").to_vec();
+            let kept = |at: usize| index.checked_sub(at).map(|at| records[at].clone()).unwrap_or_default();
+            // A whole record without its seal may count already.
+            let (was, is) = ((kept(1), kept(2)), (now.clone(), kept(1)));
+            let seen = (newest, previous);
+            assert!(seen == is || !stored && seen == was, "record {index}, cut after {cut} operations");
+            if stored {
+                nor = torn;
+                break;
+            }
+        }
+    }
+}

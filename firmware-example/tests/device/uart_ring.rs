@@ -89,7 +89,7 @@ impl SampleSource for Imu {
         }
         self.next += INTERVAL;
         pass(&self.time, READ);
-        Some(Sample { raw: [Some([33_000.0; 3]), Some([32_000.0; 3]), None], temperature: 25.0 })
+        Some(Sample { raw: [Some([33_000.0; 3]), Some([32_000.0; 3]), None], temperature: 25.0, time: None })
     }
 
     fn units(&self) -> [Option<RawUnit>; 3] {

@@ -3,7 +3,9 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use super::{FitProgress, FitReport, FitTask, Observation};
+use super::{
+    CaptureOutcome, CaptureState, CaptureTask, FitProgress, FitReport, FitTask, Observation, RawSamples,
+};
 use crate::record::{Date, Defect, RawUnit, Sensor, SensorIdentity};
 
 /// Observations of one message at the most.
@@ -83,6 +85,38 @@ pub enum Request<'a> {
     Unlock,
     /// How did the last run end? Answered by [`Reply::LastReset`].
     LastReset,
+    /// Begin a calibration session; one that is under way is given up. From then on raw samples, the device's own
+    /// and [`Request::Samples`], go into it. Answered by [`Reply::Capture`].
+    StartCapture(CaptureTask),
+    /// Raw samples for the session under way; without one for the drift watch. Answered by [`Reply::Capture`], or
+    /// [`Reply::Done`], when all have been taken.
+    Samples {
+        /// Index of the first one since the session, or without one the device, started; modulo 65 536.
+        index: u16,
+        /// The samples.
+        samples: RawSamples,
+    },
+    /// How far is the session? Answered by [`Reply::Capture`].
+    Capture,
+    /// End the session: what is accepted and surer than what is in use is used from then on, and stored by
+    /// [`Request::Store`]. Answered by [`Reply::Captured`] when the last fits are done.
+    FinishCapture {
+        /// Today, for the record.
+        date: Date,
+    },
+    /// Give the session up. Answered by [`Reply::Done`].
+    AbortCapture,
+    /// Use and store the record before the one that is stored. Answered as [`Request::PutRecord`] is; where another one
+    /// than `of` is stored already, by its number.
+    RestorePrevious {
+        /// Number of the stored record.
+        of: u32,
+    },
+    /// What has the drift watch seen? Answered by [`Reply::Watch`].
+    Watch,
+    /// What is taken off the rate of the device's own gyroscope, since it lay still after its start? Answered by
+    /// [`Reply::BiasOfTheDay`].
+    BiasOfTheDay,
 }
 
 impl Request<'_> {
@@ -96,7 +130,10 @@ impl Request<'_> {
             | Self::Correct { .. }
             | Self::Stream { .. }
             | Self::Lock
-            | Self::LastReset => false,
+            | Self::LastReset
+            | Self::Capture
+            | Self::Watch
+            | Self::BiasOfTheDay => false,
             Self::PutRecord { .. }
             | Self::StartFit(_)
             | Self::Feed { .. }
@@ -104,7 +141,12 @@ impl Request<'_> {
             | Self::FinishFit { .. }
             | Self::Store { .. }
             | Self::AbortFit
-            | Self::Unlock => true,
+            | Self::Unlock
+            | Self::StartCapture(_)
+            | Self::Samples { .. }
+            | Self::FinishCapture { .. }
+            | Self::AbortCapture
+            | Self::RestorePrevious { .. } => true,
         }
     }
 }
@@ -145,6 +187,14 @@ pub enum Reply<'a> {
     Fault(Fault),
     /// To [`Request::LastReset`].
     LastReset(LastReset),
+    /// How far the calibration session is.
+    Capture(CaptureState),
+    /// To [`Request::FinishCapture`]: accelerometer, gyroscope, magnetometer.
+    Captured([CaptureOutcome; 3]),
+    /// To [`Request::Watch`]: the bytes of a [`WatchSummary`](crate::watch::WatchSummary).
+    Watch(&'a [u8]),
+    /// To [`Request::BiasOfTheDay`]: rad/s, calibrated; `None` where nothing is taken off.
+    BiasOfTheDay(Option<[f32; 3]>),
 }
 
 /// Who a device is.
@@ -332,9 +382,12 @@ mod tests {
     use super::*;
     use crate::{
         accept::Refusal,
-        link::{FitModel, Header, MAX_FRAME, MOST_COVARIANCE, MOST_PARAMETERS, Origin, encode},
+        link::{
+            FitModel, Header, MAX_FRAME, MOST_COVARIANCE, MOST_PARAMETERS, Origin, RawSample, SAMPLES, encode,
+        },
         record,
         solver::Termination,
+        watch,
     };
 
     fn fits(message: &impl Serialize) -> bool {
@@ -371,5 +424,9 @@ mod tests {
             theta: Vec::from([1.0; MOST_PARAMETERS]),
             covariance: Vec::from([1.0; MOST_COVARIANCE]),
         })));
+        let sample = RawSample { time: u64::MAX, raw: [Some([1.0; 3]); 3], temperature: 1.0 };
+        assert!(fits(&Request::Samples { index: u16::MAX, samples: Vec::from([sample; SAMPLES]) }));
+        assert!(fits(&Reply::Captured([CaptureOutcome::Refused(refusal); 3])));
+        assert!(fits(&Reply::Watch(&[1; watch::MAX_LEN])));
     }
 }

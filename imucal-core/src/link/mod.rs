@@ -61,6 +61,7 @@
 //! | 1 | no session, flags or seal: the message follows the id. A replay after a reset was taken |
 //! | 2 | this |
 
+mod capture;
 mod fit;
 mod frame;
 mod guard;
@@ -68,6 +69,9 @@ mod key;
 mod message;
 mod session;
 
+pub use capture::{
+    Advised, CaptureOutcome, CaptureSensor, CaptureState, CaptureTask, RawSample, RawSamples, SAMPLES,
+};
 pub use fit::{FitModel, FitProgress, FitReport, FitTask, MOST_COVARIANCE, MOST_PARAMETERS, Observation};
 pub use frame::{
     Frame, FrameError, Header, MAX_FRAME, Origin, Receiver, VERSION_REFUSAL, encode, refuse_version, split,

@@ -115,6 +115,7 @@ impl<T: Scalar, const B: usize> InertialObserver<T, B> {
     }
 
     /// Takes the rate of a sample into the turn.
+    #[inline]
     fn follow(&mut self, sample: &Sample<T>) {
         // One that is missing is bridged by its neighbours.
         let Some(rate) = sample.gyr.as_ref().filter(|rate| is_finite(rate)) else { return };

@@ -114,6 +114,7 @@ impl<T: Scalar> Stretch<T> {
         }
     }
 
+    #[inline]
     fn push(&mut self, sample: &Sample<T>) {
         self.rows = self.rows.saturating_add(1);
         if sample.is_whole() {
@@ -144,10 +145,6 @@ impl<T: Scalar> Stretch<T> {
         self.broken || whole < 2 || 5 * whole < 4 * u64::from(self.rows)
     }
 
-    fn variance(&self) -> T {
-        self.acc.variance().sum()
-    }
-
     fn rest(&self) -> Rest<T> {
         let middle = self.start.midpoint(self.end) / 1000;
         let time = T::whole(u32::try_from(middle).unwrap_or(u32::MAX)) / T::whole(1000);
@@ -155,6 +152,42 @@ impl<T: Scalar> Stretch<T> {
         let temperature = self.temperature / T::whole(self.temperatures);
         Rest { time, acc: self.acc, gyr: self.gyr, temperature }
     }
+}
+
+/// Four quarters together.
+struct Window<T: Scalar> {
+    /// Variance of the specific force, sum of the axes, (m/s²)².
+    variance: T,
+    /// Mean rate, rad/s; zero without a gyroscope.
+    rate: Vector3<T>,
+}
+
+/// Four quarters together; `None` where one is broken. Only what is asked for: [`Stretch::join`] of all costs several times as much.
+fn window<T: Scalar>(quarters: [&Stretch<T>; 4]) -> Option<Window<T>> {
+    if quarters.iter().any(|quarter| quarter.is_broken()) {
+        return None;
+    }
+    let weights = |of: fn(&Stretch<T>) -> u32| quarters.map(|quarter| T::whole(of(quarter)));
+    let (acc, gyr) = (weights(|quarter| quarter.acc.count()), weights(|quarter| quarter.gyr.count()));
+    let force = weighted(quarters.map(|quarter| quarter.acc.mean()), acc);
+    let mut squares = T::zero();
+    for (quarter, weight) in quarters.into_iter().zip(acc) {
+        let (off, own) = (quarter.acc.mean() - force, quarter.acc.squares());
+        squares += weight * (off.x * off.x + off.y * off.y + off.z * off.z) + (own.x + own.y + own.z);
+    }
+    let [a, b, c, d] = acc;
+    let rate = weighted(quarters.map(|quarter| quarter.gyr.mean()), gyr);
+    Some(Window { variance: squares / (a + b + c + d - T::one()), rate })
+}
+
+/// Mean by weights; zero where all are. By components: see [`Moments::push`].
+fn weighted<T: Scalar>(means: [Vector3<T>; 4], weights: [T; 4]) -> Vector3<T> {
+    let (mut sum, mut total) = (Vector3::zeros(), T::zero());
+    for (mean, weight) in means.into_iter().zip(weights) {
+        sum = Vector3::new(sum.x + weight * mean.x, sum.y + weight * mean.y, sum.z + weight * mean.z);
+        total += weight;
+    }
+    if total > T::zero() { Vector3::new(sum.x / total, sum.y / total, sum.z / total) } else { sum }
 }
 
 /// A rest that goes on.
@@ -243,8 +276,9 @@ impl<T: Scalar> RestObserver<T> {
         };
         now.broken |= self.interval > 0 && since > self.gap;
         let last = core::mem::replace(&mut self.last, sample.time);
-        now.end = sample.time;
-        let whole = *now;
+        let mut whole = core::mem::replace(now, Stretch::new(sample.time));
+        now.push(sample);
+        whole.end = sample.time;
         // A gap before this sample is none of the intervals of the quarter.
         if let Some(interval) =
             last.saturating_sub(whole.start).checked_div(u64::from(whole.rows).saturating_sub(1))
@@ -252,10 +286,10 @@ impl<T: Scalar> RestObserver<T> {
             self.interval = interval;
             self.gap = GAP.saturating_mul(interval);
         }
-        let mut next = Stretch::new(sample.time);
-        next.push(sample);
-        self.now = Some(next);
-        self.quarter(whole)
+        let ended = self.quarter(&whole);
+        let [oldest, inner, newest] = &mut self.before;
+        *oldest = core::mem::replace(inner, newest.replace(whole));
+        ended
     }
 
     /// The rest that goes on, when no more samples come; what was gathered is forgotten, but not the quietest window.
@@ -319,19 +353,19 @@ impl<T: Scalar> RestObserver<T> {
     }
 
     /// Takes a whole quarter in.
-    fn quarter(&mut self, whole: Stretch<T>) -> Option<ObservedRest<T>> {
+    fn quarter(&mut self, whole: &Stretch<T>) -> Option<ObservedRest<T>> {
         self.quarters = self.quarters.wrapping_add(1);
-        let [oldest, inner, newest] = self.before;
-        self.before = [inner, newest, Some(whole)];
-        let quarters = [oldest?, inner?, newest?, whole];
-        let Some(variance) = self.still(&quarters) else { return self.ended() };
+        let [Some(oldest), Some(inner), Some(newest)] = &self.before else { return None };
+        let inner = *inner;
+        let window = window([oldest, &inner, newest, whole]);
+        let Some(variance) = window.and_then(|window| self.still(&window)) else { return self.ended() };
         let lasting = self.lasting.get_or_insert(Lasting { held: None, quarters: 0, noise: variance });
         lasting.noise = if variance > lasting.noise { variance } else { lasting.noise };
         // From the middle of the window before to that of this one.
         if let Some(held) = &mut lasting.held {
-            held.join(&quarters[1]);
+            held.join(&inner);
         } else {
-            lasting.held = Some(Stretch::new(quarters[1].end));
+            lasting.held = Some(Stretch::new(inner.end));
             return None;
         }
         lasting.quarters = lasting.quarters.saturating_add(1);
@@ -339,17 +373,12 @@ impl<T: Scalar> RestObserver<T> {
     }
 
     /// Variance of a window, if it is still.
-    fn still(&mut self, quarters: &[Stretch<T>; 4]) -> Option<T> {
-        if quarters.iter().any(Stretch::is_broken) {
-            return None;
-        }
-        let [mut window, rest @ ..] = *quarters;
-        rest.iter().for_each(|quarter| window.join(quarter));
-        let variance = window.variance();
+    fn still(&mut self, window: &Window<T>) -> Option<T> {
+        let variance = window.variance;
         if self.quietest.is_none_or(|quietest| variance < quietest) {
             self.quietest = Some(variance);
         }
-        (variance <= self.threshold()? && self.is_usual(window.gyr.mean())).then_some(variance)
+        (variance <= self.threshold()? && self.is_usual(window.rate)).then_some(variance)
     }
 
     /// The mean rate of a window in which the accelerometer is still is the usual one, which follows it.

@@ -7,7 +7,7 @@
 //!
 //! | symbol | meaning |
 //! | --- | --- |
-//! | C | attitude after the turn, as the product over blocks of [`FINE`] samples |
+//! | C | attitude after the turn, as the product over blocks of [`FINE`] seconds |
 //! | C_B | the same over B blocks, into which those were joined |
 //! | A, b | gain and bias of the gyroscope |
 //! | A₀, b₀ | the best known gain, nominal at first, and the usual rate of the rest before |
@@ -37,8 +37,8 @@ use crate::{
     triad::Triad,
 };
 
-/// Samples of a block before blocks are joined.
-pub const FINE: u16 = 5;
+/// How long a block lasts before blocks are joined, s: a third of a quarter of the rest's window.
+pub const FINE: f64 = 1.0 / 12.0;
 /// Quarters of a second that are kept while a rest lasts.
 const KEPT: usize = 3;
 
@@ -196,6 +196,7 @@ impl<T: Scalar, const B: usize> TurnObserver<T, B> {
 
     /// Takes a rate `w_ns_s` in, rad/s, that was measured `since` s after the one before. It is held from half-way after the one
     /// before to half-way before the next.
+    #[inline]
     pub fn push(&mut self, rate: &Vector3<T>, since: T) {
         if matches!(self.way, Way::Lost) {
             return;
@@ -203,7 +204,8 @@ impl<T: Scalar, const B: usize> TurnObserver<T, B> {
         let half = since * T::of(0.5);
         if let Some((before, earlier)) = self.held.replace((*rate, half)) {
             self.builder.push(&before, earlier + half);
-            if self.builder.count() >= FINE {
+            // At rest a quarter turns by so little that it is one block.
+            if self.builder.duration() >= T::of(FINE) && matches!(self.way, Way::Turning(..)) {
                 self.block();
             }
         }

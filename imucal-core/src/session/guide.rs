@@ -8,12 +8,14 @@
 //! A session ends at its targets, standard errors as shares of a vector's length, and not after a number of poses.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use super::{Session, estimate::Estimate, poses::unit};
 use crate::{coverage, observer::rest::Stage, record::Sensor};
 
 /// What was not used, and why.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Thrown {
     /// Rests that were too short or too noisy.
     pub rests: u16,
@@ -53,6 +55,8 @@ pub struct Guide {
     pub turns: u16,
     /// Points of the magnetometer's cloud.
     pub points: u16,
+    /// Share of the sphere of directions that the rests of the accelerometer's last fit cover; 0 before it.
+    pub coverage: f32,
     /// Expected error of a calibrated vector of each sensor, as a share of its length; `None` before its first fit.
     pub error: [Option<f32>; 3],
     /// Whether it is accepted as it is.
@@ -81,6 +85,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             rests: count(self.poses.list().len()),
             turns: count(turns),
             points: count(self.cloud.slots().len()),
+            coverage: of(Sensor::Accelerometer).map_or(0.0, |acc| acc.summary.coverage.share),
             error: Sensor::ALL.map(|sensor| of(sensor).map(|estimate| estimate.error)),
             accepted: Sensor::ALL.map(|sensor| of(sensor).is_some_and(|estimate| estimate.verdict.is_ok())),
             never_still: self.poses.list().is_empty()

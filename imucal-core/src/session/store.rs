@@ -12,7 +12,6 @@ use super::{
 use crate::{
     accept::{Refusal, relative_error},
     fit::Units,
-    observation::Rest,
     record::{Sensor, TriadRecord},
     triad::Triad,
 };
@@ -90,24 +89,68 @@ pub fn stated_error(record: &TriadRecord, length: f32) -> f32 {
     relative_error(&gain, &std, length * libm::sqrtf(3.0 / gain.norm_squared()))
 }
 
-/// The gyroscope's bias of the day from a rest at start-up, raw unit of the record: less `stored` where it differs by more than
-/// three standard errors of both, `None` where it does not, or where the rest turned (its rates spread more than `most`, rad/s).
+/// What a gyroscope shows at rest after a start beyond its record: the calibrated rate to take off, rad/s; `None` where it is
+/// within three standard errors of the record and of the rest, or beyond `most` on any axis, rad/s.
 ///
-/// A bias that is further off than a record may be wrong by is none: the sensor is turned steadily, or is another one.
+/// A rate that is further off than a bias moves from day to day is none: the sensor is turned steadily, or is another one.
+/// Earth's rate is part of what is taken off. `still`: calibrated by `stored`.
 #[inline]
-pub fn bias_of_the_day(rest: &Rest<f32>, stored: &TriadRecord, units: &Units, most: f32) -> Option<[f32; 3]> {
-    let count = rest.gyr.count();
-    let variance = rest.gyr.variance();
-    let mean = RestBias::of(core::iter::once(MeanRate {
-        mean: rest.gyr.mean(),
-        variance: variance / (count.max(1) as f32),
-        count,
-    }))?;
-    let now = mean.mean * units.per_unit + Vector3::repeat(units.offset);
-    let off = now - Vector3::from(stored.bias);
-    let error = Vector3::from(stored.quality.bias_std).zip_map(&(mean.std() * units.per_unit), libm::hypotf);
-    let moved = off.iter().zip(error.iter()).any(|(off, error)| libm::fabsf(*off) > 3.0 * error);
-    let limit = libm::fabsf(most * units.per_unit);
-    let possible = off.iter().all(|off| libm::fabsf(*off) <= limit);
-    (moved && possible).then(|| now.into())
+pub fn bias_of_the_day(still: &MeanRate<f32>, stored: &TriadRecord, most: f32) -> Option<Vector3<f32>> {
+    let bias = RestBias::of(core::iter::once(*still))?;
+    let gain = stored.triad::<f32>().gain;
+    let stated = Vector3::from(stored.quality.bias_std);
+    let squares = gain.component_mul(&gain) * stated.component_mul(&stated);
+    let error = bias.std().zip_map(&squares, |rest, stated| libm::sqrtf(rest * rest + stated));
+    let moved = bias.mean.iter().zip(error.iter()).any(|(rate, error)| libm::fabsf(*rate) > 3.0 * error);
+    let possible = bias.mean.iter().all(|rate| libm::fabsf(*rate) <= most);
+    (moved && possible).then_some(bias.mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{FitQuality, RawUnit};
+
+    /// A gyroscope in counts, a thousand a rad/s, whose bias is known to 2 counts.
+    fn stored() -> TriadRecord {
+        let quality = FitQuality {
+            gain_std: [[0.0; 3]; 3],
+            bias_std: [2.0; 3],
+            rms: 0.0,
+            held_out_rms: None,
+            observations: 9,
+            parameters: 9,
+            condition: 1.0,
+            coverage: 1.0,
+            field_norm: None,
+        };
+        TriadRecord {
+            gain: [[1e-3, 0.0, 0.0], [0.0, 1e-3, 0.0], [0.0, 0.0, 1e-3]],
+            bias: [0.0; 3],
+            unit_in: RawUnit::Counts,
+            unit_out: RawUnit::RadianPerSecond,
+            model: "K9".parse().unwrap_or_default(),
+            temperature: None,
+            quality,
+            order: Default::default(),
+        }
+    }
+
+    fn still(z: f32, variance: f32) -> MeanRate<f32> {
+        MeanRate { mean: Vector3::new(0.0, 0.0, z), variance: Vector3::repeat(variance), count: 1 }
+    }
+
+    #[test]
+    fn a_rate_at_rest_beyond_three_standard_errors_of_both_is_taken_off() {
+        // Of the record 2e-3 rad/s, of the rest 1.5e-3: together 2.5e-3.
+        assert_eq!(bias_of_the_day(&still(7.4e-3, 2.25e-6), &stored(), 0.02), None);
+        let rate = bias_of_the_day(&still(7.6e-3, 2.25e-6), &stored(), 0.02);
+        assert_eq!(rate, Some(Vector3::new(0.0, 0.0, 7.6e-3)));
+    }
+
+    #[test]
+    fn a_rate_that_no_bias_reaches_is_a_turn_and_not_taken_off() {
+        assert_eq!(bias_of_the_day(&still(0.021, 1e-8), &stored(), 0.02), None);
+        assert_eq!(bias_of_the_day(&still(f32::NAN, 1e-8), &stored(), 0.02), None);
+    }
 }

@@ -3,6 +3,7 @@
 //! The messages stand in [`imucal_core::link`]; here are the line, and who asks and waits for the answer.
 
 mod address;
+pub mod capture;
 pub mod fit;
 mod line;
 mod qemu;
@@ -94,7 +95,10 @@ fn of_fault(fault: &Fault) -> String {
         Fault::Full => "it has no room for so many observations; feed fewer".into(),
         Fault::Flash => "its flash did not take the record, and the last one is still there".into(),
         Fault::Busy => "it is still at work on another request; ask again".into(),
-        Fault::NotReady => "no fit was begun, or it has not stopped".into(),
+        Fault::NotReady => {
+            "no fit or session is under way, or it has not come so far; after a start of the device begin again".into()
+        }
+        Fault::Unsuited => "it has no memory for that, or does not fit that model".into(),
         Fault::Session => {
             "it is in another session: it has started again, or another program talks to it; run the command again"
                 .into()

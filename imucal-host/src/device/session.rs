@@ -165,11 +165,11 @@ impl Session {
         self.done(&Request::Unlock)
     }
 
-    fn done(&mut self, request: &Request<'_>) -> Result<(), DeviceError> {
+    pub(super) fn done(&mut self, request: &Request<'_>) -> Result<(), DeviceError> {
         self.ask(request, "that it is done", |reply| matches!(reply, Reply::Done).then_some(()))
     }
 
-    fn store(&mut self, request: &Request<'_>) -> Result<u32, DeviceError> {
+    pub(super) fn store(&mut self, request: &Request<'_>) -> Result<u32, DeviceError> {
         self.ask_within(FLASH_PATIENCE, request, "that it is stored", |reply| match reply {
             Reply::Stored { sequence } => Some(*sequence),
             _ => None,

@@ -1,13 +1,16 @@
 //! The guide of a session, in sentences.
 
-use imucal_core::{coverage::Coverage, session::guide::Advice};
+use imucal_core::session::{
+    SessionSettings,
+    guide::{Advice, Guide},
+};
 use nalgebra::Vector3;
 
 use super::{
     measure::{plain, rounded},
     table::words,
 };
-use crate::{capture::Capture, recording::SensorKind};
+use crate::recording::SensorKind;
 
 /// An axis whose share of a direction is below this does not belong to it.
 const SHARE: f32 = 0.3;
@@ -43,8 +46,7 @@ fn pointing(direction: &Vector3<f32>) -> String {
 }
 
 /// One line: when, what there is so far, what to do next.
-pub fn line(time: f64, session: &Capture, recorded: &[SensorKind]) -> String {
-    let guide = session.guide();
+pub fn line(time: f64, guide: &Guide, hold: f32, recorded: &[SensorKind]) -> String {
     let sure: String = recorded
         .iter()
         // An error as large as the vector itself says no more than that there is none yet.
@@ -52,7 +54,7 @@ pub fn line(time: f64, session: &Capture, recorded: &[SensorKind]) -> String {
         .map(|(kind, error)| format!(", {kind} {} %", percent(error)))
         .collect();
     let never = if guide.never_still { " (it has moved since the beginning)" } else { "" };
-    let next = advice(&guide.advice, session.settings().hold);
+    let next = advice(&guide.advice, hold);
     format!("{:>8} s  {}{sure}: {next}{never}", rounded(time, 1), counted(guide.rests, "pose"))
 }
 
@@ -61,9 +63,7 @@ fn counted(count: u16, what: &str) -> String {
 }
 
 /// How sure each recorded sensor is, what is covered, and what was thrown away; ends its lines.
-pub fn state(session: &Capture, recorded: &[SensorKind]) -> String {
-    let guide = session.guide();
-    let settings = session.settings();
+pub fn state(guide: &Guide, settings: &SessionSettings, recorded: &[SensorKind]) -> String {
     let mut text = String::new();
     for kind in recorded {
         let at = *kind as usize;
@@ -74,11 +74,9 @@ pub fn state(session: &Capture, recorded: &[SensorKind]) -> String {
         });
         text += &format!("  {:<14} {sure}; target {} %\n", words(*kind), percent(target));
     }
-    let directions = session.poses().list().iter().map(|pose| pose.acc / pose.acc.norm());
-    let covered = Coverage::of(directions).share;
     text += &format!(
         "  coverage       {:.0} % of the directions by {}; {}, {} of the field\n",
-        100.0 * covered,
+        100.0 * guide.coverage,
         counted(guide.rests, "pose"),
         counted(guide.turns, "turn"),
         counted(guide.points, "place")

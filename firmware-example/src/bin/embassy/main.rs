@@ -32,8 +32,8 @@ mod tasks {
             exchange::Exchange,
             region::Region,
         },
-        board::{Board, Clock},
-        coprocessor::Coprocessor,
+        board::{Board, Clock, Sample},
+        coprocessor::{Alone, Coprocessor},
         fitting::Memory,
         log,
         machine::{PATIENCE, Watchdog, nrf52840, reset},
@@ -92,7 +92,7 @@ mod tasks {
             }
             Timer::at(due).await;
             if let Ok(sample) = sensor.read().await {
-                EXCHANGE.offer(sample);
+                EXCHANGE.offer(Sample { time: Some(Instant::now().as_micros()), ..sample });
             }
         }
     }
@@ -100,11 +100,13 @@ mod tasks {
     #[embassy_executor::main]
     async fn main(spawner: Spawner) {
         static mut MEMORY: nrf52840::BoardMemory = Memory::new();
+        static mut ALONE: nrf52840::BoardAlone = Alone::new();
         static mut UART: [[u8; 1024]; 2] = [[0; 1024]; 2];
         static mut BUS: [u8; 16] = [0; 16];
         // SAFETY: this runs once, and nothing else knows the variables.
-        let (memory, [uart_in, uart_out], bus_memory) =
-            unsafe { (&mut *(&raw mut MEMORY), &mut *(&raw mut UART), &mut *(&raw mut BUS)) };
+        let (memory, alone) = unsafe { (&mut *(&raw mut MEMORY), &mut *(&raw mut ALONE)) };
+        // SAFETY: as above.
+        let ([uart_in, uart_out], bus_memory) = unsafe { (&mut *(&raw mut UART), &mut *(&raw mut BUS)) };
         let last_reset = reset::last();
         log::started(&last_reset);
         let mut config = Config::default();
@@ -154,7 +156,7 @@ mod tasks {
             stack: || u32::try_from(stack::deepest().0).ok(),
             last_reset,
         };
-        let mut coprocessor = Coprocessor::new(board, nrf52840::unit(), guard, memory);
+        let mut coprocessor = Coprocessor::with_sessions(board, nrf52840::unit(), guard, memory, alone);
         let watchdog = Watchdog::start(PATIENCE);
         let poll = || {
             watchdog.feed();

@@ -29,7 +29,7 @@ mod board {
 
     use firmware_example::{
         board::Board,
-        coprocessor::Coprocessor,
+        coprocessor::{Alone, Coprocessor},
         fitting::Memory,
         log,
         machine::{PATIENCE, Ticks, Watchdog, nrf52840, reset},
@@ -54,11 +54,13 @@ mod board {
 
     pub fn run() -> ! {
         static mut MEMORY: nrf52840::BoardMemory = Memory::new();
+        static mut ALONE: nrf52840::BoardAlone = Alone::new();
         static mut UART: UartMemory = UartMemory::new();
         static mut IMU: ImuMemory = ImuMemory::new();
         // SAFETY: the entry point calls this once, and nothing else knows the variables.
-        let (memory, uart_memory, imu_memory) =
-            unsafe { (&mut *(&raw mut MEMORY), &mut *(&raw mut UART), &mut *(&raw mut IMU)) };
+        let (memory, alone) = unsafe { (&mut *(&raw mut MEMORY), &mut *(&raw mut ALONE)) };
+        // SAFETY: as above.
+        let (uart_memory, imu_memory) = unsafe { (&mut *(&raw mut UART), &mut *(&raw mut IMU)) };
         let last_reset = reset::last();
         log::started(&last_reset);
         let Some(chip) = Peripherals::take() else { cortex_m::peripheral::SCB::sys_reset() };
@@ -90,7 +92,7 @@ mod board {
             stack: || u32::try_from(stack::deepest().0).ok(),
             last_reset,
         };
-        let mut coprocessor = Coprocessor::new(board, unit, guard, memory);
+        let mut coprocessor = Coprocessor::with_sessions(board, unit, guard, memory, alone);
         let watchdog = Watchdog::start(PATIENCE);
         loop {
             watchdog.feed();

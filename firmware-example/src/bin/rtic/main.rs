@@ -37,8 +37,8 @@ mod app {
             bmi160::{BlockingImu, UNITS},
             exchange::{Exchange, ExchangeSensors},
         },
-        board::Board,
-        coprocessor::Coprocessor,
+        board::{Board, Sample},
+        coprocessor::{Alone, Coprocessor},
         fitting::Memory,
         log,
         machine::{PATIENCE, Ticks, Watchdog, nrf52840, reset},
@@ -61,7 +61,7 @@ mod app {
 
     type Samples = Exchange<CriticalSectionRawMutex, 1, 1, 8>;
     type Sensors = ExchangeSensors<'static, CriticalSectionRawMutex, 1, 1, 8>;
-    type Whole = Coprocessor<'static, Serial, Nvmc<NVMC>, Ticks, Sensors, 256, 64, 48, 2048, 40>;
+    type Whole = Coprocessor<'static, Serial, Nvmc<NVMC>, Ticks, Sensors, 256, 64, 48, 2048, 40, 1>;
     type Imu = BlockingImu<I2cInterface<Twim<TWIM0>>, fn() -> bool>;
 
     /// From `imu` to `idle`.
@@ -76,7 +76,11 @@ mod app {
         sensor: Option<Imu>,
     }
 
-    #[init(local = [memory: nrf52840::BoardMemory = Memory::new(), uart: UartMemory = UartMemory::new()])]
+    #[init(local = [
+        memory: nrf52840::BoardMemory = Memory::new(),
+        alone: nrf52840::BoardAlone = Alone::new(),
+        uart: UartMemory = UartMemory::new()
+    ])]
     fn init(context: init::Context) -> (Shared, Local) {
         let last_reset = reset::last();
         log::started(&last_reset);
@@ -113,7 +117,8 @@ mod app {
         };
         // A number of this start alone.
         let guard = Guard::new(None, Rng::new(chip.RNG).random_u64());
-        let coprocessor = Coprocessor::new(board, nrf52840::unit(), guard, context.local.memory);
+        let (memory, alone) = (context.local.memory, context.local.alone);
+        let coprocessor = Coprocessor::with_sessions(board, nrf52840::unit(), guard, memory, alone);
         let _first = imu::spawn();
         (Shared {}, Local { coprocessor, sensor })
     }
@@ -130,7 +135,8 @@ mod app {
             }
             Mono::delay_until(due).await;
             if let Ok(sample) = sensor.read() {
-                SAMPLES.offer(sample);
+                let time = Some(Mono::now().duration_since_epoch().to_micros());
+                SAMPLES.offer(Sample { time, ..sample });
             }
         }
     }

@@ -191,7 +191,7 @@ fn the_newest_samples_are_kept_in_their_order_and_the_others_counted() {
     let mut sensors = exchange.sensors(units);
     assert_eq!((sensors.units(), sensors.sample()), (units, None));
     for number in 0..5 {
-        exchange.offer(Sample { raw: [Some([number as f32; 3]), None, None], temperature: 25.0 });
+        exchange.offer(Sample { raw: [Some([number as f32; 3]), None, None], temperature: 25.0, time: None });
     }
     let kept: Vec<_> = std::iter::from_fn(|| sensors.sample()).map(|sample| sample.raw[0]).collect();
     assert_eq!(kept, [2.0, 3.0, 4.0].map(|number| Some([number; 3])));

@@ -1,5 +1,7 @@
 //! `imucal device`
 
+mod watch;
+
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -51,6 +53,10 @@ enum Command {
     Lock(Place),
     /// Allow changes again; needs the device's key
     Unlock(Place),
+    /// Go back to the record that was stored before the last one
+    Restore(Place),
+    /// Print what the device's drift watch has seen since its start
+    Watch(watch::Arguments),
 }
 
 /// Where the device is.
@@ -170,6 +176,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Command::Calibrate(arguments) => fit(arguments),
         Command::Lock(place) => lock(place),
         Command::Unlock(place) => unlock(place),
+        Command::Restore(place) => restore(place),
+        Command::Watch(arguments) => watch::run(arguments),
     })
 }
 
@@ -212,6 +220,11 @@ fn identify(place: &Place) -> anyhow::Result<Ending> {
         Some(last) => say!("up for {seconds} s since {}", named_reset(&last)),
         None => say!("up for {seconds} s"),
     }
+    if let Some([x, y, z]) = session.bias_of_the_day()? {
+        say!(
+            "taken off the rate since the start: {x:.6}, {y:.6}, {z:.6} rad/s, as its gyroscope showed at rest"
+        );
+    }
     Ok(Ending::Done)
 }
 
@@ -224,6 +237,14 @@ fn lock(place: &Place) -> anyhow::Result<Ending> {
 fn unlock(place: &Place) -> anyhow::Result<Ending> {
     place.open()?.unlock()?;
     say!("unlocked: it takes changes again");
+    Ok(Ending::Done)
+}
+
+fn restore(place: &Place) -> anyhow::Result<Ending> {
+    let Some(sequence) = place.open()?.restore_previous()? else {
+        return Ok(refuse(&"no record is stored before the last one"));
+    };
+    say!("the record before the last one is in use again, stored as record {sequence}");
     Ok(Ending::Done)
 }
 

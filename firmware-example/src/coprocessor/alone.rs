@@ -1,0 +1,212 @@
+//! What the co-processor does without its host's observations: a calibration session, the drift watch, and the
+//! gyroscope's bias of the day.
+
+use heapless::Vec;
+use imucal_core::{
+    link::{CaptureOutcome, CaptureState, CaptureTask, Fault, RawSample},
+    observer::{
+        self,
+        rest::{RestObserver, RestSettings, Stage},
+    },
+    record::{CalibrationRecord, RawUnit, Sensor, TriadRecord},
+    session::{bias::MeanRate, store::bias_of_the_day},
+    watch::{CalibratedSample, Look, LookObserver, Watch, WatchSettings, WatchSummary},
+};
+use nalgebra::Vector3;
+
+use crate::standalone::Standalone;
+
+/// A gyroscope's bias moves less than this from day to day, rad/s.
+const MOST: f32 = 0.02;
+
+/// The memory of `N` sessions and watches: one, or none on a board without the room.
+#[derive(Clone, Debug)]
+pub struct Alone<const N: usize> {
+    captures: Vec<Capture, N>,
+    watches: Vec<Watching, N>,
+    /// Samples of the link that went into watches.
+    watched: u16,
+    /// Rate at rest that is taken off the board's own samples, rad/s.
+    of_the_day: Option<Vector3<f32>>,
+}
+
+/// A session under way.
+#[derive(Clone, Debug)]
+pub(super) struct Capture {
+    pub(super) session: Standalone,
+    pub(super) task: CaptureTask,
+    /// Samples taken.
+    taken: u32,
+    /// What it came to, once it is over.
+    pub(super) outcomes: Option<[CaptureOutcome; 3]>,
+}
+
+/// A watch under way.
+#[derive(Clone, Debug)]
+struct Watching {
+    rests: RestObserver<f32>,
+    looks: LookObserver,
+    watch: Watch,
+}
+
+impl<const N: usize> Default for Alone<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const N: usize> Alone<N> {
+    /// Neither session nor watch. Nothing but zeros, so that a `static` costs no flash.
+    pub const fn new() -> Self {
+        Self { captures: Vec::new(), watches: Vec::new(), watched: 0, of_the_day: None }
+    }
+
+    /// Begins a session; one that is under way is given up.
+    ///
+    /// # Errors
+    ///
+    /// [`Fault::Unsuited`] without memory for one, [`Fault::Malformed`] for figures that cannot be.
+    pub(super) fn begin(&mut self, task: CaptureTask) -> Result<(), Fault> {
+        if N == 0 {
+            return Err(Fault::Unsuited);
+        }
+        let settings = task.settings().ok_or(Fault::Malformed)?;
+        self.captures.clear();
+        let _room = self.captures.push(Capture {
+            session: Standalone::new(settings),
+            task,
+            taken: 0,
+            outcomes: None,
+        });
+        Ok(())
+    }
+
+    /// Gives the session up.
+    pub(super) fn end(&mut self) {
+        self.captures.clear();
+    }
+
+    /// The session under way. Of a board without the memory nothing that it would need is linked.
+    #[inline]
+    pub(super) fn capture(&mut self) -> Option<&mut Capture> {
+        if N == 0 {
+            return None;
+        }
+        self.captures.first_mut().filter(|capture| capture.outcomes.is_none())
+    }
+
+    /// What the session that is over came to.
+    pub(super) fn outcomes(&self) -> Option<[CaptureOutcome; 3]> {
+        self.captures.first()?.outcomes
+    }
+
+    /// What was watched and taken off belongs to the calibration before.
+    pub(super) fn forget_watch(&mut self) {
+        self.watches.clear();
+        self.of_the_day = None;
+    }
+
+    /// Index of the next sample of the link.
+    pub(super) fn next(&mut self) -> u16 {
+        let watched = self.watched;
+        self.capture().map_or(watched, |capture| capture.taken as u16)
+    }
+
+    /// Counts a sample of the link that goes into the watch.
+    pub(super) fn count(&mut self) {
+        self.watched = self.watched.wrapping_add(1);
+    }
+
+    /// Rate that is taken off, rad/s.
+    pub(super) fn bias_of_the_day(&self) -> Option<[f32; 3]> {
+        self.of_the_day.map(Into::into)
+    }
+
+    /// The gyroscope lay still and showed this rate. The first one counts until another calibration is used: what moves
+    /// later is the watch's to find.
+    pub(super) fn found_at_rest(&mut self, rate: Vector3<f32>) {
+        self.of_the_day.get_or_insert(rate);
+    }
+
+    /// Takes it off a corrected sample.
+    pub(super) fn take_bias_of_the_day_off(&self, values: &mut [Option<[f32; 3]>; 3]) {
+        if let (Some(rate), [_, Some(gyr), _]) = (self.of_the_day, values) {
+            *gyr = (Vector3::from(*gyr) - rate).into();
+        }
+    }
+
+    /// What the watch has seen; `None` where nothing is watched.
+    pub(super) fn summary(&self) -> Option<WatchSummary> {
+        self.watches.first().filter(|_| N > 0).map(|watching| watching.watch.summary())
+    }
+
+    /// Takes a calibrated sample of the record into the watch, which begins with the first one. The bias of the day, once the
+    /// gyroscope lay still for it.
+    #[inline(never)]
+    pub(super) fn watch(
+        &mut self,
+        record: &CalibrationRecord,
+        time: u64,
+        values: &[Option<[f32; 3]>; 3],
+        temperature: f32,
+    ) -> Option<Vector3<f32>> {
+        if N == 0 {
+            return None;
+        }
+        let [Some(acc), gyr, mag] = values.map(|value| value.map(Vector3::from)) else { return None };
+        if self.watches.is_empty() {
+            self.start_watch(record);
+        }
+        let watching = self.watches.first_mut()?;
+        let kelvin = Some(temperature).filter(|value| value.is_finite());
+        let _rest = watching.rests.push(&observer::Sample { time, acc, gyr, temperature: kelvin });
+        let still = watching.rests.stage() != Stage::Moving;
+        let sample = CalibratedSample { time, acc, gyr, mag, temperature };
+        let look = watching.looks.push(&sample, still)?;
+        watching.watch.push(&look);
+        of_the_day(&look, record.gyr.as_ref()?)
+    }
+
+    /// Out of line: a watch is larger than a stack's frame should be.
+    #[inline(never)]
+    fn start_watch(&mut self, record: &CalibrationRecord) {
+        if !is_si(record) {
+            return;
+        }
+        let _room = self.watches.push(Watching {
+            rests: RestObserver::new(RestSettings::default()),
+            looks: LookObserver::default(),
+            watch: Watch::new(record, WatchSettings::default()),
+        });
+    }
+}
+
+/// What the watch expects is in m/s², rad/s and µT.
+fn is_si(record: &CalibrationRecord) -> bool {
+    let units = |(sensor, triad): (Sensor, &TriadRecord)| match sensor {
+        Sensor::Accelerometer => triad.unit_out == RawUnit::MetrePerSecondSquared,
+        Sensor::Gyroscope => triad.unit_out == RawUnit::RadianPerSecond,
+        Sensor::Magnetometer => matches!(triad.unit_out, RawUnit::MicroTesla | RawUnit::Arbitrary),
+    };
+    record.triads().all(units)
+}
+
+fn of_the_day(look: &Look, stored: &TriadRecord) -> Option<Vector3<f32>> {
+    let mean = look.gyr?;
+    let rate = MeanRate { mean: mean.value, variance: mean.variance, count: 1 };
+    bias_of_the_day(&rate, stored, MOST)
+}
+
+impl Capture {
+    /// Takes a raw sample in.
+    pub(super) fn push(&mut self, sample: &RawSample) {
+        self.task.push(&mut self.session, sample);
+        self.taken = self.taken.wrapping_add(1);
+    }
+
+    /// How far it is.
+    #[inline(never)]
+    pub(super) fn state(&self) -> CaptureState {
+        CaptureState::of(&self.session.guide(), self.taken)
+    }
+}
