@@ -198,15 +198,15 @@ fn two_parts_of_one_recording_seldom_differ() {
     for name in HAND.into_iter().chain(["broad-01-undisturbed"]) {
         let Some(recording) = read(name) else { return };
         for (how, [one, other]) in splits(&recording, HAND.contains(&name)) {
+            // What either part shows on its own is no difference between the two: that of the part calibrated has bent its
+            // model.
+            let own = [&one, &other].map(|part| without(part, &[]));
+            let own: Vec<&str> = own.iter().flat_map(names).collect();
             for (direction, calibrated, diagnosed) in [("forth", &one, &other), ("back", &other, &one)] {
                 let model = model(calibrated);
                 let told = if HAND.contains(&name) { SensorKind::Acc } else { SensorKind::Gyr };
                 assert!(model.triad(told).is_some(), "{name} {how} {direction}: no model");
                 let diagnosis = against(diagnosed, &model);
-                let own = [calibrated, diagnosed].map(|part| without(part, &[]));
-                let own: Vec<&str> = own.iter().flat_map(names).collect();
-                // What either part shows on its own is no difference between the two: that of the part calibrated has
-                // bent its model.
                 let differing: Vec<&str> =
                     names(&diagnosis).into_iter().filter(|id| !own.contains(id)).collect();
                 count += 1;

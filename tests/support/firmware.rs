@@ -37,7 +37,14 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// # Panics
 ///
 /// Where they cannot, but must: with `CI=true`, or `IMUCAL_FIRMWARE=required` as `tests/run` sets it.
+///
+/// Skipped loudly with `IMUCAL_FIRMWARE=elsewhere`: `tests/run` runs these tests in a process of their own, at the same time as the
+/// others, since an image links on one core.
 pub fn ready() -> bool {
+    if std::env::var("IMUCAL_FIRMWARE").is_ok_and(|where_to| where_to == "elsewhere") {
+        announce("\n*** NOT TESTED HERE: firmware. tests/run tests it in another process. ***\n");
+        return false;
+    }
     let missing = missing();
     if missing.is_empty() {
         return true;
