@@ -66,6 +66,8 @@ pub mod calibrate;
 
 pub mod store;
 
+pub mod compare;
+
 pub mod apply;
 
 pub mod capture;

@@ -10,12 +10,14 @@ use tempfile::TempDir;
 
 mod applying;
 mod capturing;
+mod comparing;
 mod end_to_end;
 mod exit_status;
 mod importing;
 #[cfg(unix)]
 mod interrupting;
 mod json_contract;
+mod mapping;
 mod outputs;
 mod overwriting;
 mod printing;

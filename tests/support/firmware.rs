@@ -29,8 +29,8 @@ pub const MEASURED: [Board; 2] = [BOARDS[0], BOARDS[1]];
 /// Another architecture, without a floating-point unit and without a board around it: it runs what the core computes.
 pub const RISC_V: Board = Board { target: "riscv32imac-unknown-none-elf", core: "RV32IMAC", machine: "virt" };
 
-/// An image that has not ended by then hangs: it takes milliseconds.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// An image that has not ended by then hangs: it takes milliseconds, and a wait for the build of another one a minute or two.
+const PATIENCE: Duration = Duration::from_secs(300);
 
 /// Can images be built and run here? If not, says so where nobody can overlook it.
 ///

@@ -8,10 +8,11 @@ use std::{
 use clap::Args;
 
 use super::{
-    Ending, load,
+    Ending,
+    columns::{self, Columns},
+    load,
     output::say,
     overwrite::{Overwrite, Planned, files_of},
-    read,
     reading::Reading,
     refuse, warn,
 };
@@ -33,6 +34,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     overwrite: Overwrite,
     #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
     reading: Reading,
 }
 
@@ -41,7 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut inputs = files_of(&arguments.recording);
     inputs.push(arguments.calibration.clone());
     let mut files = arguments.overwrite.plan(&inputs, &Planned::recording(&out))?;
-    let recording = read(&arguments.recording, arguments.reading)?;
+    let recording = columns::read(&arguments.recording, &arguments.columns, arguments.reading)?;
     let stored = match load(&arguments.calibration, arguments.reading)? {
         Ok(stored) => stored,
         Err(damaged) => return Ok(refuse(&damaged)),

@@ -6,10 +6,11 @@ use clap::Args;
 use imucal_core::record::Date;
 
 use super::{
-    Ending, output,
+    Ending,
+    columns::{self, Columns},
+    output,
     overwrite::{Overwrite, Planned, files_of},
     progress::Progress,
-    read,
     reading::Reading,
     warn,
 };
@@ -61,6 +62,8 @@ pub(super) struct Arguments {
     accept_suspect: bool,
     #[command(flatten)]
     overwrite: Overwrite,
+    #[command(flatten)]
+    columns: Columns,
     #[command(flatten)]
     reading: Reading,
 }
@@ -117,7 +120,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let named: Vec<SensorKind> = arguments.model.iter().map(|(kind, _)| *kind).collect();
     check_models(&named)?;
     let files = arguments.overwrite.plan(&files_of(&arguments.recording), &outputs(arguments))?;
-    let recording = read(&arguments.recording, arguments.reading)?;
+    let recording = columns::read(&arguments.recording, &arguments.columns, arguments.reading)?;
     check_named(&recording, &named)?;
     check_rig(&recording, &arguments.model)?;
     let progress = Progress::start();

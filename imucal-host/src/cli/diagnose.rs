@@ -7,11 +7,12 @@ use clap::Args;
 use imucal_core::watch::WatchSummary;
 
 use super::{
-    Ending, load, output,
+    Ending,
+    columns::{self, Columns},
+    load, output,
     overwrite::{Overwrite, Planned, files_of},
     own_effects,
     progress::Progress,
-    read,
     reading::Reading,
     refuse,
     simulate::unknown,
@@ -66,6 +67,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     overwrite: Overwrite,
     #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
     reading: Reading,
 }
 
@@ -93,7 +96,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     inputs.extend(arguments.effects.clone());
     inputs.extend(arguments.watch.clone());
     let files = arguments.overwrite.plan(&inputs, &written.map(Planned::new).collect::<Vec<_>>())?;
-    let recording = read(path, arguments.reading)?;
+    let recording = columns::read(path, &arguments.columns, arguments.reading)?;
     let model = arguments.model.as_deref().map(|path| load(path, arguments.reading)).transpose()?;
     let model = match model {
         Some(Err(damaged)) => return Ok(refuse(&damaged)),

@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::{Args, ValueEnum};
 
 use super::{
     Ending,
+    columns::{self, Columns},
     output::say,
     overwrite::{Overwrite, Planned},
     reading::Reading,
@@ -14,45 +16,66 @@ use super::{
 use crate::recording::{Manifest, read::imu_tk};
 
 /// Other people's formats.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Layout {
+    /// One CSV file, with its columns by --map, --unit and --time; fields separated by commas, semicolons or tabs
+    Csv,
     /// Two text files of imu_tk, lines of `t x y z`: the accelerometer's, then the gyroscope's
     #[value(name = "imu_tk")]
     ImuTk,
 }
 
 #[derive(Args, Debug)]
+#[command(
+    after_help = "Example:\n  imucal import log.csv --time timestamp_ms --map acc=ax,ay,az --map gyr=gx,gy,gz --unit acc=g,gyr=deg/s \
+                  --out log-si.csv"
+)]
 pub(super) struct Arguments {
-    /// The accelerometer's file
-    acc: PathBuf,
-    /// The gyroscope's file
-    gyr: PathBuf,
-    /// Their layout
-    #[arg(long, value_enum, default_value = "imu_tk")]
-    from: Layout,
-    /// What the samples are: a recording's TOML with units, site and sensor
+    /// One CSV file, or the accelerometer's and the gyroscope's file of imu_tk
+    #[arg(required = true, num_args = 1..=2)]
+    files: Vec<PathBuf>,
+    /// Their layout; without it that of so many files
+    #[arg(long, value_enum)]
+    from: Option<Layout>,
+    /// What the samples are: a recording's TOML with units, site and sensor; needed for imu_tk
     #[arg(long, value_name = "NAME.toml")]
-    manifest: PathBuf,
+    manifest: Option<PathBuf>,
     /// The recording to write: .csv, .csv.gz or .parquet
     #[arg(long, value_name = "REC")]
     out: PathBuf,
     #[command(flatten)]
     overwrite: Overwrite,
     #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
     reading: Reading,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let inputs = [arguments.acc.clone(), arguments.gyr.clone()];
+    let inputs: Vec<PathBuf> = arguments.files.iter().chain(&arguments.manifest).cloned().collect();
     let mut files = arguments.overwrite.plan(&inputs, &Planned::recording(&arguments.out))?;
     let limits = arguments.reading.limits();
-    let (manifest, warnings) = Manifest::read_within(&arguments.manifest, &limits)?;
-    let recording = match arguments.from {
-        Layout::ImuTk => imu_tk::read_pair(&arguments.acc, &arguments.gyr, manifest, &limits)?,
+    let manifest = match &arguments.manifest {
+        Some(path) => {
+            let (manifest, warnings) = Manifest::read_within(path, &limits)?;
+            warnings.iter().for_each(|warning| warn(warning));
+            Some(manifest)
+        }
+        None => None,
     };
-    for warning in warnings.iter().chain(&recording.warnings) {
-        warn(warning);
-    }
+    let recording = match (arguments.files.as_slice(), arguments.from) {
+        ([csv], None | Some(Layout::Csv)) => {
+            columns::read_with(csv, &arguments.columns, manifest, arguments.reading)?
+        }
+        ([acc, gyr], None | Some(Layout::ImuTk)) => {
+            let manifest = manifest.context("imu_tk: its files say no units; add --manifest")?;
+            let recording = imu_tk::read_pair(acc, gyr, manifest, &limits)?;
+            recording.warnings.iter().for_each(|warning| warn(warning));
+            recording
+        }
+        (_, Some(Layout::Csv)) => anyhow::bail!("csv: found two files, expected one"),
+        _ => anyhow::bail!("imu_tk: found one file, expected the accelerometer's and then the gyroscope's"),
+    };
     recording.write_into(&arguments.out, &mut files)?;
     files.commit()?;
     say!("{}: {} rows", arguments.out.display(), recording.rows());

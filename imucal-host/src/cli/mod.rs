@@ -16,6 +16,8 @@ mod apply;
 mod blind;
 mod calibrate;
 mod capture;
+mod columns;
+mod compare;
 mod demo;
 mod device;
 mod diagnose;
@@ -47,6 +49,8 @@ enum Command {
     Capture(capture::Arguments),
     /// Correct a recording with the core's code, as a device does.
     Apply(apply::Arguments),
+    /// Compare two calibrations of a unit: how far each parameter has moved, and what that means
+    Compare(compare::Arguments),
     /// Print a calibration, its quality, and whether it is intact.
     Inspect(inspect::Arguments),
     /// Compare the core in f32 with a reference in f64, sample by sample and fit by fit.
@@ -84,6 +88,7 @@ pub fn run() -> ExitCode {
         Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments),
         Command::Apply(arguments) => apply::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Device(arguments) => device::run(&arguments),

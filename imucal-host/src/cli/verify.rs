@@ -7,11 +7,11 @@ use imucal_core::record::{self, CalibrationRecord, HigherOrder, Order};
 
 use super::{
     Ending,
+    columns::{self, Columns},
     device::{self, ending},
     load,
     output::say,
     progress::Progress,
-    read,
     reading::Reading,
     refuse, warn,
 };
@@ -48,11 +48,13 @@ pub(super) struct Arguments {
     #[arg(long, alias = "force")]
     other_serial: bool,
     #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
     reading: Reading,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let recording = read(&arguments.recording, arguments.reading)?;
+    let recording = columns::read(&arguments.recording, &arguments.columns, arguments.reading)?;
     let stored = match load(&arguments.calibration, arguments.reading)? {
         Ok(stored) => stored,
         Err(damaged) => return Ok(refuse(&damaged)),

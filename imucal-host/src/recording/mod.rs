@@ -10,7 +10,9 @@ mod epoch;
 #[cfg(test)]
 mod fixture;
 mod format;
+pub mod layout_guess;
 pub mod manifest;
+pub mod mapping;
 pub mod order_statistics;
 mod place;
 pub mod read;
@@ -28,6 +30,7 @@ use self::format::Format;
 pub use self::{
     epoch::Epoch,
     manifest::{Manifest, site::LEAST_DIP},
+    mapping::Mapping,
     order_statistics::median,
     place::Place,
     read_error::ReadError,
@@ -129,19 +132,64 @@ impl Recording {
     ///
     /// As [`Recording::read`].
     pub fn read_within(path: &Path, limits: &Limits) -> Result<Self, ReadError> {
+        Self::read_as(path, &Mapping::default(), limits)
+    }
+
+    /// As [`Recording::read_within`], of a file whose columns have other names. Then it needs no manifest, and its fields may be
+    /// separated by semicolons or tabs.
+    ///
+    /// # Errors
+    ///
+    /// As [`Recording::read`].
+    pub fn read_as(path: &Path, mapping: &Mapping, limits: &Limits) -> Result<Self, ReadError> {
+        Self::read_with(path, mapping, None, limits)
+    }
+
+    /// The manifest next to a file; a mapped file needs none.
+    fn manifest_of(
+        path: &Path,
+        mapping: &Mapping,
+        limits: &Limits,
+    ) -> Result<(Manifest, Vec<Warning>), ReadError> {
+        let beside = Manifest::path_beside(path).unwrap_or_else(|| path.with_extension("toml"));
+        match Manifest::read_within(&beside, limits) {
+            Err(ReadError::ManifestMissing { .. }) if !mapping.is_empty() => {
+                let assumed = mapping.unstated();
+                let warning = (!assumed.is_empty())
+                    .then(|| Warning::UnitsAssumed { path: path.to_path_buf(), assumed });
+                Ok((Manifest::default(), warning.into_iter().collect()))
+            }
+            read => read,
+        }
+    }
+
+    /// As [`Recording::read_as`]; `manifest` takes the place of the one next to the file.
+    ///
+    /// # Errors
+    ///
+    /// As [`Recording::read`].
+    pub fn read_with(
+        path: &Path,
+        mapping: &Mapping,
+        manifest: Option<Manifest>,
+        limits: &Limits,
+    ) -> Result<Self, ReadError> {
         let format =
             Format::of(path).map_err(|found| ReadError::UnknownFormat { path: path.to_path_buf(), found })?;
         if !path.exists() {
             let found = "there is no such file".to_owned();
             return Err(ReadError::Unreadable { path: path.to_path_buf(), found });
         }
-        let manifest_path = Manifest::path_beside(path).unwrap_or_else(|| path.with_extension("toml"));
-        let (manifest, warnings) = Manifest::read_within(&manifest_path, limits)?;
+        let (manifest, warnings) = match manifest {
+            Some(manifest) => (manifest, Vec::new()),
+            None => Self::manifest_of(path, mapping, limits)?,
+        };
+        let manifest = mapping.over(manifest);
         let unit = manifest.units.t;
         let mut table = match format {
-            Format::Csv | Format::CsvGz => read::csv::read(path, unit, limits)?,
+            Format::Csv | Format::CsvGz => read::csv::read(path, unit, mapping, limits)?,
             #[cfg(feature = "parquet")]
-            Format::Parquet => read::parquet::read(path, unit, limits)?,
+            Format::Parquet => read::parquet::read(path, unit, mapping, limits)?,
             #[cfg(not(feature = "parquet"))]
             Format::Parquet => {
                 return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() });

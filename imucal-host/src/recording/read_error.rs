@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{
     manifest::fault::ManifestFault,
+    mapping::MappingFault,
     place::Place,
     read::header_fault::HeaderFault,
     sensor_kind::SensorKind,
@@ -51,6 +52,9 @@ pub enum ReadError {
     /// The columns are not those of a recording.
     #[error("{path}, line 1: {}", joined(.faults))]
     Header { path: PathBuf, faults: Vec<HeaderFault> },
+    /// A mapping of columns that the file has not.
+    #[error("{path}, line 1: {fault}")]
+    Mapping { path: PathBuf, fault: MappingFault },
     /// More columns than a recording has.
     #[error(
         "{path}, line {line}: found more than {limit} columns, expected at most as many; check that the file is a recording, and raise the limit with --max-columns if it is"

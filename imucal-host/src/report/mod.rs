@@ -2,8 +2,10 @@
 
 pub mod capture;
 pub mod catalogue;
+pub mod compare;
 pub mod diagnosis;
 pub mod json;
+pub mod layout;
 pub mod measure;
 pub mod model;
 pub mod prose;

@@ -20,9 +20,9 @@ use imucal_core::{
 use super::{
     Ending,
     calibrate::today,
+    columns::{self, Columns},
     output::{self, say},
     overwrite::{Overwrite, Planned, files_of},
-    read,
     reading::Reading,
     refuse, warn,
 };
@@ -76,6 +76,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     overwrite: Overwrite,
     #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
     reading: Reading,
 }
 
@@ -101,7 +103,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
 
 /// Runs the session on this machine.
 fn here(arguments: &Arguments, path: &Path, mut files: OutputSet) -> anyhow::Result<Ending> {
-    let recording = read(path, arguments.reading)?;
+    let recording = columns::read(path, &arguments.columns, arguments.reading)?;
     let recorded = recorded(&recording);
     let task = task_of(arguments, &recording, &recorded)?;
     say!("{}: replayed through the session of a device", recording.name);

@@ -20,9 +20,10 @@ use crate::{
     cli::{
         Ending,
         calibrate::today,
+        columns,
         device::{ending, open},
         output::{self, say},
-        read, refuse, warn,
+        refuse, warn,
     },
     device::{Address, Session},
     file::OutputSet,
@@ -48,7 +49,7 @@ pub(super) fn run(
 
 /// Sends a recording's raw samples to the device.
 fn replay(arguments: &Arguments, device: &Address, path: &Path, files: OutputSet) -> anyhow::Result<Ending> {
-    let recording = read(path, arguments.reading)?;
+    let recording = columns::read(path, &arguments.columns, arguments.reading)?;
     let asked = recorded(&recording);
     let task = task_of(arguments, &recording, &asked)?;
     let mut session = open(device, arguments.flash.as_deref(), arguments.key.as_deref())?;

@@ -10,6 +10,7 @@ use super::{
 use crate::{
     file::{Limits, limits::Size},
     recording::{
+        mapping::Mapping,
         place::{Place, Places},
         read_error::ReadError,
         unit::TimeUnit,
@@ -18,23 +19,39 @@ use crate::{
 };
 
 /// Reads the samples of a CSV file in file units, `t` in `unit`.
-pub(crate) fn read(path: &Path, unit: TimeUnit, limits: &Limits) -> Result<Table, ReadError> {
+pub(crate) fn read(
+    path: &Path,
+    unit: TimeUnit,
+    mapping: &Mapping,
+    limits: &Limits,
+) -> Result<Table, ReadError> {
     let mut rows = Rows::open(path, limits)?;
-    table(path, unit, &mut rows, limits).map_err(|error| {
+    if !mapping.is_empty() {
+        rows.find_separator()?;
+    }
+    table(path, unit, mapping, &mut rows, limits).map_err(|error| {
         // Of a damaged stream nothing that is wrong in its text says more.
         let damage = if error.is_limit() { None } else { rows.text.damage() };
         damage.unwrap_or(error)
     })
 }
 
-fn table(path: &Path, unit: TimeUnit, rows: &mut Rows<'_>, limits: &Limits) -> Result<Table, ReadError> {
+fn table(
+    path: &Path,
+    unit: TimeUnit,
+    mapping: &Mapping,
+    rows: &mut Rows<'_>,
+    limits: &Limits,
+) -> Result<Table, ReadError> {
     let blank = |rows: &Rows<'_>| rows.fields().all(|field| field.trim_ascii().is_empty()) && rows.len() == 1;
     if !rows.advance()? || (blank(rows) && !rows.advance()?) {
         return Err(ReadError::Empty { path: path.to_path_buf() });
     }
     let names: Result<Vec<&str>, _> = rows.fields().map(std::str::from_utf8).collect();
     let names = names.map_err(|_| ReadError::NotUtf8 { path: path.to_path_buf(), line: rows.line })?;
-    let layout = Layout::new(&names, path)?;
+    let fault = |fault| ReadError::Mapping { path: path.to_path_buf(), fault };
+    let renamed = mapping.renamed(&names).map_err(fault)?;
+    let layout = Layout::new(&renamed.iter().map(String::as_str).collect::<Vec<_>>(), path)?;
     let names: Vec<String> = names.iter().map(|name| name.trim().to_owned()).collect();
     CsvReader { path, unit, layout, names, limit: limits.size, taken: 0 }.read(rows)
 }
@@ -104,6 +121,8 @@ impl CsvReader<'_> {
         for (column, (field, target)) in rows.fields().zip(&self.layout.targets).enumerate() {
             match *target {
                 Target::Known(slot) => {
+                    let pointed = rows.pointed(field);
+                    let field = pointed.as_deref().unwrap_or(field);
                     let value = match slot {
                         TIME => table.clock.take_text(field),
                         _ => number::parse(field),

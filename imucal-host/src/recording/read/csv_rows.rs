@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use csv_core::{ReadRecordResult, Reader};
+use csv_core::{ReadRecordResult, Reader, ReaderBuilder};
 
 use super::text::Text;
 use crate::{
@@ -28,6 +28,7 @@ pub(crate) struct Rows<'a> {
     pub(crate) line: u64,
     /// The text ended within the row: its line has no end.
     pub(crate) cut: bool,
+    separator: u8,
 }
 
 impl<'a> Rows<'a> {
@@ -43,7 +44,25 @@ impl<'a> Rows<'a> {
             next_line: 1,
             line: 1,
             cut: false,
+            separator: b',',
         })
+    }
+
+    /// Takes semicolons or tabs for what separates fields, where the first line has no comma; before the first row.
+    pub(crate) fn find_separator(&mut self) -> Result<(), ReadError> {
+        self.skip_blank_lines()?;
+        let input = self.text.next()?;
+        let line = input.split(|byte| *byte == b'\n').next().unwrap_or_default();
+        let found = [b',', b';', b'\t'].into_iter().find(|separator| line.contains(separator));
+        self.separator = found.unwrap_or(b',');
+        self.reader = ReaderBuilder::new().delimiter(self.separator).build();
+        Ok(())
+    }
+
+    /// A field whose decimal point is a comma, with a point; `None` where there is nothing to change.
+    pub(crate) fn pointed(&self, field: &[u8]) -> Option<Vec<u8>> {
+        let comma = self.separator != b',' && field.contains(&b',') && !field.contains(&b'.');
+        comma.then(|| field.iter().map(|byte| if *byte == b',' { b'.' } else { *byte }).collect())
     }
 
     /// Reads the next row that is not blank; false at the end of the text.

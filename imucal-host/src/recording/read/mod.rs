@@ -6,10 +6,10 @@
 
 pub(crate) mod assembly;
 pub(crate) mod clock;
-mod column_guess;
+pub(crate) mod column_guess;
 pub(crate) mod columns;
 pub(crate) mod csv;
-mod csv_rows;
+pub(crate) mod csv_rows;
 pub mod header_fault;
 pub mod imu_tk;
 pub(crate) mod interval;

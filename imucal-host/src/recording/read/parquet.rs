@@ -20,11 +20,16 @@ use super::{
 };
 use crate::{
     file::{Limits, limits::Size},
-    recording::{place::Places, read_error::ReadError, unit::TimeUnit},
+    recording::{mapping::Mapping, place::Places, read_error::ReadError, unit::TimeUnit},
 };
 
 /// Reads the samples of a Parquet file in file units; columns may be doubles, floats or integers.
-pub(crate) fn read(path: &Path, unit: TimeUnit, limits: &Limits) -> Result<Table, ReadError> {
+pub(crate) fn read(
+    path: &Path,
+    unit: TimeUnit,
+    mapping: &Mapping,
+    limits: &Limits,
+) -> Result<Table, ReadError> {
     let file = File::open(path)
         .map_err(|cause| ReadError::Unreadable { path: path.to_path_buf(), found: cause.to_string() })?;
     let damaged = |cause: ParquetError| damaged(path, &cause);
@@ -32,7 +37,9 @@ pub(crate) fn read(path: &Path, unit: TimeUnit, limits: &Limits) -> Result<Table
     refuse_too_long(path, reader.metadata(), limits)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
-    let layout = Layout::new(&names.iter().map(String::as_str).collect::<Vec<_>>(), path)?;
+    let fault = |fault| ReadError::Mapping { path: path.to_path_buf(), fault };
+    let renamed = mapping.renamed(&names.iter().map(String::as_str).collect::<Vec<_>>()).map_err(fault)?;
+    let layout = Layout::new(&renamed.iter().map(String::as_str).collect::<Vec<_>>(), path)?;
     let rows: u64 = reader.metadata().row_groups().iter().map(|group| group.num_rows().max(0) as u64).sum();
     let memory = Memory { path, limit: limits.size, taken: Cell::new(0) };
     memory.take(rows.saturating_mul(layout.row_size() as u64));

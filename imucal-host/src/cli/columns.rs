@@ -1,0 +1,74 @@
+//! Files whose columns have other names than a recording's.
+
+use std::path::Path;
+
+use clap::Args;
+
+use super::{reading::Reading, warn};
+use crate::{
+    recording::{Manifest, Mapping, ReadError, Recording, layout_guess::guess},
+    report::layout,
+};
+
+/// What the columns of another program's file are.
+#[derive(Args, Clone, Debug)]
+pub(super) struct Columns {
+    /// Columns of a file with other names, in the order x, y, z, such as acc=ax,ay,az; also gyr, mag, temp, gimbal,
+    /// ref_q, ref_p and sim_acc to sim_temp. Give it once for each
+    #[arg(long, value_name = "SENSOR=COLUMNS", help_heading = "Another program's file")]
+    map: Vec<String>,
+    /// Units of the columns, such as acc=g,gyr=deg/s,t=ms; of counts how many make a unit: acc=16384/g
+    #[arg(
+        long = "unit",
+        value_name = "SENSOR=UNIT",
+        value_delimiter = ',',
+        help_heading = "Another program's file"
+    )]
+    unit: Vec<String>,
+    /// The column of times; its unit is stated by --unit t=ms, or by the end of its name (timestamp_ms)
+    #[arg(long = "time", value_name = "COLUMN", help_heading = "Another program's file")]
+    time: Option<String>,
+}
+
+impl Columns {
+    pub(super) fn mapping(&self) -> anyhow::Result<Mapping> {
+        Ok(Mapping::parse(&self.map, &self.unit, self.time.as_deref())?)
+    }
+}
+
+/// Reads a recording, or another program's file as one, and warns of what is odd in it.
+pub(super) fn read(path: &Path, columns: &Columns, reading: Reading) -> anyhow::Result<Recording> {
+    read_with(path, columns, None, reading)
+}
+
+/// The same; `manifest` takes the place of the one next to the file.
+pub(super) fn read_with(
+    path: &Path,
+    columns: &Columns,
+    manifest: Option<Manifest>,
+    reading: Reading,
+) -> anyhow::Result<Recording> {
+    let mapping = columns.mapping()?;
+    let recording = Recording::read_with(path, &mapping, manifest, &reading.limits()).map_err(|error| {
+        let hint = hint(path, &error, reading);
+        match hint {
+            Some(hint) => anyhow::anyhow!("{error}\n\n{hint}"),
+            None => error.into(),
+        }
+    })?;
+    for warning in &recording.warnings {
+        warn(warning);
+    }
+    Ok(recording)
+}
+
+/// What the file's columns probably are, where it is not known.
+fn hint(path: &Path, error: &ReadError, reading: Reading) -> Option<String> {
+    let unknown = matches!(
+        error,
+        ReadError::Header { .. } | ReadError::ManifestMissing { .. } | ReadError::Mapping { .. }
+    );
+    let guess = guess(path, &reading.limits()).filter(|_| unknown)?;
+    let command = std::env::args().nth(1).unwrap_or_default();
+    Some(layout::guess(&guess, &command, path))
+}

@@ -1,0 +1,293 @@
+//! Two calibrations of one unit: how far each parameter has moved, and what that means.
+//!
+//! ```text
+//! z = (p_B − p_A) / √(σ_A² + σ_B²)
+//! y_A = M y + β        M = A_A A_B⁻¹        β = A_A (b_B − b_A)
+//! ```
+//!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | p, σ | an entry of gain or bias and its standard error |
+//! | A, b | gain and bias: calibrated = A (raw − b) |
+//! | y, y_A | what is measured, if B is right, and what A still makes of it |
+//! | β | error of the bias, calibrated unit |
+//! | M − 1 | its diagonal: error of the scale; its antisymmetric part: rotation; the rest: angles between axes |
+//!
+//! A parameter has moved where |z| is beyond what the largest of so many healthy ones exceeds once in a hundred times (Bonferroni).
+//! The biases are compared at B's reference temperature. Not looked at: correlations between parameters, slopes of temperature
+//! and nonlinear terms.
+
+use nalgebra::{Matrix3, Vector3};
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use crate::{
+    recording::{SensorKind, Unit},
+    store::{StoredCalibration, StoredTriad},
+};
+
+/// What the JSON begins with.
+pub const FORMAT: &str = "imucal-compare/1";
+/// How often the largest of the parameters of two calibrations of an unchanged unit is taken for moved.
+const FALSE_ALARMS: f64 = 0.01;
+
+/// Why two calibrations are not compared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CompareFault {
+    /// Of two units.
+    #[error(
+        "the serials are `{a}` and `{b}`, expected two calibrations of one unit; give the right files, or --other-serial"
+    )]
+    Serials {
+        /// Of the first.
+        a: String,
+        /// Of the second.
+        b: String,
+    },
+    /// A sensor's raw values have two units.
+    #[error(
+        "{sensor}: raw values are in {a} and in {b}, expected one unit; calibrate from recordings in the same unit"
+    )]
+    Units {
+        /// Which.
+        sensor: SensorKind,
+        /// Of the first.
+        a: Unit,
+        /// Of the second.
+        b: Unit,
+    },
+    /// A gain without an inverse.
+    #[error("{sensor}: the second gain has no inverse; calibrate again")]
+    Singular {
+        /// Which.
+        sensor: SensorKind,
+    },
+    /// They have no sensor in common.
+    #[error("no sensor is calibrated in both")]
+    Nothing,
+}
+
+/// One parameter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Moved {
+    /// `gain_xy` or `bias_x`.
+    pub name: String,
+    /// In the first.
+    pub a: f64,
+    /// In the second.
+    pub b: f64,
+    /// Standard error of the difference.
+    pub std_error: f64,
+    /// The difference in standard errors.
+    pub z: f64,
+    /// Beyond chance.
+    pub moved: bool,
+}
+
+/// One sensor.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SensorComparison {
+    /// Whose.
+    pub sensor: SensorKind,
+    /// Unit of calibrated values, in which `bias_error` is.
+    pub unit: Unit,
+    /// Each parameter that both have estimated.
+    pub parameters: Vec<Moved>,
+    /// |z| beyond which a parameter has moved.
+    pub limit: f64,
+    /// β.
+    pub bias_error: [f64; 3],
+    /// Error of the scale of each axis, a share.
+    pub scale_error: [f64; 3],
+    /// Rotation vector of the axes, rad.
+    pub rotation: [f64; 3],
+    /// Change of the angles between y and z, z and x, x and y, rad.
+    pub skew: [f64; 3],
+}
+
+impl SensorComparison {
+    /// A parameter has moved.
+    #[must_use]
+    pub fn has_moved(&self) -> bool {
+        self.parameters.iter().any(|parameter| parameter.moved)
+    }
+}
+
+/// Both calibrations.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// [`FORMAT`].
+    pub format: &'static str,
+    /// Days from the first to the second.
+    pub days: i64,
+    /// The sensors that both have.
+    pub sensors: Vec<SensorComparison>,
+    /// Sensors that one of them has not.
+    pub only_one: Vec<SensorKind>,
+}
+
+/// Compares an earlier calibration with a later one.
+///
+/// # Errors
+///
+/// [`CompareFault`].
+pub fn compare(
+    a: &StoredCalibration,
+    b: &StoredCalibration,
+    other_serial: bool,
+) -> Result<Comparison, CompareFault> {
+    let serials = [&a.sensor.serial, &b.sensor.serial];
+    if !other_serial && serials.iter().all(|serial| !serial.is_empty()) && serials[0] != serials[1] {
+        return Err(CompareFault::Serials { a: serials[0].clone(), b: serials[1].clone() });
+    }
+    let (mut sensors, mut only_one) = (Vec::new(), Vec::new());
+    for kind in SensorKind::ALL {
+        match (a.triad(kind), b.triad(kind)) {
+            (Some(a), Some(b)) => sensors.push(of_sensor(kind, a, b)?),
+            (None, None) => {}
+            _ => only_one.push(kind),
+        }
+    }
+    if sensors.is_empty() {
+        return Err(CompareFault::Nothing);
+    }
+    let days = i64::from(b.date.days()) - i64::from(a.date.days());
+    Ok(Comparison { format: FORMAT, days, sensors, only_one })
+}
+
+fn of_sensor(kind: SensorKind, a: &StoredTriad, b: &StoredTriad) -> Result<SensorComparison, CompareFault> {
+    if a.unit_in != b.unit_in {
+        return Err(CompareFault::Units { sensor: kind, a: a.unit_in, b: b.unit_in });
+    }
+    let matrix = |rows: &[[f64; 3]; 3]| Matrix3::from_fn(|row, column| rows[row][column]);
+    let bias_a = at_reference(a, b);
+    let (gain_a, gain_b) = (matrix(&a.gain), matrix(&b.gain));
+    let inverse = gain_b.try_inverse().ok_or(CompareFault::Singular { sensor: kind })?;
+    let mut error = gain_a * inverse;
+    if a.field_norm.is_some() || b.field_norm.is_some() {
+        // Gains of determinant 1: their common scale says nothing.
+        error /= error.determinant().cbrt();
+    }
+    error -= Matrix3::identity();
+    let half = |r: usize, c: usize, sign: f64| 0.5 * (error[(r, c)] + sign * error[(c, r)]);
+    let mut parameters = parameters(a, b, &bias_a);
+    let chances = Normal::standard();
+    let limit = -chances.inverse_cdf(0.5 * FALSE_ALARMS / parameters.len().max(1) as f64);
+    parameters.iter_mut().for_each(|parameter| parameter.moved = parameter.z.abs() > limit);
+    Ok(SensorComparison {
+        sensor: kind,
+        unit: b.unit_out,
+        parameters,
+        limit,
+        bias_error: (gain_a * (Vector3::from(b.bias) - bias_a)).into(),
+        scale_error: error.diagonal().into(),
+        rotation: [half(2, 1, -1.0), half(0, 2, -1.0), half(1, 0, -1.0)],
+        skew: [2.0 * half(1, 2, 1.0), 2.0 * half(2, 0, 1.0), 2.0 * half(0, 1, 1.0)],
+    })
+}
+
+/// The first bias at the second's reference temperature, where both have one.
+fn at_reference(a: &StoredTriad, b: &StoredTriad) -> Vector3<f64> {
+    let bias = Vector3::from(a.bias);
+    match (&a.temperature, &b.temperature) {
+        (Some(own), Some(other)) => bias + Vector3::from(own.bias_slope) * (other.reference - own.reference),
+        _ => bias,
+    }
+}
+
+/// The parameters that both have estimated; without a verdict.
+fn parameters(a: &StoredTriad, b: &StoredTriad, bias_a: &Vector3<f64>) -> Vec<Moved> {
+    const AXES: [char; 3] = ['x', 'y', 'z'];
+    let of = |name: String, (a, a_std): (f64, f64), (b, b_std): (f64, f64)| {
+        let std_error = a_std.hypot(b_std);
+        (a_std > 0.0 && b_std > 0.0).then(|| Moved {
+            name,
+            a,
+            b,
+            std_error,
+            z: (b - a) / std_error,
+            moved: false,
+        })
+    };
+    let gains = (0..3).flat_map(|row| (0..3).map(move |column| (row, column))).filter_map(|(row, column)| {
+        let name = format!("gain_{}{}", AXES[row], AXES[column]);
+        let pair = |triad: &StoredTriad| (triad.gain[row][column], triad.gain_std[row][column]);
+        of(name, pair(a), pair(b))
+    });
+    let biases = (0..3).filter_map(|axis| {
+        let name = format!("bias_{}", AXES[axis]);
+        of(name, (bias_a[axis], a.bias_std[axis]), (b.bias[axis], b.bias_std[axis]))
+    });
+    gains.chain(biases).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        calibrate::{Options, calibrate},
+        recording::unit::STANDARD_GRAVITY,
+        simulator::{SimulatedUnit, Tumble, record},
+    };
+
+    fn calibrated(seed: u64) -> StoredCalibration {
+        let unit = SimulatedUnit { interval: 0.02, ..SimulatedUnit::mtx() };
+        let recording = record("unit.csv", &Tumble::new(16, seed), &unit, seed);
+        let calibration = calibrate(&recording, &Options::default(), &|_| {});
+        StoredCalibration::of(&calibration, imucal_core::record::Date::from_days(20_000))
+    }
+
+    #[test]
+    fn two_calibrations_of_an_unchanged_unit_seldom_differ() {
+        let all: Vec<StoredCalibration> = (0..16).map(calibrated).collect();
+        let mut moved = 0;
+        for pair in all.chunks_exact(2) {
+            let comparison = compare(&pair[0], &pair[1], false).expect("of one unit");
+            moved += comparison.sensors.iter().filter(|sensor| sensor.has_moved()).count();
+        }
+        assert!(moved <= 1, "{moved} of 24 sensors");
+    }
+
+    #[test]
+    fn a_bias_that_moves_is_named_with_its_size_in_the_calibrated_unit() {
+        let (before, mut after) = (calibrated(1), calibrated(2));
+        let acc = after.acc.as_mut().expect("calibrated");
+        // Five thousandths of g.
+        acc.bias[1] += 5e-3 * STANDARD_GRAVITY / acc.gain[1][1];
+        let comparison = compare(&before, &after, false).expect("of one unit");
+        let acc = &comparison.sensors[0];
+        let moved: Vec<&str> = acc.parameters.iter().filter(|p| p.moved).map(|p| p.name.as_str()).collect();
+        assert_eq!(moved, ["bias_y"]);
+        assert!((acc.bias_error[1] / STANDARD_GRAVITY - 5e-3).abs() < 1e-4, "{:?}", acc.bias_error);
+    }
+
+    #[test]
+    fn a_turn_of_the_axes_a_scale_and_a_skew_are_told_apart() {
+        let before = calibrated(3);
+        let mut after = before.clone();
+        let gyr = after.gyr.as_mut().expect("calibrated");
+        let turn = nalgebra::Rotation3::new(Vector3::new(0.0, 0.0, 2e-3)).into_inner();
+        let skew = Matrix3::new(1.003, 0.0, 0.0, 0.0, 1.0, 5e-4, 0.0, 5e-4, 1.0);
+        let own = Matrix3::from_fn(|row, column| gyr.gain[row][column]);
+        let changed = turn * skew * own;
+        gyr.gain = std::array::from_fn(|row| std::array::from_fn(|column| changed[(row, column)]));
+        let comparison = compare(&before, &after, false).expect("of one unit");
+        let gyr = comparison.sensors.iter().find(|sensor| sensor.sensor == SensorKind::Gyr).expect("both");
+        assert!((gyr.rotation[2] + 2e-3).abs() < 1e-5 && gyr.rotation[0].abs() < 1e-5, "{:?}", gyr.rotation);
+        assert!((gyr.scale_error[0] + 3e-3).abs() < 2e-5, "{:?}", gyr.scale_error);
+        assert!((gyr.skew[0] + 1e-3).abs() < 2e-5, "{:?}", gyr.skew);
+    }
+
+    #[test]
+    fn what_is_not_of_one_unit_or_in_other_units_is_refused() {
+        let (a, mut b) = (calibrated(1), calibrated(2));
+        b.sensor.serial = "other".into();
+        let fault = compare(&a, &b, false).unwrap_err();
+        assert!(matches!(fault, CompareFault::Serials { .. }), "{fault}");
+        b.acc.as_mut().expect("one").unit_in = Unit::Gravity;
+        assert!(matches!(compare(&a, &b, true), Err(CompareFault::Units { .. })));
+        let nothing = StoredCalibration { acc: None, gyr: None, mag: None, ..b };
+        assert_eq!(compare(&a, &nothing, true), Err(CompareFault::Nothing));
+    }
+}

@@ -1,0 +1,66 @@
+//! Two calibrations of one unit, in a table and in words.
+
+use super::{
+    measure::{plain, rounded},
+    table::words,
+};
+use crate::{
+    compare::{Comparison, SensorComparison},
+    recording::{SensorKind, unit::STANDARD_GRAVITY},
+};
+
+/// All sensors; ends its lines.
+pub fn compared(comparison: &Comparison) -> String {
+    let mut text = format!("{} days from the first to the second\n", comparison.days);
+    for sensor in &comparison.sensors {
+        text += &of_sensor(sensor);
+    }
+    for kind in &comparison.only_one {
+        text += &format!("{}: calibrated in one of them only\n", words(*kind));
+    }
+    text
+}
+
+fn of_sensor(sensor: &SensorComparison) -> String {
+    let moved: Vec<&str> =
+        sensor.parameters.iter().filter(|parameter| parameter.moved).map(|p| p.name.as_str()).collect();
+    let verdict = if moved.is_empty() {
+        "no parameter has moved beyond chance".to_owned()
+    } else {
+        format!("moved beyond chance: {}", moved.join(", "))
+    };
+    let mut text =
+        format!("{}: {verdict} (limit {} standard errors)\n", words(sensor.sensor), rounded(sensor.limit, 1));
+    text += "                     first        second   std error   drift in std errors\n";
+    for parameter in &sensor.parameters {
+        text += &format!(
+            "  {:<8} {:>15} {:>13} {:>11} {:>12}{}\n",
+            parameter.name,
+            plain(parameter.a),
+            plain(parameter.b),
+            format!("{:.1e}", parameter.std_error),
+            format!("{:+.1}", parameter.z),
+            if parameter.moved { "  moved" } else { "" }
+        );
+    }
+    text + &meaning(sensor)
+}
+
+/// What the first calibration makes of what the second has right.
+fn meaning(sensor: &SensorComparison) -> String {
+    let three =
+        |values: [f64; 3], decimals: usize| values.map(|value| format!("{value:+.decimals$}")).join(", ");
+    let (bias, unit, decimals) = match sensor.sensor {
+        SensorKind::Acc => (sensor.bias_error.map(|value| 1e3 * value / STANDARD_GRAVITY), "mg", 3),
+        SensorKind::Gyr => (sensor.bias_error.map(f64::to_degrees), "°/s", 4),
+        SensorKind::Mag => (sensor.bias_error, "µT", 3),
+    };
+    let degrees = |angles: [f64; 3]| three(angles.map(f64::to_degrees), 4);
+    format!(
+        "  With the first calibration, where the second is right:\n    bias off by     {} {unit}\n    scale off by    {} %\n    axes turned by  {}°\n    angles off by   {}° (yz, zx, xy)\n",
+        three(bias, decimals),
+        three(sensor.scale_error.map(|share| 100.0 * share), 4),
+        degrees(sensor.rotation),
+        degrees(sensor.skew)
+    )
+}

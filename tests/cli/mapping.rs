@@ -1,0 +1,76 @@
+//! Logs of other programs: columns of other names, other units, other separators.
+
+use imucal_host::recording::SensorKind;
+use imucal_tests::simulated;
+
+use super::Folder;
+
+/// Options that read the log.
+const MAPPED: &str = "--time timestamp_ms --map acc=ax,ay,az --map gyr=gx,gy,gz --map mag=mx,my,mz --unit acc=g,gyr=deg/s,mag=uT";
+
+/// The small recording as somebody's own log: milliseconds, g and °/s, and other names.
+fn log(separator: char) -> String {
+    let small = simulated::small();
+    let names = ["timestamp_ms", "ax", "ay", "az", "gx", "gy", "gz", "mx", "my", "mz"];
+    let mut text = names.join(&separator.to_string()) + "\n";
+    for (row, time) in small.time.iter().enumerate() {
+        let mut fields = vec![format!("{:.3}", time * 1e3)];
+        let per_si = [1.0 / 9.80665, 180.0 / std::f64::consts::PI, 1.0];
+        for (kind, per_si) in SensorKind::ALL.into_iter().zip(per_si) {
+            let value = small.sensor(kind).expect("it has all").values[row];
+            fields.extend((0..3).map(|axis| format!("{}", value[axis] * per_si)));
+        }
+        if separator == ';' {
+            fields.iter_mut().for_each(|field| *field = field.replace('.', ","));
+        }
+        text += &(fields.join(&separator.to_string()) + "\n");
+    }
+    text
+}
+
+fn parameters(folder: &Folder, name: &str) -> serde_json::Value {
+    let json: serde_json::Value = serde_json::from_str(&folder.text(name)).expect("JSON");
+    json["sensors"].clone()
+}
+
+#[test]
+fn an_unknown_log_is_answered_with_its_columns_and_the_command_that_calibrates_it() {
+    let folder = Folder::new();
+    folder.write("log.csv", log(','));
+    let first = folder.run("calibrate log.csv").with(2);
+    let first = first.telling(&["ax", "acc_x, first", "gz", "Then this reads it:"]);
+    let command =
+        first.err.lines().last().expect("a command").trim().strip_prefix("imucal ").expect("a command");
+    assert!(command.contains("--map acc=ax,ay,az") && command.contains("acc=g"), "{command}");
+    let arguments = command.replace(&folder.path("log.csv").display().to_string(), "log.csv");
+    folder.run(&arguments).with(0).printing(&["accelerometer", "accepted"]);
+}
+
+#[test]
+fn a_mapped_log_gives_what_the_recording_made_of_it_gives() {
+    let folder = Folder::new();
+    folder.write("log.csv", log(','));
+    folder.write("semicolons.csv", log(';'));
+    folder.run(&format!("calibrate log.csv {MAPPED} --json direct.json")).with(0);
+    folder.run(&format!("calibrate semicolons.csv {MAPPED} --json semicolons.json")).with(0);
+    folder.run(&format!("import log.csv {MAPPED} --out made.csv")).with(0);
+    folder.run("calibrate made.csv --json made.json").with(0);
+    let direct = parameters(&folder, "direct.json");
+    assert_eq!(direct, parameters(&folder, "made.json"));
+    assert_eq!(direct, parameters(&folder, "semicolons.json"));
+    assert_eq!(direct["acc"]["unit_in"], "g");
+}
+
+#[test]
+fn a_mapping_that_contradicts_itself_the_file_or_the_numbers_is_bad_usage() {
+    let folder = Folder::new();
+    folder.write("log.csv", log(','));
+    let told = |options: &str, parts: &[&str]| {
+        folder.run(&format!("calibrate log.csv --time timestamp_ms {options}")).with(2).telling(parts);
+    };
+    told("--map acc=ax,ay,ay", &["`ay` mapped twice"]);
+    told("--map acc=ax,ay,aw", &["no column `aw`", "Then this reads it"]);
+    told("--map force=ax,ay,az", &["`force`", "`acc`, `gyr`"]);
+    told("--map acc=ax,ay,az --unit acc=deg/s", &["--unit acc", "m/s^2"]);
+    told("--map acc=ax,ay,az --unit acc=mg", &["median length"]);
+}
