@@ -12,6 +12,7 @@ mod fixture;
 mod format;
 pub mod manifest;
 pub mod order_statistics;
+mod parts;
 mod place;
 pub mod read;
 mod read_error;
@@ -129,14 +130,7 @@ impl Recording {
     ///
     /// As [`Recording::read`].
     pub fn read_within(path: &Path, limits: &Limits) -> Result<Self, ReadError> {
-        let format =
-            Format::of(path).map_err(|found| ReadError::UnknownFormat { path: path.to_path_buf(), found })?;
-        if !path.exists() {
-            let found = "there is no such file".to_owned();
-            return Err(ReadError::Unreadable { path: path.to_path_buf(), found });
-        }
-        let manifest_path = Manifest::path_beside(path).unwrap_or_else(|| path.with_extension("toml"));
-        let (manifest, warnings) = Manifest::read_within(&manifest_path, limits)?;
+        let (format, manifest, warnings) = parts::opened(path, limits)?;
         let unit = manifest.units.t;
         let mut table = match format {
             Format::Csv | Format::CsvGz => read::csv::read(path, unit, limits)?,
@@ -147,15 +141,9 @@ impl Recording {
                 return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() });
             }
         };
-        // An unknown key is often why the samples cannot be understood, and then nobody would read the warning.
-        let misspelt =
-            warnings.iter().find(|warning| matches!(warning, Warning::UnknownKey { nearest: Some(_), .. }));
-        let misspelt = misspelt.cloned().map(Box::new);
+        let misled = parts::misled(&warnings);
         table.warnings.splice(0..0, warnings);
-        read::assembly::assemble(path, manifest, table).map_err(|error| match misspelt {
-            Some(warning) => ReadError::Misled { error: Box::new(error), warning },
-            None => error,
-        })
+        read::assembly::assemble(path, manifest, table).map_err(misled)
     }
 
     /// Writes the samples, in the units of the manifest, as the ending of `path` says, and the manifest
