@@ -26,6 +26,7 @@
 //! | [`effect`] | – | the only list of what a simulator may lack; a user's own, from a file |
 //! | [`simulator`] | a movement, effects | what ideal or afflicted sensors put out |
 //! | [`noise`], [`observe`], [`ellipsoid`] | samples | rests, motions, turns, and the noise of their means |
+//! | [`allan`] | a recording that is still, of any length | coefficients of each axis' noise, with intervals |
 //! | [`calibrate`] | observations | triads with standard errors; accepted, suspect or refused |
 //! | [`capture`] | samples as they arrive | what to do next, until a session has calibrated its sensors |
 //! | [`store`], [`apply`], [`device`] | triads | records, corrected recordings, answers of a device |
@@ -57,6 +58,8 @@ pub mod effect;
 pub mod simulator;
 
 pub mod noise;
+
+pub mod allan;
 
 pub mod observe;
 
