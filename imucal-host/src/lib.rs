@@ -33,6 +33,7 @@
 //! | [`equivalence`] | a calibration | how far the core in `f32` is from a reference in `f64` |
 //! | [`diagnosis`] | a recording, effects | where the gap lies, its causes, what to record next |
 //! | [`blind`], [`study`] | simulated recordings | how often answers and standard errors are right |
+//! | [`export`] | a calibration, a unit's noise | files of other programs, and what they cannot say |
 //! | [`report`], `cli` | any of these | text, JSON, exit status |
 //!
 //! A calibration of the core itself is described in [`imucal_core`].
@@ -78,6 +79,8 @@ pub mod device;
 pub mod equivalence;
 
 pub mod diagnosis;
+
+pub mod export;
 
 pub mod blind;
 

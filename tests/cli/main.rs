@@ -11,6 +11,7 @@ use tempfile::TempDir;
 mod applying;
 mod capturing;
 mod end_to_end;
+mod estimating_noise;
 mod exit_status;
 mod importing;
 #[cfg(unix)]

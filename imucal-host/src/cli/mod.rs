@@ -22,6 +22,7 @@ mod diagnose;
 mod import;
 mod inspect;
 mod interrupt;
+mod noise;
 mod output;
 mod overwrite;
 mod progress;
@@ -57,6 +58,8 @@ enum Command {
     Import(import::Arguments),
     /// Simulate a recording of a unit on a flight motion simulator.
     Simulate(simulate::Arguments),
+    /// Estimate the noise of a unit from a recording at rest: Allan deviations and their coefficients, with intervals.
+    Noise(noise::Arguments),
     /// Run every step on a simulated sensor: record, calibrate, pack, apply, verify, diagnose.
     Demo(demo::Arguments),
     /// Compare estimators and models on simulated data; print tables.
@@ -89,6 +92,7 @@ pub fn run() -> ExitCode {
         Command::Device(arguments) => device::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Noise(arguments) => noise::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Diagnose(arguments) => diagnose::run(&arguments),

@@ -6,6 +6,7 @@ pub mod diagnosis;
 pub mod json;
 pub mod measure;
 pub mod model;
+pub mod noise;
 pub mod prose;
 pub mod table;
 pub mod temperature;
