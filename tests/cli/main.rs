@@ -13,6 +13,7 @@ mod capturing;
 mod end_to_end;
 mod estimating_noise;
 mod exit_status;
+mod exporting;
 mod importing;
 #[cfg(unix)]
 mod interrupting;

@@ -19,6 +19,7 @@ mod capture;
 mod demo;
 mod device;
 mod diagnose;
+mod export;
 mod import;
 mod inspect;
 mod interrupt;
@@ -60,6 +61,8 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Estimate the noise of a unit from a recording at rest: Allan deviations and their coefficients, with intervals.
     Noise(noise::Arguments),
+    /// Write a calibration and a unit's noise for another program, and list what that program cannot say.
+    Export(export::Arguments),
     /// Run every step on a simulated sensor: record, calibrate, pack, apply, verify, diagnose.
     Demo(demo::Arguments),
     /// Compare estimators and models on simulated data; print tables.
@@ -93,6 +96,7 @@ pub fn run() -> ExitCode {
         Command::Import(arguments) => import::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Noise(arguments) => noise::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Diagnose(arguments) => diagnose::run(&arguments),

@@ -12,9 +12,16 @@ use crate::{
     store::{StoredCalibration, noise_file::NoiseFile},
 };
 
+mod affine;
+mod ardupilot;
+mod c_header;
+mod csv;
 mod error;
 mod kalibr;
 mod level;
+mod px4;
+mod python;
+mod ros;
 mod sdf;
 
 pub use error::ExportError;
@@ -26,6 +33,18 @@ pub enum Target {
     Kalibr,
     /// The sensor of a Gazebo model.
     Sdf,
+    /// A Python module that needs numpy alone.
+    Python,
+    /// A C99 header.
+    CHeader,
+    /// ROS: imu_calib and covariances of messages.
+    Ros,
+    /// PX4's parameters.
+    Px4,
+    /// ArduPilot's parameters.
+    Ardupilot,
+    /// Every number, a row each.
+    Csv,
 }
 
 /// What there is to write.
@@ -59,6 +78,12 @@ pub fn document(target: Target, inputs: &Inputs<'_>) -> Result<Document, ExportE
     let mut document = match target {
         Target::Kalibr => kalibr::document(inputs),
         Target::Sdf => sdf::document(inputs),
+        Target::Python => python::document(inputs),
+        Target::CHeader => c_header::document(inputs),
+        Target::Ros => ros::document(inputs),
+        Target::Px4 => px4::document(inputs),
+        Target::Ardupilot => ardupilot::document(inputs),
+        Target::Csv => csv::document(inputs),
     }?;
     document.cannot.extend(inputs.causes.iter().map(|cause| format!("what the diagnosis found: {cause}")));
     let list = document.cannot.iter().map(|line| target.comment(line)).collect::<String>();
@@ -73,9 +98,10 @@ impl Target {
     /// A line of comment.
     fn comment(self, line: &str) -> String {
         match self {
+            Self::CHeader => format!("/* {} */\n", line.replace("*/", "* /")),
             // Two hyphens end a comment of XML.
             Self::Sdf => format!("<!-- {} -->\n", line.replace("--", "- -")),
-            Self::Kalibr => format!("# {line}\n"),
+            _ => format!("# {line}\n"),
         }
     }
 }
