@@ -108,6 +108,39 @@ fn gaps_and_lost_samples_are_bridged_with_a_warning() {
 }
 
 #[test]
+fn a_filter_and_repeated_values_leave_the_density_as_it_is() {
+    use std::cell::Cell;
+    let folder = Folder::new();
+    let density = |name: &str| -> f64 {
+        let axis = &json(&folder, name)["gyr"]["axes"][1];
+        axis["white"]["value"].as_f64().unwrap_or_else(|| panic!("{axis}"))
+    };
+    let truth = 1e-3 / 50f64.sqrt();
+    let filtered = Cell::new(Vector3::zeros());
+    still(&folder, 60_000, |_, _, w| {
+        filtered.set(filtered.get() + (*w - filtered.get()) * 0.6);
+        *w = filtered.get();
+        true
+    });
+    let warned = folder.run("noise still.csv --json filtered.json").with(0);
+    warned.telling(&["gyr, axis y: averages below", "as after a filter"]);
+    assert!((density("filtered.json") / truth - 1.0).abs() < 0.06, "{}", density("filtered.json"));
+    // Read four times before it changes: the same values at a quarter of the rate.
+    let (count, held) = (Cell::new(0), Cell::new(Vector3::zeros()));
+    still(&folder, 60_000, |_, _, w| {
+        if count.get() % 4 == 0 {
+            held.set(*w);
+        }
+        count.set(count.get() + 1);
+        *w = held.get();
+        true
+    });
+    let warned = folder.run("noise still.csv --json repeated.json").with(0);
+    warned.telling(&["gyr: each value is read 4.0 times on average"]);
+    assert!((density("repeated.json") / (2.0 * truth) - 1.0).abs() < 0.06, "{}", density("repeated.json"));
+}
+
+#[test]
 fn an_axis_that_rounding_stills_has_no_coefficients() {
     let folder = Folder::new();
     still(&folder, 2000, |_, f, _| {

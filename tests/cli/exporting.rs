@@ -1,4 +1,4 @@
-//! `imucal export`: other programs' files.
+//! `imucal export` and `imucal corrupt`: other programs' files, and what a unit would have read.
 
 use super::{Folder, estimating_noise::still};
 
@@ -65,4 +65,30 @@ fn the_rate_of_a_target_is_that_of_its_samples() {
     assert!((ratio - 2.0).abs() < 1e-3, "{ratio}");
     folder.run("export cal.toml --noise noise.json --to sdf --rate -5").with(2);
     folder.run("export cal.toml --noise noise.json --to sdf --rate 0").with(1).telling(&["--rate: found 0"]);
+}
+
+#[test]
+fn what_is_corrupted_and_applied_is_the_ideal_stream() {
+    let folder = Folder::with_calibration();
+    folder.run("apply small.csv --calibration cal.bin --out ideal.csv").with(0);
+    folder
+        .run("corrupt ideal.csv --calibration cal.bin --out as-read.csv")
+        .with(0)
+        .printing(&["rows corrupted into"]);
+    folder.run("apply as-read.csv --calibration cal.bin --out back.csv").with(0);
+    let rows = |name: &str| -> Vec<Vec<f64>> {
+        let text = folder.text(name);
+        text.lines()
+            .skip(1)
+            .map(|line| line.split(',').filter_map(|field| field.parse().ok()).collect())
+            .collect()
+    };
+    let (ideal, back) = (rows("ideal.csv"), rows("back.csv"));
+    assert!(ideal.len() > 1000 && ideal.len() == back.len());
+    for (one, other) in ideal.iter().zip(&back) {
+        let near = |(a, b): (&f64, &f64)| (a - b).abs() < 2e-5 * a.abs().max(1.0);
+        assert!(one.len() == other.len() && one.iter().zip(other).all(near), "{one:?} {other:?}");
+    }
+    folder.run("corrupt ideal.csv --calibration cal.bin --out as-read.csv").with(2).telling(&["--force"]);
+    folder.run("corrupt ideal.csv --calibration cal.bin --out other.csv --seed 3").with(2);
 }

@@ -8,6 +8,7 @@ use imucal_host::store::{
 };
 
 mod code;
+mod corrupted;
 mod parameters;
 
 fn triad(unit_in: Unit, unit_out: Unit, scale: f64, bias: [f64; 3]) -> StoredTriad {

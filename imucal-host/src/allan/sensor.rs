@@ -377,9 +377,8 @@ const AXES: [char; 3] = ['x', 'y', 'z'];
 fn odd(sensor: SensorKind, axis: char, found: &Axis, begin: f64) -> Vec<Remark> {
     let mut remarks = Vec::new();
     let misfit = &found.misfit;
-    if misfit.from > 1.01 * begin.max(found.deviations.first().map_or(0.0, |first| first.time))
-        && misfit.from > 2.0 * begin
-    {
+    // The next length after the shortest may be half as long again.
+    if misfit.from > 2.0 * begin {
         remarks.push(Remark::Filtered { sensor, axis, from: misfit.from });
     }
     if misfit.inflation > 1.0 {

@@ -16,6 +16,7 @@ mod apply;
 mod blind;
 mod calibrate;
 mod capture;
+mod corrupt;
 mod demo;
 mod device;
 mod diagnose;
@@ -63,6 +64,8 @@ enum Command {
     Noise(noise::Arguments),
     /// Write a calibration and a unit's noise for another program, and list what that program cannot say.
     Export(export::Arguments),
+    /// Make of an ideal stream what a calibrated unit would have read.
+    Corrupt(corrupt::Arguments),
     /// Run every step on a simulated sensor: record, calibrate, pack, apply, verify, diagnose.
     Demo(demo::Arguments),
     /// Compare estimators and models on simulated data; print tables.
@@ -97,6 +100,7 @@ pub fn run() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Noise(arguments) => noise::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
+        Command::Corrupt(arguments) => corrupt::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Diagnose(arguments) => diagnose::run(&arguments),

@@ -4,7 +4,11 @@ use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::{ExportError, Inputs};
-use crate::{recording::SensorKind, store::StoredTriad};
+use crate::{
+    allan::sensor::si_unit,
+    recording::{SensorKind, Unit},
+    store::StoredTriad,
+};
 
 /// A stored triad in SI units; `None` where the sensor is not calibrated.
 pub(super) fn si_triad(
@@ -14,14 +18,9 @@ pub(super) fn si_triad(
 ) -> Result<Option<Triad<f64>>, ExportError> {
     let calibration = inputs.calibration.ok_or(ExportError::NoCalibration { target })?;
     let Some(stored) = calibration.triad(kind) else { return Ok(None) };
-    let wrong = |found| ExportError::WrongUnit {
-        target,
-        sensor: kind,
-        found,
-        expected: crate::allan::sensor::si_unit(kind),
-    };
-    let si = |unit: crate::recording::Unit| {
-        let known = unit.per_si().filter(|_| unit != crate::recording::Unit::Arbitrary);
+    let wrong = |found| ExportError::WrongUnit { target, sensor: kind, found, expected: si_unit(kind) };
+    let si = |unit: Unit| {
+        let known = unit.per_si().filter(|_| unit != Unit::Arbitrary);
         known.ok_or_else(|| wrong(unit))
     };
     let (raw, calibrated) = (si(stored.unit_in)?, si(stored.unit_out)?);

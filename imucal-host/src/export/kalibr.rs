@@ -71,15 +71,10 @@ fn levels(kind: SensorKind, sensor: &NoiseOfSensor) -> Result<(Level, Level), Ex
 
 /// Where a bias forgets, the density of its steps: what it does within less than its correlation time.
 fn forgetting(sensor: &NoiseOfSensor) -> Option<Level> {
-    let steps: Option<Vec<f64>> = sensor
-        .known_axes()
-        .map(|axis| match (axis.random_walk.value, axis.bias_std.value.zip(axis.correlation_time.value)) {
-            (Some(walk), _) => Some(walk),
-            (None, Some((std, time))) => Some(level::step_density(std, time)),
-            (None, None) => axis.random_walk.at_most,
-        })
-        .collect();
-    let steps = steps?;
-    let square = steps.iter().map(|step| step * step).sum::<f64>() / steps.len() as f64;
-    Some(Level { value: square.sqrt(), bound: false })
+    let steps = sensor.known_axes().map(|axis| {
+        let forgets = axis.bias_std.value.zip(axis.correlation_time.value);
+        let step = forgets.map(|(std, time)| Level { value: level::step_density(std, time), bound: false });
+        step.or(Level::of(&axis.random_walk))
+    });
+    Level::root_mean_square(steps)
 }

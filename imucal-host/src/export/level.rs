@@ -22,9 +22,14 @@ impl Level {
         known.or(figure.at_most.map(|value| Self { value, bound: true }))
     }
 
-    /// Root mean square over the axes; a bound where one of them is.
+    /// Of a sensor.
     pub fn of_sensor(sensor: &NoiseOfSensor, of: fn(&NoiseOfAxis) -> &Figure) -> Option<Self> {
-        let levels: Option<Vec<Self>> = sensor.known_axes().map(|axis| Self::of(of(axis))).collect();
+        Self::root_mean_square(sensor.known_axes().map(|axis| Self::of(of(axis))))
+    }
+
+    /// Root mean square over the axes; a bound where one of them is.
+    pub fn root_mean_square(levels: impl Iterator<Item = Option<Self>>) -> Option<Self> {
+        let levels: Option<Vec<Self>> = levels.collect();
         let levels = levels.filter(|levels| !levels.is_empty())?;
         let square = levels.iter().map(|level| level.value * level.value).sum::<f64>() / levels.len() as f64;
         Some(Self { value: square.sqrt(), bound: levels.iter().any(|level| level.bound) })

@@ -14,6 +14,7 @@ use super::{
     terms_without_a_place,
 };
 use crate::{
+    allan::sensor::si_unit,
     recording::{SensorKind, unit::MICROTESLA_PER_TESLA},
     store::noise_file::{NoiseOfAxis, NoiseOfSensor},
 };
@@ -58,66 +59,99 @@ fn of_sensor(
     inputs: &Inputs<'_>,
     cannot: &mut Vec<String>,
 ) -> Result<(), ExportError> {
-    let (element, unit, scale) = match kind {
-        SensorKind::Acc => (Some("linear_acceleration"), "m/s^2", 1.0),
-        SensorKind::Gyr => (Some("angular_velocity"), "rad/s", 1.0),
-        SensorKind::Mag => (None, "T", 1.0 / MICROTESLA_PER_TESLA),
+    let element = match kind {
+        SensorKind::Acc => Some("linear_acceleration"),
+        SensorKind::Gyr => Some("angular_velocity"),
+        SensorKind::Mag => None,
     };
-    let duration = inputs.noise.map_or(f64::NAN, |noise| noise.duration);
-    let rate = level::rate(inputs, sensor)?;
-    let indent = if element.is_some() { "      " } else { "    " };
     if let Some(element) = element {
         let _ = writeln!(text, "    <{element}>");
     }
-    for (at, (name, axis)) in ["x", "y", "z"].into_iter().zip(&sensor.axes).enumerate() {
-        let Some(axis) = axis else {
-            cannot.push(format!("{kind}, axis {name}: rounding hides its noise; it has none here"));
-            continue;
-        };
-        let white = Level::of(&axis.white).ok_or_else(|| ExportError::NotKnown {
-            target: TARGET,
-            sensor: kind,
-            what: "white noise",
-            why: axis.white.reason.clone().unwrap_or_default(),
-        })?;
-        let mean = bias(inputs, kind, at, cannot) * scale;
-        let _ = writeln!(text, "{indent}<{name}><noise type=\"gaussian\">");
-        let _ = writeln!(text, "{indent}  <mean>{mean:.6e}</mean> <!-- {unit}: the measured bias -->");
-        let _ = writeln!(
-            text,
-            "{indent}  <stddev>{:.6e}</stddev> <!-- {unit} a sample: N {:.4e} {unit}/sqrt(Hz) times sqrt(rate){} -->",
-            level::per_sample(white.value, rate) * scale,
-            white.value * scale,
-            white.remark()
-        );
-        let _ =
-            writeln!(text, "{indent}  <bias_mean>0</bias_mean> <!-- its sign would be drawn at random -->");
-        match drift(axis, duration) {
-            Some((density, time, words)) => {
-                let _ = writeln!(
-                    text,
-                    "{indent}  <dynamic_bias_stddev>{:.6e}</dynamic_bias_stddev> <!-- {unit}*sqrt(Hz), a density: {words} -->",
-                    density * scale
-                );
-                let _ = writeln!(
-                    text,
-                    "{indent}  <dynamic_bias_correlation_time>{time:.6e}</dynamic_bias_correlation_time> <!-- s -->"
-                );
+    for (at, axis) in sensor.axes.iter().enumerate() {
+        match axis {
+            Some(axis) => {
+                let mean = bias(inputs, kind, at, cannot);
+                let about = About { kind, name: AXES[at], rate: level::rate(inputs, sensor)?, mean };
+                of_axis(text, &about, axis, inputs, cannot)?;
             }
-            None => cannot.push(format!(
-                "{kind}, axis {name}: the drift of the bias, which the recording does not show{}",
-                axis.random_walk.at_most.map_or(String::new(), |most| format!(
-                    " (random walk at most {most:.2e} {})",
-                    axis.random_walk.unit
-                ))
-            )),
+            None => {
+                cannot.push(format!("{kind}, axis {}: rounding hides its noise; it has none here", AXES[at]))
+            }
         }
-        let _ = writeln!(text, "{indent}</noise></{name}>");
     }
     if let Some(element) = element {
         let _ = writeln!(text, "    </{element}>");
     }
     Ok(())
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// What is written of an axis besides its noise.
+struct About {
+    kind: SensorKind,
+    name: &'static str,
+    /// Hz.
+    rate: f64,
+    /// What it reads at zero, SI unit.
+    mean: f64,
+}
+
+fn of_axis(
+    text: &mut String,
+    about: &About,
+    axis: &NoiseOfAxis,
+    inputs: &Inputs<'_>,
+    cannot: &mut Vec<String>,
+) -> Result<(), ExportError> {
+    let About { kind, name, rate, mean } = *about;
+    let (unit, scale) = match kind {
+        SensorKind::Mag => ("T", 1.0 / MICROTESLA_PER_TESLA),
+        _ => (si_unit(kind), 1.0),
+    };
+    let white = Level::of(&axis.white).ok_or_else(|| ExportError::NotKnown {
+        target: TARGET,
+        sensor: kind,
+        what: "white noise",
+        why: axis.white.reason.clone().unwrap_or_default(),
+    })?;
+    let (deviation, density) = (level::per_sample(white.value, rate) * scale, white.value * scale);
+    let remark = white.remark();
+    let mean = mean * scale;
+    // Writing to a string cannot fail.
+    let _ = write!(
+        text,
+        "      <{name}><noise type=\"gaussian\">
+        <mean>{mean:.6e}</mean> <!-- {unit}: the measured bias -->
+        <stddev>{deviation:.6e}</stddev> <!-- {unit} a sample: N {density:.4e} {unit}/sqrt(Hz) times sqrt(rate){remark} -->
+        <bias_mean>0</bias_mean> <!-- its sign would be drawn at random -->
+"
+    );
+    match drift(axis, inputs.noise.map_or(f64::NAN, |noise| noise.duration)) {
+        Some((density, time, words)) => {
+            let density = density * scale;
+            let _ = write!(
+                text,
+                "        <dynamic_bias_stddev>{density:.6e}</dynamic_bias_stddev> <!-- {unit}*sqrt(Hz), a density: {words} -->
+        <dynamic_bias_correlation_time>{time:.6e}</dynamic_bias_correlation_time> <!-- s -->
+"
+            );
+        }
+        None => cannot.push(unseen_drift(about, axis)),
+    }
+    let _ = writeln!(text, "      </noise></{name}>");
+    Ok(())
+}
+
+fn unseen_drift(about: &About, axis: &NoiseOfAxis) -> String {
+    let most = axis
+        .random_walk
+        .at_most
+        .map_or(String::new(), |most| format!(" (random walk at most {most:.2e} {})", axis.random_walk.unit));
+    format!(
+        "{}, axis {}: the drift of the bias, which the recording does not show{most}",
+        about.kind, about.name
+    )
 }
 
 /// Density of the bias' steps, its correlation time, s, and where both come from.

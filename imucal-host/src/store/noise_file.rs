@@ -178,11 +178,10 @@ impl NoiseFile {
     pub fn new(noise: &Noise, warnings: Vec<String>) -> Self {
         let of = |kind: SensorKind| {
             let (_, found) = noise.sensors.iter().find(|(known, _)| *known == kind)?;
-            let unit = noise.manifest.units.of(kind);
-            Some(NoiseOfSensor::new(
-                found,
-                &if unit == Unit::Arbitrary { unit.to_string() } else { si_unit(kind).into() },
-            ))
+            // Of arbitrary units no µT are known.
+            let arbitrary = noise.manifest.units.of(kind) == Unit::Arbitrary;
+            let unit = if arbitrary { Unit::Arbitrary.to_string() } else { si_unit(kind).to_owned() };
+            Some(NoiseOfSensor::new(found, &unit))
         };
         let sensor = &noise.manifest.sensor;
         Self {
