@@ -26,12 +26,14 @@
 //! | [`effect`] | – | the only list of what a simulator may lack; a user's own, from a file |
 //! | [`simulator`] | a movement, effects | what ideal or afflicted sensors put out |
 //! | [`noise`], [`observe`], [`ellipsoid`] | samples | rests, motions, turns, and the noise of their means |
+//! | [`allan`] | a recording that is still, of any length | coefficients of each axis' noise, with intervals |
 //! | [`calibrate`] | observations | triads with standard errors; accepted, suspect or refused |
 //! | [`capture`] | samples as they arrive | what to do next, until a session has calibrated its sensors |
-//! | [`store`], [`apply`], [`device`] | triads | records, corrected recordings, answers of a device |
+//! | [`store`], [`apply`], [`corrupt`], [`device`] | triads | records, corrected and corrupted recordings, answers of a device |
 //! | [`equivalence`] | a calibration | how far the core in `f32` is from a reference in `f64` |
 //! | [`diagnosis`] | a recording, effects | where the gap lies, its causes, what to record next |
 //! | [`blind`], [`study`] | simulated recordings | how often answers and standard errors are right |
+//! | [`export`] | a calibration, a unit's noise | files of other programs, and what they cannot say |
 //! | [`report`], `cli` | any of these | text, JSON, exit status |
 //!
 //! A calibration of the core itself is described in [`imucal_core`].
@@ -58,6 +60,8 @@ pub mod simulator;
 
 pub mod noise;
 
+pub mod allan;
+
 pub mod observe;
 
 pub mod ellipsoid;
@@ -70,6 +74,8 @@ pub mod compare;
 
 pub mod apply;
 
+pub mod corrupt;
+
 pub mod capture;
 
 pub mod device;
@@ -77,6 +83,8 @@ pub mod device;
 pub mod equivalence;
 
 pub mod diagnosis;
+
+pub mod export;
 
 pub mod blind;
 

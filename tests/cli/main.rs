@@ -12,7 +12,9 @@ mod applying;
 mod capturing;
 mod comparing;
 mod end_to_end;
+mod estimating_noise;
 mod exit_status;
+mod exporting;
 mod importing;
 #[cfg(unix)]
 mod interrupting;

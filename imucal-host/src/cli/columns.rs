@@ -49,17 +49,20 @@ pub(super) fn read_with(
     reading: Reading,
 ) -> anyhow::Result<Recording> {
     let mapping = columns.mapping()?;
-    let recording = Recording::read_with(path, &mapping, manifest, &reading.limits()).map_err(|error| {
-        let hint = hint(path, &error, reading);
-        match hint {
-            Some(hint) => anyhow::anyhow!("{error}\n\n{hint}"),
-            None => error.into(),
-        }
-    })?;
+    let recording = Recording::read_with(path, &mapping, manifest, &reading.limits())
+        .map_err(|error| explained(path, error, reading))?;
     for warning in &recording.warnings {
         warn(warning);
     }
     Ok(recording)
+}
+
+/// An error of reading, with what the file's columns probably are where these are not known.
+pub(super) fn explained(path: &Path, error: ReadError, reading: Reading) -> anyhow::Error {
+    match hint(path, &error, reading) {
+        Some(hint) => anyhow::anyhow!("{error}\n\n{hint}"),
+        None => error.into(),
+    }
 }
 
 /// What the file's columns probably are, where it is not known.

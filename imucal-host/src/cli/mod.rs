@@ -18,12 +18,15 @@ mod calibrate;
 mod capture;
 mod columns;
 mod compare;
+mod corrupt;
 mod demo;
 mod device;
 mod diagnose;
+mod export;
 mod import;
 mod inspect;
 mod interrupt;
+mod noise;
 mod output;
 mod overwrite;
 mod progress;
@@ -61,6 +64,12 @@ enum Command {
     Import(import::Arguments),
     /// Simulate a recording of a unit on a flight motion simulator.
     Simulate(simulate::Arguments),
+    /// Estimate the noise of a unit from a recording at rest: Allan deviations and their coefficients, with intervals.
+    Noise(noise::Arguments),
+    /// Write a calibration and a unit's noise for another program, and list what that program cannot say.
+    Export(export::Arguments),
+    /// Make of an ideal stream what a calibrated unit would have read.
+    Corrupt(corrupt::Arguments),
     /// Run every step on a simulated sensor: record, calibrate, pack, apply, verify, diagnose.
     Demo(demo::Arguments),
     /// Compare estimators and models on simulated data; print tables.
@@ -94,6 +103,9 @@ pub fn run() -> ExitCode {
         Command::Device(arguments) => device::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Noise(arguments) => noise::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
+        Command::Corrupt(arguments) => corrupt::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Diagnose(arguments) => diagnose::run(&arguments),

@@ -14,6 +14,7 @@ pub mod layout_guess;
 pub mod manifest;
 pub mod mapping;
 pub mod order_statistics;
+mod parts;
 mod place;
 pub mod read;
 mod read_error;
@@ -145,24 +146,6 @@ impl Recording {
         Self::read_with(path, mapping, None, limits)
     }
 
-    /// The manifest next to a file; a mapped file needs none.
-    fn manifest_of(
-        path: &Path,
-        mapping: &Mapping,
-        limits: &Limits,
-    ) -> Result<(Manifest, Vec<Warning>), ReadError> {
-        let beside = Manifest::path_beside(path).unwrap_or_else(|| path.with_extension("toml"));
-        match Manifest::read_within(&beside, limits) {
-            Err(ReadError::ManifestMissing { .. }) if !mapping.is_empty() => {
-                let assumed = mapping.unstated();
-                let warning = (!assumed.is_empty())
-                    .then(|| Warning::UnitsAssumed { path: path.to_path_buf(), assumed });
-                Ok((Manifest::default(), warning.into_iter().collect()))
-            }
-            read => read,
-        }
-    }
-
     /// As [`Recording::read_as`]; `manifest` takes the place of the one next to the file.
     ///
     /// # Errors
@@ -174,17 +157,7 @@ impl Recording {
         manifest: Option<Manifest>,
         limits: &Limits,
     ) -> Result<Self, ReadError> {
-        let format =
-            Format::of(path).map_err(|found| ReadError::UnknownFormat { path: path.to_path_buf(), found })?;
-        if !path.exists() {
-            let found = "there is no such file".to_owned();
-            return Err(ReadError::Unreadable { path: path.to_path_buf(), found });
-        }
-        let (manifest, warnings) = match manifest {
-            Some(manifest) => (manifest, Vec::new()),
-            None => Self::manifest_of(path, mapping, limits)?,
-        };
-        let manifest = mapping.over(manifest);
+        let (format, manifest, warnings) = parts::opened(path, mapping, manifest, limits)?;
         let unit = manifest.units.t;
         let mut table = match format {
             Format::Csv | Format::CsvGz => read::csv::read(path, unit, mapping, limits)?,
@@ -195,15 +168,9 @@ impl Recording {
                 return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() });
             }
         };
-        // An unknown key is often why the samples cannot be understood, and then nobody would read the warning.
-        let misspelt =
-            warnings.iter().find(|warning| matches!(warning, Warning::UnknownKey { nearest: Some(_), .. }));
-        let misspelt = misspelt.cloned().map(Box::new);
+        let misled = parts::misled(&warnings);
         table.warnings.splice(0..0, warnings);
-        read::assembly::assemble(path, manifest, table).map_err(|error| match misspelt {
-            Some(warning) => ReadError::Misled { error: Box::new(error), warning },
-            None => error,
-        })
+        read::assembly::assemble(path, manifest, table).map_err(misled)
     }
 
     /// Writes the samples, in the units of the manifest, as the ending of `path` says, and the manifest

@@ -9,6 +9,9 @@ use super::sensor_kind::SensorKind;
 /// Standard gravity, m/s² (CGPM 1901, exact): what a file's `g` means.
 pub const STANDARD_GRAVITY: f64 = 9.80665;
 
+/// What other programs have fields in: µT in a tesla.
+pub const MICROTESLA_PER_TESLA: f64 = 1e6;
+
 /// Unit of a sensor's columns, spelt in the manifest as the contract spells it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]

@@ -8,6 +8,7 @@ pub mod json;
 pub mod layout;
 pub mod measure;
 pub mod model;
+pub mod noise;
 pub mod prose;
 pub mod table;
 pub mod temperature;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 pub mod form;
 pub mod higher_order;
+pub mod noise_file;
 pub mod record_form;
 pub mod watch_file;
 

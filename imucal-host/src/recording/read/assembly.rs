@@ -16,6 +16,7 @@ use crate::recording::{
     check::{absurd, unit_check},
     manifest::Manifest,
     order_statistics::median,
+    place::Places,
     read_error::ReadError,
     sensor_kind::SensorKind,
     simulated::Simulated,
@@ -25,7 +26,23 @@ use crate::recording::{
 };
 
 /// Makes a recording of a table, or says what is wrong with it.
-pub(crate) fn assemble(path: &Path, manifest: Manifest, mut table: Table) -> Result<Recording, ReadError> {
+pub(crate) fn assemble(path: &Path, manifest: Manifest, table: Table) -> Result<Recording, ReadError> {
+    let (mut recording, places) = converted(path, manifest, table)?;
+    interval::check(&mut recording)?;
+    unit_check::check(&mut recording)?;
+    absurd::mask(&mut recording, &places);
+    Ok(recording)
+}
+
+/// The same of rows that follow others of one file. Units were judged by those; a few rows at the end show none.
+pub(crate) fn continued(path: &Path, manifest: Manifest, table: Table) -> Result<Recording, ReadError> {
+    let (mut recording, places) = converted(path, manifest, table)?;
+    absurd::mask(&mut recording, &places);
+    Ok(recording)
+}
+
+/// A table in SI units, and the places of its rows.
+fn converted(path: &Path, manifest: Manifest, mut table: Table) -> Result<(Recording, Places), ReadError> {
     let time = std::mem::take(&mut table.columns[TIME]);
     if time.is_empty() {
         return Err(ReadError::NoRows { path: path.to_path_buf() });
@@ -60,10 +77,7 @@ pub(crate) fn assemble(path: &Path, manifest: Manifest, mut table: Table) -> Res
     };
     keep_assumed(&mut recording);
     note_columns(&mut recording);
-    interval::check(&mut recording)?;
-    unit_check::check(&mut recording)?;
-    absurd::mask(&mut recording, &table.places);
-    Ok(recording)
+    Ok((recording, table.places))
 }
 
 fn check_time(path: &Path, time: &[f64], table: &Table, unit: TimeUnit) -> Result<(), ReadError> {

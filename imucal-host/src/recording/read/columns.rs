@@ -8,8 +8,7 @@ use super::{
     header_fault::{HeaderFault, MisspeltColumn, names_listed},
 };
 use crate::recording::{
-    ExtraColumn, place::Places, read_error::ReadError, sensor_kind::SensorKind, topic, unit::TimeUnit,
-    warning::Warning,
+    ExtraColumn, place::Places, read_error::ReadError, sensor_kind::SensorKind, topic, warning::Warning,
 };
 
 /// Number of columns the contract knows.
@@ -168,8 +167,8 @@ impl Layout {
         layout
     }
 
-    /// A table with room for `rows` rows in the columns that are there, and times in `unit`.
-    pub(crate) fn table(&self, rows: usize, places: Places, unit: TimeUnit) -> Table {
+    /// A table with room for `rows` rows in the columns that are there, and times by `clock`.
+    pub(crate) fn table(&self, rows: usize, places: Places, clock: Clock) -> Table {
         let room = |present: &bool| {
             if *present { Vec::with_capacity(rows) } else { Vec::new() }
         };
@@ -181,7 +180,7 @@ impl Layout {
                 .map(|name| ExtraColumn { name: name.clone(), values: Vec::new() })
                 .collect(),
             places,
-            clock: Clock::new(unit),
+            clock,
             warnings: Vec::new(),
         }
     }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{
+    clock::Clock,
     columns::{Layout, TIME, Table, Target, infinite_is_missing},
     csv_rows::Rows,
     number::{self, NotANumber},
@@ -26,23 +27,51 @@ pub(crate) fn read(
     limits: &Limits,
 ) -> Result<Table, ReadError> {
     let mut rows = Rows::open(path, limits)?;
-    if !mapping.is_empty() {
-        rows.find_separator()?;
-    }
-    table(path, unit, mapping, &mut rows, limits).map_err(|error| {
-        // Of a damaged stream nothing that is wrong in its text says more.
-        let damage = if error.is_limit() { None } else { rows.text.damage() };
-        damage.unwrap_or(error)
-    })
+    reader(path, unit, mapping, &mut rows, limits.size)
+        .and_then(|mut reader| reader.part(&mut rows, usize::MAX))
+        .map_err(|error| explained(error, &mut rows))
 }
 
-fn table(
+/// As [`read`], but by parts of so many rows. The text may be of any length; the limit is that of one part.
+pub(crate) fn read_parts(
     path: &Path,
     unit: TimeUnit,
     mapping: &Mapping,
-    rows: &mut Rows<'_>,
     limits: &Limits,
-) -> Result<Table, ReadError> {
+    length: usize,
+    take: &mut dyn FnMut(Table) -> Result<(), ReadError>,
+) -> Result<(), ReadError> {
+    let unlimited = Limits { size: u64::MAX, ..*limits };
+    let mut rows = Rows::open(path, &unlimited)?;
+    let mut reader =
+        reader(path, unit, mapping, &mut rows, limits.size).map_err(|error| explained(error, &mut rows))?;
+    loop {
+        let table = reader.part(&mut rows, length).map_err(|error| explained(error, &mut rows))?;
+        let last = reader.ended;
+        take(table)?;
+        if last {
+            return Ok(());
+        }
+    }
+}
+
+/// Of a damaged stream nothing that is wrong in its text says more.
+fn explained(error: ReadError, rows: &mut Rows<'_>) -> ReadError {
+    let damage = if error.is_limit() { None } else { rows.text.damage() };
+    damage.unwrap_or(error)
+}
+
+/// A reader that has read the header.
+fn reader<'a>(
+    path: &'a Path,
+    unit: TimeUnit,
+    mapping: &Mapping,
+    rows: &mut Rows<'_>,
+    limit: u64,
+) -> Result<CsvReader<'a>, ReadError> {
+    if !mapping.is_empty() {
+        rows.find_separator()?;
+    }
     let blank = |rows: &Rows<'_>| rows.fields().all(|field| field.trim_ascii().is_empty()) && rows.len() == 1;
     if !rows.advance()? || (blank(rows) && !rows.advance()?) {
         return Err(ReadError::Empty { path: path.to_path_buf() });
@@ -53,17 +82,21 @@ fn table(
     let renamed = mapping.renamed(&names).map_err(fault)?;
     let layout = Layout::new(&renamed.iter().map(String::as_str).collect::<Vec<_>>(), path)?;
     let names: Vec<String> = names.iter().map(|name| name.trim().to_owned()).collect();
-    CsvReader { path, unit, layout, names, limit: limits.size, taken: 0 }.read(rows)
+    Ok(CsvReader { path, clock: Clock::new(unit), layout, names, limit, taken: 0, rows: 0, ended: false })
 }
 
 struct CsvReader<'a> {
     path: &'a Path,
-    unit: TimeUnit,
+    clock: Clock,
     layout: Layout,
     names: Vec<String>,
-    /// Bytes that the samples may take in memory, and those they take.
+    /// Bytes that the samples of a part may take in memory, and those they take.
     limit: u64,
     taken: u64,
+    /// Rows of the parts before.
+    rows: usize,
+    /// The text has no more rows.
+    ended: bool,
 }
 
 /// What is wrong with a field, before the place is known.
@@ -73,16 +106,23 @@ struct BadField {
 }
 
 impl CsvReader<'_> {
-    fn read(mut self, rows: &mut Rows<'_>) -> Result<Table, ReadError> {
+    /// The next rows, so many at the most.
+    fn part(&mut self, rows: &mut Rows<'_>, length: usize) -> Result<Table, ReadError> {
         // A guess that is a little high; it spares the growing columns their copies.
         let row = (self.layout.row_size() + size_of::<u64>()) as u64;
         let guess =
             (rows.text.expected / (self.names.len() * 7).max(1) as u64).min(self.limit / row) as usize;
-        let mut table = self.layout.table(guess, Places::Lines(Vec::new()), self.unit);
-        let mut lines = Vec::with_capacity(guess);
-        while rows.advance()? {
+        let mut table = self.layout.table(guess.min(length), Places::Lines(Vec::new()), self.clock.clone());
+        let mut lines = Vec::with_capacity(guess.min(length));
+        self.taken = 0;
+        while lines.len() < length {
+            if !rows.advance()? {
+                self.ended = true;
+                break;
+            }
             let last = rows.cut;
             if last && self.drop_cut_line(rows, &mut table) {
+                self.ended = true;
                 break;
             }
             if rows.len() != self.names.len() {
@@ -93,12 +133,12 @@ impl CsvReader<'_> {
             lines.push(rows.line);
             self.take(rows)?;
         }
-        if rows.text.truncated {
-            table
-                .warnings
-                .push(Warning::TruncatedStream { path: self.path.to_path_buf(), rows: lines.len() });
+        self.rows += lines.len();
+        if self.ended && rows.text.truncated {
+            table.warnings.push(Warning::TruncatedStream { path: self.path.to_path_buf(), rows: self.rows });
         }
         table.places = Places::Lines(lines);
+        self.clock.clone_from(&table.clock);
         Ok(table)
     }
 

@@ -1,25 +1,25 @@
 //! Samples as Parquet: the columns of the CSV, numbers as doubles, unknown columns as text.
 
-use std::{cell::Cell, fs::File, path::Path};
+use std::{fs::File, ops::Range, path::Path};
 
 use ::parquet::{
     basic::ConvertedType,
     column::reader::{ColumnReader, ColumnReaderImpl},
     data_type::{ByteArray, DataType},
     errors::ParquetError,
-    file::{
-        metadata::ParquetMetaData,
-        reader::{FileReader, RowGroupReader, SerializedFileReader},
-    },
+    file::reader::{FileReader, RowGroupReader, SerializedFileReader},
     schema::types::ColumnDescriptor,
 };
 
+mod memory;
+
+use self::memory::{Memory, refuse_too_long};
 use super::{
     clock::Clock,
     columns::{KNOWN, Layout, NAMES, TIME, Table, Target, infinite_is_missing},
 };
 use crate::{
-    file::{Limits, limits::Size},
+    file::Limits,
     recording::{mapping::Mapping, place::Places, read_error::ReadError, unit::TimeUnit},
 };
 
@@ -30,22 +30,61 @@ pub(crate) fn read(
     mapping: &Mapping,
     limits: &Limits,
 ) -> Result<Table, ReadError> {
+    let reader = open(path)?;
+    groups(path, &reader, 0..reader.num_row_groups(), Clock::new(unit), mapping, limits)
+}
+
+/// As [`read`], but by row groups. The file may be of any length; the limits are those of one group.
+pub(crate) fn read_parts(
+    path: &Path,
+    unit: TimeUnit,
+    mapping: &Mapping,
+    limits: &Limits,
+    take: &mut dyn FnMut(Table) -> Result<(), ReadError>,
+) -> Result<(), ReadError> {
+    let reader = open(path)?;
+    let mut clock = Clock::new(unit);
+    // A file without a group is one without a row, which a whole reading says.
+    if reader.num_row_groups() == 0 {
+        return take(groups(path, &reader, 0..0, clock, mapping, limits)?);
+    }
+    for group in 0..reader.num_row_groups() {
+        let table = groups(path, &reader, group..group + 1, clock, mapping, limits)?;
+        clock = table.clock.clone();
+        take(table)?;
+    }
+    Ok(())
+}
+
+fn open(path: &Path) -> Result<SerializedFileReader<File>, ReadError> {
     let file = File::open(path)
         .map_err(|cause| ReadError::Unreadable { path: path.to_path_buf(), found: cause.to_string() })?;
+    SerializedFileReader::new(file).map_err(|cause| damaged(path, &cause))
+}
+
+/// The rows of some groups.
+fn groups(
+    path: &Path,
+    reader: &SerializedFileReader<File>,
+    which: Range<usize>,
+    clock: Clock,
+    mapping: &Mapping,
+    limits: &Limits,
+) -> Result<Table, ReadError> {
     let damaged = |cause: ParquetError| damaged(path, &cause);
-    let reader = SerializedFileReader::new(file).map_err(damaged)?;
-    refuse_too_long(path, reader.metadata(), limits)?;
+    refuse_too_long(path, reader.metadata(), &which, limits)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
     let fault = |fault| ReadError::Mapping { path: path.to_path_buf(), fault };
     let renamed = mapping.renamed(&names.iter().map(String::as_str).collect::<Vec<_>>()).map_err(fault)?;
     let layout = Layout::new(&renamed.iter().map(String::as_str).collect::<Vec<_>>(), path)?;
-    let rows: u64 = reader.metadata().row_groups().iter().map(|group| group.num_rows().max(0) as u64).sum();
-    let memory = Memory { path, limit: limits.size, taken: Cell::new(0) };
+    let found = &reader.metadata().row_groups()[which.clone()];
+    let rows: u64 = found.iter().map(|group| group.num_rows().max(0) as u64).sum();
+    let memory = Memory::new(path, limits.size);
     memory.take(rows.saturating_mul(layout.row_size() as u64));
     memory.check()?;
-    let mut table = layout.table(rows as usize, Places::Rows, unit);
-    for group in 0..reader.num_row_groups() {
+    let mut table = layout.table(rows as usize, Places::Rows, clock);
+    for group in which {
         let group = reader.get_row_group(group).map_err(damaged)?;
         for (at, target) in layout.targets.iter().enumerate() {
             let descriptor = &schema.column(at);
@@ -87,42 +126,6 @@ fn refuse_infinite(path: &Path, table: &Table) -> Result<(), ReadError> {
         }
     }
     Ok(())
-}
-
-/// What the file says of itself, before anything is made of it.
-fn refuse_too_long(path: &Path, found: &ParquetMetaData, limits: &Limits) -> Result<(), ReadError> {
-    if found.file_metadata().schema_descr().num_columns() > limits.columns {
-        let (path, limit) = (path.to_path_buf(), limits.columns);
-        return Err(ReadError::TooManyColumns { path, line: 1, limit });
-    }
-    let sizes = found.row_groups().iter().flat_map(|group| group.columns());
-    let size = sizes.fold(0u64, |sum, column| sum.saturating_add(column.uncompressed_size().max(0) as u64));
-    if size > limits.size {
-        return Err(ReadError::TooLong { path: path.to_path_buf(), limit: Size(limits.size) });
-    }
-    Ok(())
-}
-
-/// Bytes that the samples take in memory, against those they may take.
-struct Memory<'a> {
-    path: &'a Path,
-    limit: u64,
-    taken: Cell<u64>,
-}
-
-impl Memory<'_> {
-    /// Counts so many more; whether they are allowed.
-    fn take(&self, bytes: u64) -> bool {
-        self.taken.set(self.taken.get().saturating_add(bytes));
-        self.taken.get() <= self.limit
-    }
-
-    fn check(&self) -> Result<(), ReadError> {
-        if self.take(0) {
-            return Ok(());
-        }
-        Err(ReadError::TooManySamples { path: self.path.to_path_buf(), limit: Size(self.limit) })
-    }
 }
 
 /// One column of one row group.
@@ -366,7 +369,7 @@ mod tests {
         assert_says(&message, &["run.parquet", "damaged", "expected an intact Parquet file", "copy"]);
 
         let layout = Layout::new(&["t", "speed"], Path::new("a")).unwrap();
-        let mut table = layout.table(1, Places::Rows, TimeUnit::Second);
+        let mut table = layout.table(1, Places::Rows, Clock::new(TimeUnit::Second));
         table.columns[0].push(0.0);
         table.extra[0].name = "temp".to_owned();
         table.extra[0].values.push("warm".to_owned());
@@ -388,7 +391,7 @@ mod tests {
             &["more than 3 columns", "--max-columns"],
         );
         let layout = Layout::new(&["t", "note"], Path::new("a")).unwrap();
-        let mut table = layout.table(0, Places::Rows, TimeUnit::Second);
+        let mut table = layout.table(0, Places::Rows, Clock::new(TimeUnit::Second));
         table.columns[0] = (0..300).map(f64::from).collect();
         table.extra[0].values = vec!["long ".repeat(300); 300];
         let mut bytes = Vec::new();

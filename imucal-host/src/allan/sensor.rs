@@ -1,0 +1,389 @@
+//! The noise of one sensor, as its samples arrive.
+
+use nalgebra::Vector3;
+
+use super::{
+    cascade::Cascade,
+    clock::{Before, Gaps, SampleClock},
+    coefficients::{Axis, Estimator, Sums},
+    stillness::{Moved, Stillness},
+};
+use crate::recording::SensorKind;
+
+/// Samples from which the interval and a constant are taken before the first is used.
+const HEAD: usize = 1024;
+/// A recording shorter than this, s, or of fewer samples, shows no noise.
+const SHORTEST: f64 = 10.0;
+const FEWEST: u64 = 256;
+/// Samples that are bridged at most, of all.
+const BRIDGED: f64 = 0.05;
+/// Repeated samples beyond this share come from an output that is read more often than it changes.
+const REPEATED: f64 = 0.2;
+/// Averages are fitted from so many repetitions on.
+const REPETITIONS: f64 = 4.0;
+
+/// Why a sensor has no noise to report.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// Too few samples, or too short a time.
+    #[error(
+        "found {samples} samples in {duration:.1} s, expected at least {FEWEST} samples and {SHORTEST:.0} s; record \
+         longer: an hour for the bias instability, a minute for the white noise"
+    )]
+    TooShort {
+        /// Samples.
+        samples: u64,
+        /// Their duration, s.
+        duration: f64,
+    },
+    /// It moved.
+    #[error(
+        "{} of {} blocks of a second moved: a standard deviation of {:.3e} at {:.1} s where {:.3e} is usual, a step of \
+         {:.3e} at {:.1} s where {:.3e} is usual ({unit}); record the sensor untouched, or cut the recording",
+        .moved.blocks, .moved.of, .moved.deviation.0, .moved.deviation.1, .moved.usual_deviation,
+        .moved.step.0, .moved.step.1, .moved.usual_step
+    )]
+    NotStill {
+        /// What moved.
+        moved: Moved,
+        /// Unit of the sizes.
+        unit: &'static str,
+    },
+    /// The inertial sensors moved, and so did this one.
+    #[error("the {by} moved, and this sensor with it")]
+    MovedWith {
+        /// Which.
+        by: SensorKind,
+    },
+    /// Too many samples are missing.
+    #[error(
+        "{missing} of {of} samples are missing, expected at most {:.0} %; record without losses", 100.0 * BRIDGED
+    )]
+    Missing {
+        /// Samples that were bridged.
+        missing: u64,
+        /// All of them.
+        of: u64,
+    },
+}
+
+impl Refusal {
+    /// Its name in a report.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::TooShort { .. } => "too-short",
+            Self::NotStill { .. } => "not-still",
+            Self::MovedWith { .. } => "moved-with",
+            Self::Missing { .. } => "samples-missing",
+        }
+    }
+}
+
+/// What is odd about a sensor's samples and changes no answer.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Remark {
+    /// Times are irregular.
+    #[error(
+        "{sensor}: intervals vary by {:.1} % rms; samples are taken as equally spaced, {interval:.6} s apart", 100.0 * .jitter
+    )]
+    Jitter {
+        /// Which sensor.
+        sensor: SensorKind,
+        /// Rms of the intervals, of their mean.
+        jitter: f64,
+        /// Their mean, s.
+        interval: f64,
+    },
+    /// Samples are missing.
+    #[error(
+        "{sensor}: samples are missing from {first:.3} s on; {bridged} were bridged by straight lines, {gaps} longer gaps (up \
+         to {longest:.2} s) end a stretch, and no average goes across"
+    )]
+    Gaps {
+        /// Which sensor.
+        sensor: SensorKind,
+        /// Time of the first, s.
+        first: f64,
+        /// Samples bridged.
+        bridged: u64,
+        /// Longer gaps.
+        gaps: u64,
+        /// The longest, s.
+        longest: f64,
+    },
+    /// Little moved.
+    #[error(
+        "{sensor}: {blocks} of {of} blocks of a second moved, at {time:.1} s the most; the variances hardly show it"
+    )]
+    Knocked {
+        /// Which sensor.
+        sensor: SensorKind,
+        /// Blocks that moved.
+        blocks: u64,
+        /// All of them.
+        of: u64,
+        /// Time of the largest, s.
+        time: f64,
+    },
+    /// The output is read more often than it changes.
+    #[error(
+        "{sensor}: each value is read {times:.1} times on average before it changes; averages below {shortest:.3} s are not \
+         fitted"
+    )]
+    Repeated {
+        /// Which sensor.
+        sensor: SensorKind,
+        /// How often.
+        times: f64,
+        /// Averages from which on are fitted, s.
+        shortest: f64,
+    },
+    /// The kinds of noise do not explain the variances.
+    #[error(
+        "{sensor}, axis {axis}: white noise, bias instability and random walk do not explain the variances (chi-squared \
+         {chi_square:.0} of {freedom} degrees of freedom); standard errors were raised by {inflation:.1}"
+    )]
+    Misfit {
+        /// Which sensor.
+        sensor: SensorKind,
+        /// x, y or z.
+        axis: char,
+        /// χ².
+        chi_square: f64,
+        /// Its degrees of freedom.
+        freedom: usize,
+        /// The factor.
+        inflation: f64,
+    },
+    /// Averages were left out.
+    #[error(
+        "{sensor}, axis {axis}: averages below {from:.3} s do not fit, as after a filter; they are left out of the fit"
+    )]
+    Filtered {
+        /// Which sensor.
+        sensor: SensorKind,
+        /// x, y or z.
+        axis: char,
+        /// From which on they were fitted, s.
+        from: f64,
+    },
+    /// The axis shows nothing but one value.
+    #[error(
+        "{sensor}, axis {axis}: all samples are {value}: rounding hides the noise, and the axis has no coefficients"
+    )]
+    Constant {
+        /// Which sensor.
+        sensor: SensorKind,
+        /// x, y or z.
+        axis: char,
+        /// The value, SI unit.
+        value: f64,
+    },
+}
+
+/// The noise of a still sensor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensorNoise {
+    /// Samples.
+    pub samples: u64,
+    /// From sample to sample, s.
+    pub interval: f64,
+    /// Time of all stretches, s.
+    pub duration: f64,
+    /// Of x, y and z; `None` where all samples are one value.
+    pub axes: [Option<Axis>; 3],
+}
+
+/// Takes a sensor's samples.
+#[derive(Debug)]
+pub struct SensorStream {
+    kind: SensorKind,
+    head: Vec<(f64, Vector3<f64>)>,
+    running: Option<Running>,
+}
+
+#[derive(Debug)]
+struct Running {
+    clock: SampleClock,
+    stillness: Stillness,
+    cascade: Cascade,
+    /// Taken from all samples, which keeps digits.
+    origin: Vector3<f64>,
+    last: Vector3<f64>,
+    sum: Vector3<f64>,
+    samples: u64,
+    repeated: u64,
+}
+
+impl SensorStream {
+    /// Before the first sample.
+    pub fn new(kind: SensorKind) -> Self {
+        Self { kind, head: Vec::new(), running: None }
+    }
+
+    /// A sample, SI unit, and its time, s, later than those before.
+    pub fn push(&mut self, time: f64, sample: &Vector3<f64>) {
+        if let Some(running) = &mut self.running {
+            running.push(time, sample);
+            return;
+        }
+        self.head.push((time, *sample));
+        if self.head.len() == HEAD {
+            self.start();
+        }
+    }
+
+    fn start(&mut self) {
+        let times: Vec<f64> = self.head.iter().map(|(time, _)| *time).collect();
+        let Some(clock) = SampleClock::new(&times) else { return };
+        let origin = self.head.iter().map(|(_, sample)| sample).sum::<Vector3<f64>>() / times.len() as f64;
+        let mut running = Running {
+            stillness: Stillness::new(self.kind, clock.nominal()),
+            clock,
+            cascade: Cascade::default(),
+            origin,
+            last: Vector3::repeat(f64::NAN),
+            sum: Vector3::zeros(),
+            samples: 0,
+            repeated: 0,
+        };
+        self.head.drain(..).for_each(|(time, sample)| running.push(time, &sample));
+        self.running = Some(running);
+    }
+
+    /// What moved.
+    pub fn moved(&self) -> Option<Moved> {
+        self.running.as_ref().and_then(|running| running.stillness.moved())
+    }
+
+    /// Ends the stream: what few samples were held back are counted.
+    pub fn end(&mut self) {
+        if self.running.is_none() {
+            self.start();
+        }
+    }
+
+    /// The noise of all samples, and what is odd about them.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`], with its figures.
+    pub fn noise(&self) -> Result<(SensorNoise, Vec<Remark>), Refusal> {
+        let Some(running) = &self.running else {
+            return Err(Refusal::TooShort { samples: self.head.len() as u64, duration: 0.0 });
+        };
+        let moved = running.stillness.moved();
+        if let Some(moved) = moved.filter(|moved| moved.spoils) {
+            return Err(Refusal::NotStill { moved, unit: si_unit(self.kind) });
+        }
+        running.noise(self.kind, moved)
+    }
+}
+
+/// SI unit of a sensor, in words.
+pub fn si_unit(kind: SensorKind) -> &'static str {
+    match kind {
+        SensorKind::Acc => "m/s^2",
+        SensorKind::Gyr => "rad/s",
+        SensorKind::Mag => "uT",
+    }
+}
+
+impl Running {
+    fn push(&mut self, time: f64, sample: &Vector3<f64>) {
+        let sample = sample - self.origin;
+        match self.clock.before(time) {
+            Before::Nothing => {}
+            Before::Bridge(missing) => {
+                for k in 1..=missing {
+                    let share = k as f64 / (missing + 1) as f64;
+                    self.cascade.push(&(self.last + (sample - self.last) * share));
+                }
+            }
+            Before::Gap => self.cascade.interrupt(),
+        }
+        self.cascade.push(&sample);
+        self.stillness.push(time, &sample);
+        self.repeated += u64::from(sample == self.last);
+        self.samples += 1;
+        self.sum += sample;
+        self.last = sample;
+    }
+
+    fn noise(&self, kind: SensorKind, moved: Option<Moved>) -> Result<(SensorNoise, Vec<Remark>), Refusal> {
+        let (interval, gaps) = (self.clock.interval(), self.clock.gaps());
+        let samples = self.samples + gaps.bridged;
+        let duration = samples as f64 * interval;
+        if samples < FEWEST || duration < SHORTEST {
+            return Err(Refusal::TooShort { samples, duration });
+        }
+        if gaps.bridged as f64 > BRIDGED * samples as f64 {
+            return Err(Refusal::Missing { missing: gaps.bridged, of: samples });
+        }
+        let mut remarks = self.remarks(kind, &gaps, moved);
+        let mean = self.origin + self.sum / self.samples as f64;
+        let points = self.cascade.points();
+        // The finest average shows whether an axis moves at all.
+        let moves = |axis: usize| points.iter().any(|point| point.variance[axis] > 0.0);
+        let moving = std::array::from_fn::<bool, 3, _>(moves);
+        let sums = Sums::new(&points, samples);
+        let estimator = Estimator::new(&points, &sums, samples, interval);
+        let shortest = self.shortest();
+        let axes = std::array::from_fn(|axis| {
+            if !moving[axis] {
+                remarks.push(Remark::Constant { sensor: kind, axis: AXES[axis], value: mean[axis] });
+                return None;
+            }
+            let found = estimator.axis(axis, mean[axis], shortest);
+            remarks.extend(odd(kind, AXES[axis], &found, shortest.max(1.0) * interval));
+            Some(found)
+        });
+        Ok((SensorNoise { samples: self.samples, interval, duration, axes }, remarks))
+    }
+
+    /// Samples of the shortest average that is fitted.
+    fn shortest(&self) -> f64 {
+        let times = self.samples as f64 / (self.samples - self.repeated).max(1) as f64;
+        if self.repeated as f64 > REPEATED * self.samples as f64 { REPETITIONS * times } else { 1.0 }
+    }
+
+    fn remarks(&self, sensor: SensorKind, gaps: &Gaps, moved: Option<Moved>) -> Vec<Remark> {
+        /// Rms of intervals that is worth a word.
+        const JITTER: f64 = 0.01;
+        let (jitter, interval) = (self.clock.jitter(), self.clock.interval());
+        let mut remarks = Vec::new();
+        if jitter > JITTER {
+            remarks.push(Remark::Jitter { sensor, jitter, interval });
+        }
+        if let Some(first) = gaps.first {
+            let Gaps { bridged, gaps, longest, .. } = *gaps;
+            remarks.push(Remark::Gaps { sensor, first, bridged, gaps, longest });
+        }
+        if let Some(moved) = moved {
+            let Moved { blocks, of, deviation: (_, time), .. } = moved;
+            remarks.push(Remark::Knocked { sensor, blocks, of, time });
+        }
+        let shortest = self.shortest();
+        if shortest > 1.0 {
+            let (times, shortest) = (shortest / REPETITIONS, shortest * interval);
+            remarks.push(Remark::Repeated { sensor, times, shortest });
+        }
+        remarks
+    }
+}
+
+const AXES: [char; 3] = ['x', 'y', 'z'];
+
+fn odd(sensor: SensorKind, axis: char, found: &Axis, begin: f64) -> Vec<Remark> {
+    let mut remarks = Vec::new();
+    let misfit = &found.misfit;
+    // The next length after the shortest may be half as long again.
+    if misfit.from > 2.0 * begin {
+        remarks.push(Remark::Filtered { sensor, axis, from: misfit.from });
+    }
+    if misfit.inflation > 1.0 {
+        let (chi_square, freedom) = (misfit.chi_square, misfit.freedom);
+        remarks.push(Remark::Misfit { sensor, axis, chi_square, freedom, inflation: misfit.inflation });
+    }
+    remarks
+}

@@ -1,0 +1,153 @@
+//! `imucal export`
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::{Args, ValueEnum};
+
+use super::{
+    Ending, load,
+    output::{self, say},
+    overwrite::{Overwrite, Planned},
+    reading::Reading,
+    refuse, warn,
+};
+use crate::{
+    diagnosis::finding::{self, Cause, Diagnosis},
+    export::{self, Inputs, Target},
+    file::Limits,
+    store::noise_file::NoiseFile,
+};
+
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Example:\n  imucal export cal.toml --noise noise.json --to c-header --out imu_calibration.h"
+)]
+pub(super) struct Arguments {
+    /// The calibration: TOML or record
+    calibration: PathBuf,
+    /// The program that reads it
+    #[arg(long, value_name = "TARGET")]
+    to: To,
+    /// The noise of the unit, by `imucal noise --json`
+    #[arg(long, value_name = "NOISE.json")]
+    noise: Option<PathBuf>,
+    /// What a diagnosis found, by `imucal diagnose --json`; the targets have no place for it and list it
+    #[arg(long, value_name = "DIAGNOSIS.json")]
+    diagnosis: Option<PathBuf>,
+    /// Samples a second of the target; without it those of the noise's recording
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// Write to a file in place of the screen
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum To {
+    /// Kalibr's imu.yaml: noise
+    Kalibr,
+    /// A Gazebo sensor: noise and bias
+    Sdf,
+    /// A Python module that needs numpy alone: forward model and its inverse
+    Python,
+    /// A C99 header that corrects samples, with the bits of the core
+    CHeader,
+    /// ROS: imu_calib's YAML and covariances of messages
+    Ros,
+    /// PX4's parameters
+    Px4,
+    /// ArduPilot's parameters
+    Ardupilot,
+    /// Every number, a row each
+    Csv,
+}
+
+impl From<To> for Target {
+    fn from(to: To) -> Self {
+        match to {
+            To::Kalibr => Self::Kalibr,
+            To::Sdf => Self::Sdf,
+            To::Python => Self::Python,
+            To::CHeader => Self::CHeader,
+            To::Ros => Self::Ros,
+            To::Px4 => Self::Px4,
+            To::Ardupilot => Self::Ardupilot,
+            To::Csv => Self::Csv,
+        }
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let mut inputs = vec![arguments.calibration.clone()];
+    inputs.extend(arguments.noise.iter().chain(&arguments.diagnosis).cloned());
+    let outputs: Vec<Planned> = arguments.out.iter().map(Planned::new).collect();
+    let mut files = arguments.overwrite.plan(&inputs, &outputs)?;
+    let limits = arguments.reading.limits();
+    let calibration = match load(&arguments.calibration, arguments.reading)? {
+        Ok(stored) => stored,
+        Err(damaged) => return Ok(refuse(&damaged)),
+    };
+    let noise = arguments.noise.as_ref().map(|path| NoiseFile::read(path, &limits)).transpose()?;
+    let causes =
+        arguments.diagnosis.as_ref().map(|path| causes(path, &limits)).transpose()?.unwrap_or_default();
+    if let Some(noise) = noise.as_ref().filter(|noise| {
+        !noise.serial.is_empty()
+            && !calibration.sensor.serial.is_empty()
+            && noise.serial != calibration.sensor.serial
+    }) {
+        warn(&format!(
+            "the noise is of serial `{}`, the calibration of `{}`; check that they belong together",
+            noise.serial, calibration.sensor.serial
+        ));
+    }
+    let given = Inputs {
+        calibration: Some(&calibration),
+        noise: noise.as_ref(),
+        causes: &causes,
+        rate: arguments.rate,
+    };
+    let document = match export::document(arguments.to.into(), &given) {
+        Ok(document) => document,
+        Err(refusal) => return Ok(refuse(&refusal)),
+    };
+    let Some(out) = &arguments.out else {
+        output::text(&document.text)?;
+        return Ok(Ending::Done);
+    };
+    files.add(out, document.text.as_bytes())?;
+    files.commit()?;
+    say!("{}: written; it cannot say", out.display());
+    for line in &document.cannot {
+        say!("  - {line}");
+    }
+    Ok(Ending::Done)
+}
+
+/// Causes that a diagnosis asserts, in words.
+fn causes(path: &Path, limits: &Limits) -> anyhow::Result<Vec<String>> {
+    let expected = || {
+        format!(
+            "{}: expected `{}`; give the file that `imucal diagnose --json` wrote",
+            path.display(),
+            finding::FORMAT
+        )
+    };
+    let bytes = limits.read_small(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    let diagnosis: Diagnosis = serde_json::from_slice(&bytes).with_context(expected)?;
+    anyhow::ensure!(diagnosis.format == finding::FORMAT, "{}", expected());
+    Ok(diagnosis.causes.iter().map(described).collect())
+}
+
+fn described(cause: &Cause) -> String {
+    let sizes = cause
+        .parameters
+        .iter()
+        .filter_map(|amount| Some(format!("{} {:.4e} {}", amount.name, amount.value?, amount.unit)));
+    let sizes: Vec<String> = sizes.collect();
+    if sizes.is_empty() { cause.effect.clone() } else { format!("{} ({})", cause.effect, sizes.join(", ")) }
+}

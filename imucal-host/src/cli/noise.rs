@@ -1,0 +1,99 @@
+//! `imucal noise`
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::{
+    Ending,
+    columns::{self, Columns},
+    output::{self, say},
+    overwrite::{Overwrite, Planned, files_of},
+    reading::Reading,
+    refuse, warn,
+};
+use crate::{
+    allan::{self, sensor::Refusal},
+    export::{self, Inputs, Target},
+    report,
+    store::noise_file::NoiseFile,
+};
+
+#[derive(Args, Debug)]
+#[command(after_help = "Example:\n  imucal noise still.csv --json noise.json")]
+pub(super) struct Arguments {
+    /// A recording of the untouched unit: an hour or more for the bias instability
+    recording: PathBuf,
+    /// Write everything as JSON; `-` prints it
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Print the settings of another program in place of the tables
+    #[arg(long, value_name = "TARGET")]
+    to: Option<To>,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+/// What the noise alone can be printed for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum To {
+    /// Kalibr's imu.yaml
+    Kalibr,
+    /// The noise of a Gazebo sensor
+    Sdf,
+    /// The JSON
+    Json,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let on_screen = arguments.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
+    anyhow::ensure!(!(on_screen && arguments.to.is_some()), "--json -: found --to too, expected one of them");
+    let outputs: Vec<Planned> = arguments.json.iter().filter(|_| !on_screen).map(Planned::new).collect();
+    let mut files = arguments.overwrite.plan(&files_of(&arguments.recording), &outputs)?;
+    let mapping = arguments.columns.mapping()?;
+    let noise = allan::noise(&arguments.recording, &mapping, &arguments.reading.limits())
+        .map_err(|error| columns::explained(&arguments.recording, error, arguments.reading))?;
+    let mut warnings: Vec<String> = noise.warnings.iter().map(ToString::to_string).collect();
+    warnings.extend(noise.remarks.iter().map(ToString::to_string));
+    warnings.iter().for_each(|warning| warn(warning));
+    let file = NoiseFile::new(&noise, warnings);
+    if let Some(path) = arguments.json.as_ref().filter(|_| !on_screen) {
+        files.add(path, file.text().as_bytes())?;
+        files.commit()?;
+    }
+    let estimated = noise.sensors.iter().any(|(_, found)| found.is_ok());
+    match arguments.to {
+        _ if on_screen => output::text(&file.text())?,
+        Some(To::Json) => output::text(&file.text())?,
+        Some(to) if estimated => return print(&file, to),
+        _ => output::text(&report::noise::noise(&file))?,
+    }
+    if estimated {
+        return Ok(Ending::Done);
+    }
+    // What moved says more than what moved with it.
+    let refusals = noise.sensors.iter().filter_map(|(_, found)| found.as_ref().err());
+    let moved_with = |refusal: &&Refusal| matches!(refusal, Refusal::MovedWith { .. });
+    let first = refusals.min_by_key(moved_with).map(ToString::to_string);
+    let nothing = || format!("{}: found no sensor, expected the columns of one", file.recording);
+    Ok(refuse(&first.unwrap_or_else(nothing)))
+}
+
+fn print(file: &NoiseFile, to: To) -> anyhow::Result<Ending> {
+    let target = if to == To::Kalibr { Target::Kalibr } else { Target::Sdf };
+    let inputs = Inputs { noise: Some(file), ..Inputs::default() };
+    match export::document(target, &inputs) {
+        Ok(document) => {
+            output::text(&document.text)?;
+            Ok(Ending::Done)
+        }
+        Err(refusal) => {
+            say!("{}: nothing printed", file.recording);
+            Ok(refuse(&refusal))
+        }
+    }
+}

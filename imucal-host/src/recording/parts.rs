@@ -1,0 +1,199 @@
+//! Recordings of any length, read by parts in constant memory.
+
+use std::{mem, path::Path};
+
+use super::{Format, Manifest, Mapping, ReadError, Recording, Warning, read};
+use crate::file::Limits;
+
+/// Rows of a part of a text file: a second at 65 kHz, 10 MiB of ten columns.
+const ROWS: usize = 1 << 16;
+
+impl Recording {
+    /// Reads a recording by parts, each a recording of consecutive rows. What is odd but harmless is returned, each kind
+    /// of warning once, and in [`Recording::warnings`] of no part.
+    ///
+    /// A part of a text file has 65 536 rows; one of a Parquet file is a row group. `limits` hold for one part, so that
+    /// the file may be of any length.
+    ///
+    /// # Errors
+    ///
+    /// As [`Recording::read`]; units are judged by the first part alone.
+    pub fn read_parts(
+        path: &Path,
+        mapping: &Mapping,
+        limits: &Limits,
+        take: &mut dyn FnMut(&Self),
+    ) -> Result<Vec<Warning>, ReadError> {
+        let (format, manifest, warnings) = opened(path, mapping, None, limits)?;
+        let misled = misled(&warnings);
+        let unit = manifest.units.t;
+        let mut parts =
+            Parts { path, manifest, of_manifest: warnings, warnings: Vec::new(), last: None, take };
+        let mut next = |table| parts.next(table);
+        let read = match format {
+            Format::Csv | Format::CsvGz => {
+                read::csv::read_parts(path, unit, mapping, limits, ROWS, &mut next)
+            }
+            #[cfg(feature = "parquet")]
+            Format::Parquet => read::parquet::read_parts(path, unit, mapping, limits, &mut next),
+            #[cfg(not(feature = "parquet"))]
+            Format::Parquet => return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() }),
+        };
+        read.map_err(misled)?;
+        Ok(parts.warnings)
+    }
+}
+
+/// The format of a samples file, its manifest with what a mapping states, and what is odd in that. A mapped file needs no manifest.
+pub(super) fn opened(
+    path: &Path,
+    mapping: &Mapping,
+    manifest: Option<Manifest>,
+    limits: &Limits,
+) -> Result<(Format, Manifest, Vec<Warning>), ReadError> {
+    let format =
+        Format::of(path).map_err(|found| ReadError::UnknownFormat { path: path.to_path_buf(), found })?;
+    if !path.exists() {
+        let found = "there is no such file".to_owned();
+        return Err(ReadError::Unreadable { path: path.to_path_buf(), found });
+    }
+    let (manifest, warnings) = match manifest {
+        Some(manifest) => (manifest, Vec::new()),
+        None => manifest_of(path, mapping, limits)?,
+    };
+    Ok((format, mapping.over(manifest), warnings))
+}
+
+fn manifest_of(
+    path: &Path,
+    mapping: &Mapping,
+    limits: &Limits,
+) -> Result<(Manifest, Vec<Warning>), ReadError> {
+    let beside = Manifest::path_beside(path).unwrap_or_else(|| path.with_extension("toml"));
+    match Manifest::read_within(&beside, limits) {
+        Err(ReadError::ManifestMissing { .. }) if !mapping.is_empty() => {
+            let assumed = mapping.unstated();
+            let warning =
+                (!assumed.is_empty()).then(|| Warning::UnitsAssumed { path: path.to_path_buf(), assumed });
+            Ok((Manifest::default(), warning.into_iter().collect()))
+        }
+        read => read,
+    }
+}
+
+/// An unknown key is often why the samples cannot be understood, and then nobody would read the warning.
+pub(super) fn misled(warnings: &[Warning]) -> impl FnOnce(ReadError) -> ReadError + use<> {
+    let misspelt =
+        warnings.iter().find(|warning| matches!(warning, Warning::UnknownKey { nearest: Some(_), .. }));
+    let misspelt = misspelt.cloned().map(Box::new);
+    move |error| match misspelt {
+        Some(warning) => ReadError::Misled { error: Box::new(error), warning },
+        None => error,
+    }
+}
+
+struct Parts<'a> {
+    path: &'a Path,
+    manifest: Manifest,
+    /// What is odd in the manifest, for the first part to judge.
+    of_manifest: Vec<Warning>,
+    warnings: Vec<Warning>,
+    /// The last time of the parts before, s.
+    last: Option<f64>,
+    take: &'a mut dyn FnMut(&Recording),
+}
+
+impl Parts<'_> {
+    fn next(&mut self, mut table: read::columns::Table) -> Result<(), ReadError> {
+        let empty = table.columns[read::columns::TIME].is_empty();
+        if empty && self.last.is_some() {
+            self.note(mem::take(&mut table.warnings));
+            return Ok(());
+        }
+        table.warnings.splice(0..0, mem::take(&mut self.of_manifest));
+        let (clock, place) = (table.clock.clone(), table.places.of(0));
+        let assemble = match self.last {
+            None => read::assembly::assemble,
+            Some(_) => read::assembly::continued,
+        };
+        let mut part = assemble(self.path, self.manifest.clone(), table)?;
+        let text = |time: f64| clock.text(time * clock.per_si());
+        if let Some((last, first)) = self.last.zip(part.time.first().copied()).filter(|(last, t)| t <= last) {
+            return Err(ReadError::TimeOrder {
+                path: self.path.to_path_buf(),
+                place,
+                found: text(first),
+                before: text(last),
+                remedy: "sort the rows by time, or split the file where the clock was reset".to_owned(),
+            });
+        }
+        self.note(mem::take(&mut part.warnings));
+        self.last = part.time.last().copied();
+        (self.take)(&part);
+        Ok(())
+    }
+
+    /// Keeps what no part before has said.
+    fn note(&mut self, warnings: Vec<Warning>) {
+        if self.last.is_none() {
+            self.warnings.extend(warnings);
+            return;
+        }
+        for warning in warnings {
+            let same = |kept: &Warning| mem::discriminant(kept) == mem::discriminant(&warning);
+            if !self.warnings.iter().any(same) {
+                self.warnings.push(warning);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::fixture::{Fixture, assert_says, csv};
+
+    fn rows(times: impl Iterator<Item = f64>) -> String {
+        times.fold("t,gyr_x,gyr_y,gyr_z,note\n".to_owned(), |text, t| {
+            text + &format!("{t},0,0,{},a\n", t / 1024.0)
+        })
+    }
+
+    #[derive(Default)]
+    struct Read {
+        lengths: Vec<usize>,
+        values: Vec<f64>,
+        warnings: Vec<Warning>,
+    }
+
+    fn parts(fixture: &Fixture) -> Result<Read, ReadError> {
+        let mut read = Read::default();
+        read.warnings =
+            Recording::read_parts(&fixture.path, &Mapping::default(), &Limits::default(), &mut |part| {
+                read.lengths.push(part.rows());
+                read.values.extend(part.gyr.iter().flat_map(|gyr| gyr.values.iter().map(|rate| rate.z)));
+            })?;
+        Ok(read)
+    }
+
+    #[test]
+    fn the_parts_are_the_whole_and_each_warning_is_said_once() {
+        let fixture = csv(rows((0..2 * ROWS + 3).map(|k| k as f64 / 256.0)));
+        let Read { lengths, values, warnings } = parts(&fixture).unwrap();
+        assert_eq!(lengths, [ROWS, ROWS, 3]);
+        let whole = fixture.read();
+        assert!(whole.time.iter().zip(&values).all(|(time, rate)| *rate == time / 1024.0));
+        assert_eq!(whole.rows(), values.len());
+        assert_eq!(whole.warnings, warnings);
+    }
+
+    #[test]
+    fn a_clock_that_runs_back_between_two_parts_is_refused_with_its_line() {
+        let fixture = csv(rows((0..ROWS + 3).map(|k| (k % ROWS) as f64 / 256.0)));
+        let message = parts(&fixture).err().unwrap().to_string();
+        assert_says(
+            &message,
+            &[&format!("line {}", ROWS + 2), "found 0 after 255.99609375", "sort the rows"],
+        );
+    }
+}

@@ -1,0 +1,55 @@
+//! What a Parquet file may come to: by what it says of itself, and by what its samples take.
+
+use std::{cell::Cell, ops::Range, path::Path};
+
+use ::parquet::file::metadata::ParquetMetaData;
+
+use crate::{
+    file::{Limits, limits::Size},
+    recording::read_error::ReadError,
+};
+
+/// What the file says of itself and of some of its groups, before anything is made of them.
+pub(super) fn refuse_too_long(
+    path: &Path,
+    found: &ParquetMetaData,
+    which: &Range<usize>,
+    limits: &Limits,
+) -> Result<(), ReadError> {
+    if found.file_metadata().schema_descr().num_columns() > limits.columns {
+        let (path, limit) = (path.to_path_buf(), limits.columns);
+        return Err(ReadError::TooManyColumns { path, line: 1, limit });
+    }
+    let sizes = found.row_groups()[which.clone()].iter().flat_map(|group| group.columns());
+    let size = sizes.fold(0u64, |sum, column| sum.saturating_add(column.uncompressed_size().max(0) as u64));
+    if size > limits.size {
+        return Err(ReadError::TooLong { path: path.to_path_buf(), limit: Size(limits.size) });
+    }
+    Ok(())
+}
+
+/// Bytes that the samples take in memory, against those they may take.
+pub(super) struct Memory<'a> {
+    path: &'a Path,
+    limit: u64,
+    taken: Cell<u64>,
+}
+
+impl<'a> Memory<'a> {
+    pub(super) fn new(path: &'a Path, limit: u64) -> Self {
+        Self { path, limit, taken: Cell::new(0) }
+    }
+
+    /// Counts so many more; whether they are allowed.
+    pub(super) fn take(&self, bytes: u64) -> bool {
+        self.taken.set(self.taken.get().saturating_add(bytes));
+        self.taken.get() <= self.limit
+    }
+
+    pub(super) fn check(&self) -> Result<(), ReadError> {
+        if self.take(0) {
+            return Ok(());
+        }
+        Err(ReadError::TooManySamples { path: self.path.to_path_buf(), limit: Size(self.limit) })
+    }
+}

@@ -1,0 +1,105 @@
+//! The noise of a unit, for people.
+
+use super::{measure::plain, prose::hanging, table::words};
+use crate::{
+    recording::SensorKind,
+    store::noise_file::{Figure, NoiseFile, NoiseOfAxis, NoiseOfSensor},
+};
+
+/// Tables of each sensor's coefficients, and what is not known.
+pub fn noise(file: &NoiseFile) -> String {
+    let mut text = format!("{}: {} s\n", file.recording, plain(file.duration));
+    for kind in SensorKind::ALL {
+        let Some(sensor) = file.sensor(kind) else { continue };
+        text.push('\n');
+        match &sensor.detail {
+            Some(detail) => text.push_str(&hanging(&format!("{}: refused: ", words(kind)), detail)),
+            None => text.push_str(&of_sensor(kind, sensor)),
+        }
+    }
+    text
+}
+
+fn of_sensor(kind: SensorKind, sensor: &NoiseOfSensor) -> String {
+    let rate = sensor.rate.unwrap_or(f64::NAN);
+    let mut text =
+        format!("{}: {} samples at {} Hz, {}\n", words(kind), sensor.samples, plain(rate), sensor.unit);
+    text.push_str(&format!("  {:<30} {:>21} {:>21} {:>21}\n", "", "x", "y", "z"));
+    for (name, of) in FIGURES {
+        let cells: Vec<String> = sensor.axes.iter().map(|axis| cell(axis.as_ref().map(of))).collect();
+        let head =
+            sensor.known_axes().next().map_or(String::new(), |axis| format!("{name}, {}", of(axis).unit));
+        text.push_str(&format!("  {head:<30}"));
+        cells.iter().for_each(|cell| text.push_str(&format!(" {cell:>21}")));
+        text.push('\n');
+    }
+    let least = |axis: &Option<NoiseOfAxis>| {
+        axis.as_ref().map_or(String::from("–"), |axis| {
+            format!("{} at {} s", plain(axis.least_deviation), plain(axis.least_at))
+        })
+    };
+    text.push_str(&format!("  {:<30}", "least deviation"));
+    sensor.axes.iter().for_each(|axis| text.push_str(&format!(" {:>21}", least(axis))));
+    text.push('\n');
+    text.push_str(&reasons(sensor));
+    text
+}
+
+/// A coefficient's name and where an axis has it.
+type Row = (&'static str, fn(&NoiseOfAxis) -> &Figure);
+
+const FIGURES: [Row; 6] = [
+    ("N white", |axis| &axis.white),
+    ("B bias instability", |axis| &axis.bias_instability),
+    ("K random walk", |axis| &axis.random_walk),
+    ("Q quantisation", |axis| &axis.quantisation),
+    ("T correlation time", |axis| &axis.correlation_time),
+    ("bias that forgets", |axis| &axis.bias_std),
+];
+
+/// A value with its interval, or the most that it may be.
+fn cell(figure: Option<&Figure>) -> String {
+    let Some(figure) = figure else { return "–".into() };
+    match (figure.value, figure.interval, figure.at_most) {
+        (Some(value), Some([low, high]), _) => interval(value, low, high),
+        (_, _, Some(most)) => format!("< {most:.2e}"),
+        _ => "–".into(),
+    }
+}
+
+/// Three digits, and the interval's ends in percent of the value.
+fn interval(value: f64, low: f64, high: f64) -> String {
+    let share = |end: f64| {
+        let percent = 100.0 * (end / value - 1.0);
+        if percent.abs() < 9.5 { format!("{percent:+.1}") } else { format!("{percent:+.0}") }
+    };
+    format!("{value:.2e} {}{}%", share(high), share(low))
+}
+
+/// Why coefficients have no value, each reason once.
+fn reasons(sensor: &NoiseOfSensor) -> String {
+    let mut text = String::new();
+    for (name, of) in FIGURES {
+        let mut said: Vec<String> = Vec::new();
+        for (axis, found) in ["x", "y", "z"].into_iter().zip(&sensor.axes) {
+            let Some(reason) = found.as_ref().and_then(|found| of(found).reason.clone()) else { continue };
+            said.push(format!("{axis}: {reason}"));
+        }
+        if let Some(first) = said.first() {
+            let more = if said.len() > 1 { "; other axes in the JSON" } else { "" };
+            text.push_str(&hanging(&format!("  no {name}: "), &format!("{first}{more}")));
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_are_printed_in_percent_of_the_value() {
+        assert_eq!(interval(1.0e-3, 0.99e-3, 1.012e-3), "1.00e-3 +1.2-1.0%");
+        assert_eq!(interval(2.0e-5, 1.5e-5, 3.0e-5), "2.00e-5 +50-25%");
+    }
+}
