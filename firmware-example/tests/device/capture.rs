@@ -351,7 +351,7 @@ fn the_board_s_own_sensors_bring_a_session_its_samples_while_they_are_streamed()
     let mut memory = BenchMemory::new();
     let sensors = Queued::default();
     let mut bench = Bench::new(Nor::new(2), SERIAL, sensors.clone(), &mut memory);
-    bench.ask(&Request::StartCapture(task()), |reply| state(reply));
+    bench.ask(&Request::StartCapture(task()), state);
     let samples = tumble(14);
     let own = |sample: &RawSample| Sample { raw: sample.raw, temperature: 25.0, time: Some(sample.time) };
     bench.ask(&Request::Stream { every: 100 }, |reply| assert_eq!(*reply, Reply::Done));

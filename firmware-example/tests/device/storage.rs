@@ -302,7 +302,6 @@ fn a_cut_while_a_record_is_stored_loses_neither_the_last_one_nor_the_one_before(
             let mut slots = Slots::open(&mut torn).expect("it opens");
             let mut writing = slots.begin(now).expect("room");
             let stored = (0..=cut).any(|_| slots.step(&mut writing).expect("flash").is_some());
-            drop(slots);
             let mut slots = Slots::open(&mut torn).expect("it opens");
             let (mut buffer, mut other) = ([0; MAX_LEN], [0; MAX_LEN]);
             let newest = slots.read(&mut buffer).expect("it reads").to_vec();

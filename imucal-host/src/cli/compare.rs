@@ -33,7 +33,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let outputs: Vec<Planned> = arguments.json.iter().map(|path| Planned::new(path)).collect();
+    let outputs: Vec<Planned> = arguments.json.iter().map(Planned::new).collect();
     let inputs = [arguments.first.clone(), arguments.second.clone()];
     let mut files = arguments.overwrite.plan(&inputs, &outputs)?;
     let mut both = Vec::new();

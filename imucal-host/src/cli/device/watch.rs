@@ -28,7 +28,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let outputs: Vec<Planned> = arguments.out.iter().map(|path| Planned::new(path)).collect();
+    let outputs: Vec<Planned> = arguments.out.iter().map(Planned::new).collect();
     let mut files = arguments.overwrite.plan(&arguments.place.files(), &outputs)?;
     let Some(summary) = arguments.place.open()?.watch()? else {
         return Ok(refuse(
