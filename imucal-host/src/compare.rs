@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_of_the_axes_a_scale_and_a_skew_are_told_apart() {
+    fn a_turn_of_the_axes_a_scale_and_a_skew_are_distinguished() {
         let before = calibrated(3);
         let mut after = before.clone();
         let gyr = after.gyr.as_mut().expect("calibrated");

@@ -65,12 +65,12 @@ fn a_mapped_log_gives_what_the_recording_made_of_it_gives() {
 fn a_mapping_that_contradicts_itself_the_file_or_the_numbers_is_bad_usage() {
     let folder = Folder::new();
     folder.write("log.csv", log(','));
-    let told = |options: &str, parts: &[&str]| {
+    let says = |options: &str, parts: &[&str]| {
         folder.run(&format!("calibrate log.csv --time timestamp_ms {options}")).with(2).telling(parts);
     };
-    told("--map acc=ax,ay,ay", &["`ay` mapped twice"]);
-    told("--map acc=ax,ay,aw", &["no column `aw`", "Then this reads it"]);
-    told("--map force=ax,ay,az", &["`force`", "`acc`, `gyr`"]);
-    told("--map acc=ax,ay,az --unit acc=deg/s", &["--unit acc", "m/s^2"]);
-    told("--map acc=ax,ay,az --unit acc=mg", &["median length"]);
+    says("--map acc=ax,ay,ay", &["`ay` mapped twice"]);
+    says("--map acc=ax,ay,aw", &["no column `aw`", "Then this reads it"]);
+    says("--map force=ax,ay,az", &["`force`", "`acc`, `gyr`"]);
+    says("--map acc=ax,ay,az --unit acc=deg/s", &["--unit acc", "m/s^2"]);
+    says("--map acc=ax,ay,az --unit acc=mg", &["median length"]);
 }
