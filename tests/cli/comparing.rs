@@ -1,6 +1,19 @@
-//! `imucal compare`: two calibrations of one unit.
+//! `imucal compare` and `imucal check`: two calibrations of one unit.
+
+use imucal_tests::simulated;
 
 use super::Folder;
+
+/// The calibration with the first bias of a sensor so many counts off.
+fn moved(folder: &Folder, sensor: &str, counts: f64) -> String {
+    let text = folder.text("cal.toml");
+    let at = text.find(&format!("[{sensor}]")).expect("a sensor");
+    let line = text[at..].lines().find(|line| line.starts_with("bias = [")).expect("a bias");
+    let first = line["bias = [".len()..].split(',').next().expect("three");
+    let changed: f64 = first.trim().parse::<f64>().expect("a number") + counts;
+    let other = line.replacen(first, &format!("{changed:?}"), 1);
+    format!("{}{}", &text[..at], text[at..].replacen(line, &other, 1))
+}
 
 #[test]
 fn a_calibration_compared_with_itself_has_not_moved_and_a_changed_one_has() {
@@ -14,18 +27,7 @@ fn a_calibration_compared_with_itself_has_not_moved_and_a_changed_one_has() {
     assert_eq!(json["format"], "imucal-compare/1");
     assert_eq!(json["sensors"].as_array().map(Vec::len), Some(3));
 
-    // A bias of the gyroscope that is a hundred counts off.
-    let text = folder.text("cal.toml");
-    let at = text.find("[gyr]").expect("a gyroscope");
-    let line = text[at..].lines().find(|line| line.starts_with("bias = [")).expect("a bias").to_owned();
-    let first: f64 =
-        line["bias = [".len()..].split(',').next().expect("three").trim().parse().expect("a number");
-    let changed = line.replacen(
-        &line["bias = [".len()..line.find(',').expect("three")],
-        &(first + 100.0).to_string(),
-        1,
-    );
-    folder.write("later.toml", text.replacen(&line, &changed, 1));
+    folder.write("later.toml", moved(&folder, "gyr", 100.0));
     folder
         .run("compare cal.toml later.toml")
         .with(0)
@@ -38,4 +40,35 @@ fn calibrations_of_two_units_are_compared_only_on_request() {
     folder.write("other.toml", folder.text("cal.toml").replace("serial = \"", "serial = \"X"));
     folder.run("compare cal.toml other.toml").with(1).telling(&["serials", "--other-serial"]);
     folder.run("compare cal.toml other.toml --other-serial").with(0);
+}
+
+#[test]
+fn a_calibration_still_fits_another_recording_of_its_unit_and_a_moved_one_does_not() {
+    let folder = Folder::with_calibration();
+    let other = simulated::tumbled(simulated::RESTS, 77);
+    other.write(&folder.path("other.csv")).expect("room");
+    folder
+        .run("check other.csv --calibration cal.toml --json check.json")
+        .with(0)
+        .printing(&["accelerometer: the calibration still fits", "gyroscope: the calibration still fits"]);
+    assert!(folder.text("check.json").contains("imucal-compare/1"));
+
+    folder.write("moved.toml", moved(&folder, "acc", 100.0));
+    folder.run("check other.csv --calibration moved.toml").with(1).printing(&[
+        "accelerometer: the calibration no longer fits",
+        "gyroscope: the calibration still fits",
+        "moved beyond chance: bias_x",
+    ]);
+}
+
+#[test]
+fn a_recording_that_calibrates_nothing_checks_nothing() {
+    let folder = Folder::with_calibration();
+    let few = simulated::tumbled(2, 5);
+    few.write(&folder.path("few.csv")).expect("room");
+    folder
+        .run("check few.csv --calibration cal.toml")
+        .with(1)
+        .printing(&["accelerometer: not checked; this recording does not calibrate it"])
+        .telling(&["nothing is checked"]);
 }

@@ -16,6 +16,7 @@ mod apply;
 mod blind;
 mod calibrate;
 mod capture;
+mod check;
 mod columns;
 mod compare;
 mod corrupt;
@@ -52,6 +53,8 @@ enum Command {
     Capture(capture::Arguments),
     /// Correct a recording with the core's code, as a device does.
     Apply(apply::Arguments),
+    /// Check whether a calibration still fits a unit, by a recording of it
+    Check(check::Arguments),
     /// Compare two calibrations of a unit: how far each parameter has moved, and what that means
     Compare(compare::Arguments),
     /// Print a calibration, its quality, and whether it is intact.
@@ -97,6 +100,7 @@ pub fn run() -> ExitCode {
         Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments),
         Command::Apply(arguments) => apply::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),

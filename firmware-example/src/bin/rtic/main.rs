@@ -135,7 +135,7 @@ mod app {
             }
             Mono::delay_until(due).await;
             if let Ok(sample) = sensor.read() {
-                let time = Some(Mono::now().duration_since_epoch().to_micros());
+                let time = Some(Mono::now().duration_since_epoch().as_micros());
                 SAMPLES.offer(Sample { time, ..sample });
             }
         }

@@ -1,0 +1,111 @@
+//! `imucal check`
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::Args;
+
+use super::{
+    Ending,
+    calibrate::today,
+    columns::{self, Columns},
+    load, output,
+    overwrite::{Overwrite, Planned, files_of},
+    reading::Reading,
+    refuse, warn,
+};
+use crate::{
+    apply,
+    calibrate::{Calibration, Options, calibrate},
+    compare::{CompareFault, Comparison, compare},
+    recording::SensorKind,
+    report::{self, table::words},
+    store::StoredCalibration,
+};
+
+#[derive(Args, Debug)]
+#[command(after_help = "Example:\n  imucal check tumble.csv --calibration unit.toml")]
+pub(super) struct Arguments {
+    /// A recording that a calibration can be made from
+    recording: PathBuf,
+    /// The calibration to check: TOML or record
+    #[arg(long, value_name = "CAL")]
+    calibration: PathBuf,
+    /// Check a calibration made for another serial
+    #[arg(long)]
+    other_serial: bool,
+    /// Write the comparison with the recording's own calibration as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let outputs: Vec<Planned> = arguments.json.iter().map(Planned::new).collect();
+    let mut inputs = files_of(&arguments.recording);
+    inputs.push(arguments.calibration.clone());
+    let mut files = arguments.overwrite.plan(&inputs, &outputs)?;
+    let stored = match load(&arguments.calibration, arguments.reading)? {
+        Ok(stored) => stored,
+        Err(damaged) => return Ok(refuse(&damaged)),
+    };
+    let recording = columns::read(&arguments.recording, &arguments.columns, arguments.reading)?;
+    let record = stored.to_record(&arguments.calibration)?;
+    match apply::check(&recording, &stored, &record, arguments.other_serial) {
+        Ok(warning) => warning.iter().for_each(|warning| warn(warning)),
+        Err(refusal) => return Ok(refuse(&refusal)),
+    }
+    let calibration = calibrate(&recording, &Options::default(), &|_| {});
+    calibration.warnings.iter().for_each(|warning| warn(warning));
+    let now = StoredCalibration::of(&calibration, today());
+    let comparison = match compare(&stored, &now, arguments.other_serial) {
+        Ok(comparison) => comparison,
+        Err(CompareFault::Nothing) => {
+            output::text(&unchecked(&stored, &calibration))?;
+            return Ok(refuse(&"this recording calibrates none of the sensors, so that nothing is checked"));
+        }
+        Err(fault) => return Ok(refuse(&fault)),
+    };
+    output::text(&(verdicts(&comparison) + &unchecked(&stored, &calibration)))?;
+    output::text(&report::compare::compared(&comparison))?;
+    if let Some(path) = &arguments.json {
+        let json =
+            serde_json::to_string_pretty(&comparison).context("the comparison cannot be spelt as JSON")?;
+        files.add(path, (json + "\n").as_bytes())?;
+    }
+    files.commit()?;
+    let fits = comparison.sensors.iter().all(|sensor| !sensor.has_moved());
+    Ok(if fits { Ending::Done } else { Ending::Refused })
+}
+
+/// A line for each sensor that was compared; ends its lines.
+fn verdicts(comparison: &Comparison) -> String {
+    let line = |kind: SensorKind, moved: bool| {
+        let verdict = if moved { "no longer fits" } else { "still fits, within the errors of both" };
+        format!("{}: the calibration {verdict}\n", words(kind))
+    };
+    comparison.sensors.iter().map(|sensor| line(sensor.sensor, sensor.has_moved())).collect()
+}
+
+/// A line for each calibrated sensor that this recording does not calibrate, with the reason.
+fn unchecked(stored: &StoredCalibration, calibration: &Calibration) -> String {
+    let mut text = String::new();
+    for kind in SensorKind::ALL.into_iter().filter(|kind| stored.triad(*kind).is_some()) {
+        let outcome = calibration.sensors.iter().find(|outcome| outcome.kind == kind);
+        let why = match outcome {
+            None => "it is not in this recording".to_owned(),
+            Some(outcome) if outcome.accepted().is_some() => continue,
+            Some(outcome) => match &outcome.verdict {
+                Err(refused) => format!("this recording does not calibrate it: {}", refused.refusal),
+                Ok(()) => "its fit to this recording is suspect: its residual is not the noise".to_owned(),
+            },
+        };
+        text += &format!("{}: not checked; {why}\n", words(kind));
+    }
+    text
+}
