@@ -251,7 +251,8 @@ mod tests {
 
     #[test]
     fn a_bias_that_moves_is_named_with_its_size_in_the_calibrated_unit() {
-        let (before, mut after) = (calibrated(1), calibrated(2));
+        let before = calibrated(1);
+        let mut after = before.clone();
         let acc = after.acc.as_mut().expect("calibrated");
         // Five thousandths of g.
         acc.bias[1] += 5e-3 * STANDARD_GRAVITY / acc.gain[1][1];
