@@ -50,9 +50,7 @@ pub fn guess(path: &Path, limits: &Limits) -> Option<LayoutGuess> {
         options.extend(["--time".to_owned(), table.names[time].clone()]);
     }
     let unit = table.time_unit(time);
-    if unit_of_name(&table.names[time]) != Some(unit)
-        && (unit != TimeUnit::Second || table.names[time] == "t")
-    {
+    if unit_of_name(&table.names[time]) != Some(unit) && unit != TimeUnit::Second {
         units.push(format!("t={unit}"));
     }
     let mut any = false;
