@@ -56,7 +56,17 @@ fn a_mapped_log_gives_what_the_recording_made_of_it_gives() {
     folder.run(&format!("import log.csv {MAPPED} --out made.csv")).with(0);
     folder.run("calibrate made.csv --json made.json").with(0);
     let direct = parameters(&folder, "direct.json");
-    assert_eq!(direct, parameters(&folder, "made.json"));
+    // The file has so many digits that nothing of the errors is lost.
+    let made = parameters(&folder, "made.json");
+    for sensor in ["acc", "gyr", "mag"] {
+        let three = |json: &serde_json::Value, key: &str| -> Vec<f64> {
+            (0..3).map(|axis| json[sensor][key][axis].as_f64().expect("a number")).collect()
+        };
+        let (bias, std) = (three(&direct, "bias"), three(&direct, "bias_std"));
+        for ((one, other), std) in bias.iter().zip(three(&made, "bias")).zip(std) {
+            assert!((one - other).abs() < 1e-3 * std, "{sensor}: {one} {other} {std}");
+        }
+    }
     assert_eq!(direct, parameters(&folder, "semicolons.json"));
     assert_eq!(direct["acc"]["unit_in"], "g");
 }
@@ -72,5 +82,6 @@ fn a_mapping_that_contradicts_itself_the_file_or_the_numbers_is_bad_usage() {
     says("--map acc=ax,ay,aw", &["no column `aw`", "Then this reads it"]);
     says("--map force=ax,ay,az", &["`force`", "`acc`, `gyr`"]);
     says("--map acc=ax,ay,az --unit acc=deg/s", &["--unit acc", "m/s^2"]);
-    says("--map acc=ax,ay,az --unit acc=mg", &["median length"]);
+    let all = "--map acc=ax,ay,az --map gyr=gx,gy,gz --map mag=mx,my,mz";
+    says(&format!("{all} --unit acc=mg,gyr=deg/s"), &["median length", "look like `g`"]);
 }
