@@ -21,8 +21,8 @@ use imucal_host::{
     simulator::robot::RobotPair,
 };
 
-const HEALTHY: usize = 20;
-const AFFLICTED: usize = 18;
+const HEALTHY: usize = 40;
+const AFFLICTED: usize = 36;
 /// A set of any nonce must do; this one has been drawn once and for all, so that the test has one outcome.
 const NONCE: &str = "20261122";
 
