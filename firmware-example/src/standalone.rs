@@ -16,16 +16,13 @@
 
 use core::fmt::{self, Write};
 
+use crate::storage::Slots;
 use embedded_storage::nor_flash::NorFlash;
 use imucal_core::{
-    fit::Units,
-    observer::Sample,
+    link::{CaptureSensor, CaptureTask, RawSample},
     record::{self, CalibrationRecord, Date, RawUnit, Sensor, SensorIdentity},
     session::{Session, SessionSettings},
 };
-use nalgebra::Vector3;
-
-use crate::storage::Slots;
 
 /// What a tape begins with.
 pub const MAGIC: [u8; 4] = *b"TAPE";
@@ -56,8 +53,8 @@ impl Tape for &[u8] {
 struct Header {
     samples: u32,
     date: Date,
+    task: CaptureTask,
     settings: SessionSettings,
-    units: [Units; 3],
 }
 
 fn number(bytes: &[u8], at: usize) -> f32 {
@@ -69,8 +66,8 @@ fn whole(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(four.copied().unwrap_or_default())
 }
 
-fn vector(bytes: &[u8], at: usize) -> Vector3<f32> {
-    Vector3::new(number(bytes, at), number(bytes, at + 4), number(bytes, at + 8))
+fn three(bytes: &[u8], at: usize) -> [f32; 3] {
+    [number(bytes, at), number(bytes, at + 4), number(bytes, at + 8)]
 }
 
 impl Header {
@@ -80,31 +77,21 @@ impl Header {
         if !bytes.starts_with(&MAGIC) {
             return None;
         }
-        let calibrated = [RawUnit::MetrePerSecondSquared, RawUnit::RadianPerSecond, RawUnit::MicroTesla];
-        let mut units = calibrated.map(|calibrated| Units {
-            raw: RawUnit::Counts,
-            calibrated,
-            offset: 0.0,
-            per_unit: 1.0,
+        let usual = SessionSettings::default();
+        let sensors = [0, 1, 2].map(|index| {
+            let (offset, per_unit) = (number(&bytes, 20 + 8 * index), number(&bytes, 24 + 8 * index));
+            CaptureSensor {
+                target: usual.target.get(index).copied().unwrap_or(0.0),
+                full_scale: libm::fabsf(number(&bytes, 44 + 4 * index) / per_unit),
+                unit_in: RawUnit::Counts,
+                offset,
+                per_unit,
+            }
         });
-        let mut full_scale = [f32::INFINITY; 3];
-        for (index, (units, most)) in units.iter_mut().zip(&mut full_scale).enumerate() {
-            (units.offset, units.per_unit) = (number(&bytes, 20 + 8 * index), number(&bytes, 24 + 8 * index));
-            *most = libm::fabsf(number(&bytes, 44 + 4 * index) / units.per_unit);
-        }
         let field = Some(number(&bytes, 16)).filter(|field| field.is_finite());
-        let settings =
-            SessionSettings { gravity: number(&bytes, 12), field, full_scale, ..Default::default() };
+        let task = CaptureTask { gravity: number(&bytes, 12), field, hold: usual.hold, sensors };
         let date = Date::from_days(u16::try_from(whole(&bytes, 8)).unwrap_or(0).into());
-        Some(Self { samples: whole(&bytes, 4), date, settings, units })
-    }
-
-    /// Nominal SI.
-    fn nominal(&self, bytes: &[u8], sensor: Sensor) -> Vector3<f32> {
-        let index = sensor as usize;
-        let units = self.units.get(index).copied();
-        let (offset, per_unit) = units.map_or((0.0, 1.0), |units| (units.offset, units.per_unit));
-        vector(bytes, 8 + 12 * index).map(|raw| (raw - offset) / per_unit)
+        Some(Self { samples: whole(&bytes, 4), date, task, settings: task.settings()? })
     }
 }
 
@@ -141,12 +128,12 @@ fn play(session: &mut Standalone, tape: &mut impl Tape, header: &Header) {
     let mut bytes = [0; SAMPLE];
     for index in 0..header.samples as usize {
         tape.read(HEADER + index * SAMPLE, &mut bytes);
-        let time = u64::from(whole(&bytes, 4)) << 32 | u64::from(whole(&bytes, 0));
-        let temperature = Some(number(&bytes, 44)).filter(|value| value.is_finite());
-        let (acc, gyr) =
-            (header.nominal(&bytes, Sensor::Accelerometer), header.nominal(&bytes, Sensor::Gyroscope));
-        session.push(&Sample { time, acc, gyr: Some(gyr), temperature });
-        session.push_field(&header.nominal(&bytes, Sensor::Magnetometer));
+        let sample = RawSample {
+            time: u64::from(whole(&bytes, 4)) << 32 | u64::from(whole(&bytes, 0)),
+            raw: [8, 20, 32].map(|at| Some(three(&bytes, at))),
+            temperature: number(&bytes, 44),
+        };
+        header.task.push(session, &sample);
         session.work();
     }
     session.finish();
@@ -183,8 +170,8 @@ fn store<F: NorFlash>(
         .filter(|stored| stored.made_for(&unit.serial).is_ok())
         .unwrap_or_else(|| CalibrationRecord::empty(unit.clone(), header.date));
     let mut surer = false;
-    for (sensor, units) in Sensor::ALL.into_iter().zip(&header.units) {
-        if let Ok(triad) = session.better(sensor, units, record.triad(sensor))
+    for (sensor, of) in Sensor::ALL.into_iter().zip(&header.task.sensors) {
+        if let Ok(triad) = session.better(sensor, &of.units(sensor), record.triad(sensor))
             && triad.check(sensor).is_ok()
         {
             record.adopt(sensor, &triad, unit, header.date);

@@ -51,8 +51,6 @@ fn captures() {
     let mut session: Session<8, 2, 16> = Session::new(settings);
     let sample = RawSample { time: 0, raw: [Some([1.0; 3]); 3], temperature: 25.0 };
     reach!(link::CaptureTask::push(&task, &mut session, &sample));
-    let state = reach!(link::CaptureState::of(&session.guide(), 1));
-    reach!(link::CaptureState::guide(&state));
 }
 
 /// What a device that cannot read a frame says.

@@ -9,10 +9,7 @@ use crate::{
     fit::Units,
     observer::Sample,
     record::{Defect, RawUnit, Sensor},
-    session::{
-        Session, SessionSettings,
-        guide::{Advice, Guide, Thrown},
-    },
+    session::{Session, SessionSettings, guide::Guide},
 };
 
 /// Samples of one message at the most.
@@ -86,9 +83,7 @@ impl CaptureTask {
             ..SessionSettings::default()
         })
     }
-}
 
-impl CaptureTask {
     /// Takes a raw sample into a session of this task.
     #[inline(never)]
     pub fn push<const N: usize, const B: usize, const M: usize>(
@@ -120,74 +115,14 @@ pub struct RawSample {
     pub temperature: f32,
 }
 
-/// What to do next: [`Advice`] as it is sent.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Advised {
-    /// [`Advice::HoldStill`].
-    HoldStill,
-    /// [`Advice::HoldOn`].
-    HoldOn,
-    /// [`Advice::Turn`].
-    Turn([f32; 3]),
-    /// [`Advice::TurnAbout`].
-    TurnAbout([f32; 3]),
-    /// [`Advice::Enough`].
-    Enough,
-}
-
-/// How far a session on board is: a [`Guide`] as it is sent.
+/// How far a session on board is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CaptureState {
     /// Samples taken so far; the index of the next in a message is this, modulo 65 536.
     pub samples: u32,
-    /// What to do next.
-    pub advice: Advised,
-    /// What was thrown away.
-    pub thrown: Thrown,
-    /// Rests that are kept.
-    pub rests: u16,
-    /// Turns that are kept.
-    pub turns: u16,
-    /// Points of the magnetometer's cloud.
-    pub points: u16,
-    /// Share of the sphere of directions that the rests of the accelerometer's last fit cover; 0 before it.
-    pub coverage: f32,
-    /// Expected error of a calibrated vector of each sensor, as a share of its length; `None` before its first fit.
-    pub error: [Option<f32>; 3],
-    /// Whether it is accepted as it is.
-    pub accepted: [bool; 3],
-    /// It moves, and has never been still.
-    pub never_still: bool,
-}
-
-impl CaptureState {
-    /// Of a session that has taken so many samples.
-    pub fn of(guide: &Guide, samples: u32) -> Self {
-        let advice = match guide.advice {
-            Advice::HoldStill => Advised::HoldStill,
-            Advice::HoldOn => Advised::HoldOn,
-            Advice::Turn(to) => Advised::Turn(to.into()),
-            Advice::TurnAbout(to) => Advised::TurnAbout(to.into()),
-            Advice::Enough => Advised::Enough,
-        };
-        let Guide { thrown, rests, turns, points, coverage, error, accepted, never_still, .. } = *guide;
-        Self { samples, advice, thrown, rests, turns, points, coverage, error, accepted, never_still }
-    }
-
-    /// What the session's guide says.
-    pub fn guide(&self) -> Guide {
-        let advice = match self.advice {
-            Advised::HoldStill => Advice::HoldStill,
-            Advised::HoldOn => Advice::HoldOn,
-            Advised::Turn(to) => Advice::Turn(to.into()),
-            Advised::TurnAbout(to) => Advice::TurnAbout(to.into()),
-            Advised::Enough => Advice::Enough,
-        };
-        let Self { thrown, rests, turns, points, coverage, error, accepted, never_still, .. } = *self;
-        Guide { advice, thrown, rests, turns, points, coverage, error, accepted, never_still }
-    }
+    /// What its guide says.
+    pub guide: Guide,
 }
 
 /// What a session came to for one sensor.

@@ -68,20 +68,18 @@ mod guard;
 mod key;
 mod message;
 mod session;
+mod status;
 
-pub use capture::{
-    Advised, CaptureOutcome, CaptureSensor, CaptureState, CaptureTask, RawSample, RawSamples, SAMPLES,
-};
+pub use capture::{CaptureOutcome, CaptureSensor, CaptureState, CaptureTask, RawSample, RawSamples, SAMPLES};
 pub use fit::{FitModel, FitProgress, FitReport, FitTask, MOST_COVARIANCE, MOST_PARAMETERS, Observation};
 pub use frame::{
     Frame, FrameError, Header, MAX_FRAME, Origin, Receiver, VERSION_REFUSAL, encode, refuse_version, split,
 };
 pub use guard::{Asked, Guard};
 pub use key::{Key, SEAL, Seal};
-pub use message::{
-    BATCH, Capacity, Fault, Identity, LastReset, RecordState, Reply, Request, ResetCause, Status, Values,
-};
+pub use message::{BATCH, Fault, Reply, Request, Values};
 pub use session::{Nonces, WINDOW};
+pub use status::{Capacity, Identity, LastReset, RecordState, ResetCause, Status};
 
 /// Version of the messages that this library writes and reads.
 pub const VERSION: u8 = 2;

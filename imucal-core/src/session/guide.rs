@@ -27,23 +27,25 @@ pub struct Thrown {
     pub forgotten: u16,
 }
 
-/// What to do next.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What to do next. The order of the variants is the messages' format: append only.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Advice {
     /// Lay the sensor still: no rest was seen yet, or it moves since a while.
     HoldStill,
     /// Keep it still: the rest that goes on is too short.
     HoldOn,
     /// Turn it until the specific force (upwards, at rest) points this way in the sensor's axes, unit vector; then hold it still.
-    Turn(Vector3<f32>),
+    Turn([f32; 3]),
     /// Turn it about until the field points this way in the magnetometer's axes, unit vector.
-    TurnAbout(Vector3<f32>),
+    TurnAbout([f32; 3]),
     /// Every sensor has reached its target.
     Enough,
 }
 
-/// How far a session is.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// How far a session is. The order of the fields is the messages' format.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Guide {
     /// What to do next.
     pub advice: Advice,
@@ -117,12 +119,12 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             _ => {}
         }
         if self.is_reached(Sensor::Accelerometer) && self.is_reached(Sensor::Gyroscope) {
-            return Advice::TurnAbout(self.field_missing());
+            return Advice::TurnAbout(self.field_missing().into());
         }
         let now = rests.direction();
         let seen = self.poses.list().iter().map(|pose| pose.direction());
         let [acc, gyr] = &self.scores;
-        Advice::Turn(acc.larger(gyr).best(now.map(|mean| unit(&mean)), seen))
+        Advice::Turn(acc.larger(gyr).best(now.map(|mean| unit(&mean)), seen).into())
     }
 
     /// Direction of the field that is furthest from all seen, magnetometer's axes.

@@ -108,12 +108,13 @@ impl Hand {
             match session.guide().advice {
                 Advice::Enough => return Some(poses),
                 Advice::Turn(to) => {
-                    self.pose(session, &to);
+                    self.pose(session, &to.into());
                     poses += 1;
                 }
                 Advice::TurnAbout(to) => {
                     let from = (self.c_n_s.inverse() * FIELD).normalize();
-                    let by = Rotation3::rotation_between(&to.cast(), &from).expect("not opposite");
+                    let by =
+                        Rotation3::rotation_between(&Vector3::from(to).cast(), &from).expect("not opposite");
                     self.turn(session, &by.scaled_axis());
                 }
                 Advice::HoldStill | Advice::HoldOn => self.rest(session, 1.0),

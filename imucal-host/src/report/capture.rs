@@ -4,7 +4,6 @@ use imucal_core::session::{
     SessionSettings,
     guide::{Advice, Guide},
 };
-use nalgebra::Vector3;
 
 use super::{
     measure::{plain, rounded},
@@ -31,7 +30,7 @@ pub fn advice(advice: &Advice, hold: f32) -> String {
 }
 
 /// `x points`, `x and −z point`.
-fn pointing(direction: &Vector3<f32>) -> String {
+fn pointing(direction: &[f32; 3]) -> String {
     let axes: Vec<String> = ["x", "y", "z"]
         .into_iter()
         .zip(direction.iter())
@@ -104,7 +103,9 @@ mod tests {
 
     #[test]
     fn a_direction_is_said_by_the_axes_that_point_there() {
-        let said = |x: f32, y: f32, z: f32| advice(&Advice::Turn(Vector3::new(x, y, z).normalize()), 2.0);
+        let said = |x: f32, y: f32, z: f32| {
+            advice(&Advice::Turn(nalgebra::Vector3::new(x, y, z).normalize().into()), 2.0)
+        };
         assert_eq!(said(0.0, 0.0, -1.0), "turn it until −z points up, then keep it still for 2 s");
         assert_eq!(said(1.0, 0.0, -1.0), "turn it until +x and −z point up, then keep it still for 2 s");
         assert_eq!(said(1.0, 1.0, -1.0), "turn it until +x, +y, −z point up, then keep it still for 2 s");

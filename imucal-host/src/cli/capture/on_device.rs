@@ -55,10 +55,10 @@ fn replay(arguments: &Arguments, device: &Address, path: &Path, files: OutputSet
     let mut session = open(device, arguments.flash.as_deref(), arguments.key.as_deref())?;
     say!("{}: sent to the session of {device}", recording.name);
     let mut lines = Lines::new(arguments, task.hold, &asked);
-    let mut guide = session.start_capture(task)?.guide();
+    let mut guide = session.start_capture(task)?.guide;
     let samples: Vec<_> = capture::samples(&recording).collect();
     for (batch, before) in samples.chunks(SAMPLES).zip((0..).step_by(SAMPLES)) {
-        guide = session.push_samples(before, batch)?.guide();
+        guide = session.push_samples(before, batch)?.guide;
         let time = batch.last().map_or(0.0, |last| last.time as f64 * 1e-6);
         lines.see(time, &guide)?;
     }
@@ -84,10 +84,10 @@ fn live(arguments: &Arguments, device: &Address, files: OutputSet) -> anyhow::Re
     lines.speed = None;
     let begin = Instant::now();
     let mut state = session.start_capture(task)?;
-    while state.guide().advice != Advice::Enough && begin.elapsed().as_secs() < arguments.within.into() {
+    while state.guide.advice != Advice::Enough && begin.elapsed().as_secs() < arguments.within.into() {
         sleep(EVERY);
         state = session.capture()?;
-        lines.see(begin.elapsed().as_secs_f64(), &state.guide())?;
+        lines.see(begin.elapsed().as_secs_f64(), &state.guide)?;
     }
     if state.samples == 0 {
         session.abort_capture()?;
@@ -95,7 +95,7 @@ fn live(arguments: &Arguments, device: &Address, files: OutputSet) -> anyhow::Re
             &"the device's sensors have brought no sample; give a recording, or check its sensors",
         ));
     }
-    end(arguments, session, &task, &state.guide(), &asked, None, files)
+    end(arguments, session, &task, &state.guide, &asked, None, files)
 }
 
 /// Ends a session; stores what is accepted and surer than what was in use. `here`: the same session on this machine.
