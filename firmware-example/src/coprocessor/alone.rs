@@ -28,6 +28,8 @@ pub struct Alone<const N: usize> {
     watched: u16,
     /// Rate at rest that is taken off the board's own samples, rad/s.
     of_the_day: Option<Vector3<f32>>,
+    /// The gyroscope lay still since this calibration is used.
+    lay_still: bool,
 }
 
 /// A session under way.
@@ -58,7 +60,7 @@ impl<const N: usize> Default for Alone<N> {
 impl<const N: usize> Alone<N> {
     /// Neither session nor watch. Nothing but zeros, so that a `static` costs no flash.
     pub const fn new() -> Self {
-        Self { captures: Vec::new(), watches: Vec::new(), watched: 0, of_the_day: None }
+        Self { captures: Vec::new(), watches: Vec::new(), watched: 0, of_the_day: None, lay_still: false }
     }
 
     /// Begins a session; one that is under way is given up.
@@ -103,7 +105,7 @@ impl<const N: usize> Alone<N> {
     /// What was watched and taken off belongs to the calibration before.
     pub(super) fn forget_watch(&mut self) {
         self.watches.clear();
-        self.of_the_day = None;
+        (self.of_the_day, self.lay_still) = (None, false);
     }
 
     /// Index of the next sample of the link.
@@ -122,10 +124,12 @@ impl<const N: usize> Alone<N> {
         self.of_the_day.map(Into::into)
     }
 
-    /// The gyroscope lay still and showed this rate. The first one counts until another calibration is used: what moves
-    /// later is the watch's to find.
-    pub(super) fn found_at_rest(&mut self, rate: Vector3<f32>) {
-        self.of_the_day.get_or_insert(rate);
+    /// The gyroscope lay still, and showed a rate or none beyond its record. The first second of rest counts until another
+    /// calibration is used: what moves later is the watch's to find.
+    pub(super) fn found_at_rest(&mut self, rate: Option<Vector3<f32>>) {
+        if !self.lay_still {
+            (self.of_the_day, self.lay_still) = (rate, true);
+        }
     }
 
     /// Takes it off a corrected sample.
@@ -140,8 +144,8 @@ impl<const N: usize> Alone<N> {
         self.watches.first().filter(|_| N > 0).map(|watching| watching.watch.summary())
     }
 
-    /// Takes a calibrated sample of the record into the watch, which begins with the first one. The bias of the day, once the
-    /// gyroscope lay still for it.
+    /// Takes a calibrated sample of the record into the watch, which begins with the first one. At the end of a second of rest,
+    /// the rate that the gyroscope showed, if it is beyond the record.
     #[inline(never)]
     pub(super) fn watch(
         &mut self,
@@ -149,7 +153,7 @@ impl<const N: usize> Alone<N> {
         time: u64,
         values: &[Option<[f32; 3]>; 3],
         temperature: f32,
-    ) -> Option<Vector3<f32>> {
+    ) -> Option<Option<Vector3<f32>>> {
         if N == 0 {
             return None;
         }
@@ -164,7 +168,7 @@ impl<const N: usize> Alone<N> {
         let sample = CalibratedSample { time, acc, gyr, mag, temperature };
         let look = watching.looks.push(&sample, still)?;
         watching.watch.push(&look);
-        of_the_day(&look, record.gyr.as_ref()?)
+        Some(of_the_day(&look, record.gyr.as_ref()?))
     }
 
     /// Out of line: a watch is larger than a stack's frame should be.
@@ -207,6 +211,6 @@ impl Capture {
     /// How far it is.
     #[inline(never)]
     pub(super) fn state(&self) -> CaptureState {
-        CaptureState::of(&self.session.guide(), self.taken)
+        CaptureState { samples: self.taken, guide: self.session.guide() }
     }
 }

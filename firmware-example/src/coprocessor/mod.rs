@@ -27,7 +27,7 @@ use imucal_core::{
     link::{
         Asked, Fault, FitProgress, Frame, FrameError, Guard, LastReset, Receiver, RecordState, Reply, split,
     },
-    record::{self, Date, SensorIdentity},
+    record::{self, SensorIdentity},
 };
 
 use crate::{
@@ -279,22 +279,6 @@ impl<
         true
     }
 
-    #[inline(never)]
-    fn answer_report(&mut self, asked: Asked) -> bool {
-        let report = self.finished.take().map(|finished| Reply::Report(finished.report));
-        self.send(asked, &report.unwrap_or(Reply::Fault(Fault::NotReady)));
-        true
-    }
-
-    #[inline(never)]
-    fn judge(&mut self, asked: Asked, date: Date) {
-        self.finished = self.fitting.finish().ok();
-        let accepted = self.finished.as_ref().and_then(|finished| finished.accepted.as_ref());
-        let adopted = accepted.map_or(Ok(()), |(sensor, triad)| self.calibration.adopt(*sensor, triad, date));
-        self.forget_watch();
-        self.end(asked, adopted.map_or_else(Due::Fault, |()| Due::Report));
-    }
-
     /// Apart from who waits for bytes: a request takes its memory only while it is worked at.
     #[inline(never)]
     fn receive(&mut self, frame: Result<&[u8], FrameError>) {
@@ -329,37 +313,6 @@ impl<
 
     fn send(&mut self, asked: Asked, reply: &Reply<'_>) {
         self.outgoing.send(&asked, self.guard.seal_for(&asked), reply);
-    }
-
-    /// Corrects a sample of the board's own sensors.
-    #[inline(never)]
-    fn take_sample(&mut self) -> bool {
-        let Some(sample) = self.sensors.sample() else { return false };
-        self.number = self.number.wrapping_add(1);
-        let mut values = self.calibration.correct_all(&sample.raw, sample.temperature);
-        self.corrected = self.corrected.saturating_add(1);
-        self.observe_own(&sample, &values);
-        if let Some(alone) = &self.alone {
-            alone.take_bias_of_the_day_off(&mut values);
-        }
-        self.pass_on(&values);
-        true
-    }
-
-    /// Sends a corrected sample, if its turn in a stream has come.
-    fn pass_on(&mut self, values: &[Option<[f32; 3]>; 3]) {
-        // A session that is over takes its stream along.
-        self.stream = self.stream.filter(|stream| self.guard.is_current(&stream.asked));
-        let Some(stream) = &mut self.stream else { return };
-        stream.left = stream.left.saturating_sub(1);
-        // A stream never waits: what the link does not take is left out, and the number shows it.
-        if stream.left == 0 {
-            stream.left = stream.every;
-            let (asked, number) = (stream.asked, self.number);
-            if self.outgoing.is_free() {
-                self.send(asked, &Reply::Sample { number, values: *values });
-            }
-        }
     }
 
     /// A slice, unless something came, and not too often.

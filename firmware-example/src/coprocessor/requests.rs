@@ -237,6 +237,24 @@ impl<
         Ok(())
     }
 
+    #[inline(never)]
+    pub(super) fn answer_report(&mut self, asked: Asked) -> bool {
+        let report = self.finished.take().map(|finished| Reply::Report(finished.report));
+        self.send(asked, &report.unwrap_or(Reply::Fault(Fault::NotReady)));
+        true
+    }
+
+    #[inline(never)]
+    pub(super) fn judge(&mut self, asked: Asked, date: Date) {
+        self.finished = self.fitting.finish().ok();
+        let accepted = self.finished.as_ref().and_then(|finished| finished.accepted.as_ref());
+        let adopted = accepted.map(|(sensor, triad)| self.calibration.adopt(*sensor, triad, date));
+        if adopted == Some(Ok(())) {
+            self.forget_watch();
+        }
+        self.end(asked, adopted.unwrap_or(Ok(())).map_or_else(Due::Fault, |()| Due::Report));
+    }
+
     /// Gives the fit up; a request that waits for it is answered first come, later.
     fn abort(&mut self, asked: Asked) -> Result<(), Fault> {
         if let Job::Stepping(waiting, _) = self.job {

@@ -1,4 +1,4 @@
-//! Raw samples: into the session under way, or into the drift watch.
+//! Samples of the board and of the link: corrected, and into the session under way or into the drift watch.
 
 use embedded_storage::nor_flash::NorFlash;
 use imucal_core::{
@@ -92,8 +92,39 @@ impl<
         alone.watch(self.calibration.record(), sample.time, &values, sample.temperature);
     }
 
+    /// Corrects a sample of the board's own sensors.
+    #[inline(never)]
+    pub(super) fn take_sample(&mut self) -> bool {
+        let Some(sample) = self.sensors.sample() else { return false };
+        self.number = self.number.wrapping_add(1);
+        let mut values = self.calibration.correct_all(&sample.raw, sample.temperature);
+        self.corrected = self.corrected.saturating_add(1);
+        self.observe_own(&sample, &values);
+        if let Some(alone) = &self.alone {
+            alone.take_bias_of_the_day_off(&mut values);
+        }
+        self.pass_on(&values);
+        true
+    }
+
+    /// Sends a corrected sample, if its turn in a stream has come.
+    fn pass_on(&mut self, values: &[Option<[f32; 3]>; 3]) {
+        // A session that is over takes its stream along.
+        self.stream = self.stream.filter(|stream| self.guard.is_current(&stream.asked));
+        let Some(stream) = &mut self.stream else { return };
+        stream.left = stream.left.saturating_sub(1);
+        // A stream never waits: what the link does not take is left out, and the number shows it.
+        if stream.left == 0 {
+            stream.left = stream.every;
+            let (asked, number) = (stream.asked, self.number);
+            if self.outgoing.is_free() {
+                self.send(asked, &Reply::Sample { number, values: *values });
+            }
+        }
+    }
+
     /// A sample of the board's own, with its corrected values. A rest of it gives the gyroscope's bias of the day.
-    pub(super) fn observe_own(&mut self, sample: &Sample, values: &[Option<[f32; 3]>; 3]) {
+    fn observe_own(&mut self, sample: &Sample, values: &[Option<[f32; 3]>; 3]) {
         let Some(alone) = self.alone.as_mut() else { return };
         let time = sample.time.unwrap_or_else(|| u64::from(self.clock.uptime()) * 1_000);
         let temperature = sample.temperature;
@@ -139,7 +170,9 @@ impl<
         for (outcome, sensor) in outcomes.iter_mut().zip(Sensor::ALL) {
             *outcome = self.adopt(sensor, date);
         }
-        self.forget_watch();
+        if outcomes.contains(&CaptureOutcome::Adopted) {
+            self.forget_watch();
+        }
         if let Some(capture) = self.alone.as_mut().and_then(|alone| alone.capture()) {
             capture.outcomes = Some(outcomes);
         }

@@ -113,8 +113,8 @@ fn raw_samples_end_in_the_record_that_the_same_session_gives_elsewhere() {
     let samples = tumble(14);
     assert_eq!(state_of(&mut bench, &Request::StartCapture(task())).samples, 0);
     let last = send(&mut bench, &samples);
-    assert_eq!((last.samples as usize, last.rests > 11), (samples.len(), true), "{last:?}");
-    assert!(last.accepted[0] && last.coverage > 0.5, "{last:?}");
+    assert_eq!((last.samples as usize, last.guide.rests > 11), (samples.len(), true), "{last:?}");
+    assert!(last.guide.accepted[0] && last.guide.coverage > 0.5, "{last:?}");
     assert_eq!(
         bench.ask(&finish(), outcomes),
         [CaptureOutcome::Adopted, CaptureOutcome::TooLittle, CaptureOutcome::TooLittle]
@@ -323,6 +323,19 @@ fn a_gyroscope_that_lies_still_after_the_start_loses_its_bias_of_the_day() {
 }
 
 #[test]
+fn a_gyroscope_that_moves_after_its_first_rest_is_left_to_the_watch() {
+    let mut memory = BenchMemory::new();
+    let sensors = Queued::default();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, sensors.clone(), &mut memory);
+    assert_eq!(bench.ask(&Request::PutRecord { record: &with_gyroscope(), replace: false }, fault), None);
+    for off in [0.0, 10.0] {
+        sensors.0.borrow_mut().extend(rest(off));
+        bench.replies(|_, _| ());
+        bench.ask(&Request::BiasOfTheDay, |reply| assert_eq!(*reply, Reply::BiasOfTheDay(None)));
+    }
+}
+
+#[test]
 fn a_unit_with_a_record_is_watched_and_its_summary_names_it() {
     let mut memory = BenchMemory::new();
     let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
@@ -358,7 +371,7 @@ fn the_board_s_own_sensors_bring_a_session_its_samples_while_they_are_streamed()
     sensors.0.borrow_mut().extend(samples.iter().map(own));
     assert_eq!(bench.replies(|_, reply| assert!(matches!(reply, Reply::Sample { .. }))).len(), 28);
     let far = bench.ask(&Request::Capture, state);
-    assert_eq!((far.samples as usize, far.accepted[0]), (samples.len(), true), "{far:?}");
+    assert_eq!((far.samples as usize, far.guide.accepted[0]), (samples.len(), true), "{far:?}");
     assert_eq!(bench.ask(&finish(), outcomes)[0], CaptureOutcome::Adopted);
 }
 
@@ -374,7 +387,7 @@ fn time_stamps_that_jitter_and_a_thermometer_that_jumps_leave_a_session_its_resu
     }
     state_of(&mut bench, &Request::StartCapture(task()));
     let last = send(&mut bench, &samples);
-    assert!(last.accepted[0] && last.rests > 11, "{last:?}");
+    assert!(last.guide.accepted[0] && last.guide.rests > 11, "{last:?}");
     assert_eq!(bench.ask(&finish(), outcomes)[0], CaptureOutcome::Adopted);
 }
 
