@@ -3,9 +3,14 @@
 use std::path::Path;
 
 use super::{
-    mapping::unit_of_name,
+    mapping::unit_of_time,
     order_statistics::median,
-    read::{column_guess::meant, columns::NAMES, csv_rows::Rows, number},
+    read::{
+        column_guess::{meant, unit_behind},
+        columns::NAMES,
+        csv_rows::Rows,
+        number,
+    },
     unit::{TimeUnit, Unit},
 };
 use crate::{file::Limits, recording::sensor_kind::SensorKind};
@@ -50,7 +55,7 @@ pub fn guess(path: &Path, limits: &Limits) -> Option<LayoutGuess> {
         options.extend(["--time".to_owned(), table.names[time].clone()]);
     }
     let unit = table.time_unit(time);
-    if unit_of_name(&table.names[time]) != Some(unit) && unit != TimeUnit::Second {
+    if unit_of_time(&table.names[time]) != Some(unit) && unit != TimeUnit::Second {
         units.push(format!("t={unit}"));
     }
     let mut any = false;
@@ -128,7 +133,7 @@ impl Beginning {
     }
 
     fn time_unit(&self, time: usize) -> TimeUnit {
-        if let Some(unit) = unit_of_name(&self.names[time]) {
+        if let Some(unit) = unit_of_time(&self.names[time]) {
             return unit;
         }
         let steps = self.columns[time].windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -171,7 +176,7 @@ impl Beginning {
 
     /// The unit that a sensor's names state, or its numbers show.
     fn unit(&self, kind: SensorKind, places: [usize; 3]) -> Option<Unit> {
-        let stated = named_unit(kind, &self.names[places[0]]);
+        let stated = unit_behind(kind.prefix(), &self.names[places[0]]).and_then(|unit| unit.parse().ok());
         stated.or_else(|| self.shown_unit(kind, places)).filter(|unit| *unit != Unit::Counts)
     }
 
@@ -200,43 +205,6 @@ impl Beginning {
 fn is_time(name: &str) -> bool {
     let name = name.to_lowercase();
     name.split(|c: char| !c.is_alphabetic()).any(|word| matches!(word, "time" | "timestamp" | "stamp"))
-}
-
-/// The unit behind a column's name.
-fn named_unit(kind: SensorKind, name: &str) -> Option<Unit> {
-    let endings: &[(&str, Unit)] = match kind {
-        SensorKind::Acc => &[
-            ("ms2", Unit::MetrePerSecondSquared),
-            ("mps2", Unit::MetrePerSecondSquared),
-            ("ms2", Unit::MetrePerSecondSquared),
-            ("ms^2", Unit::MetrePerSecondSquared),
-            ("mg", Unit::MilliGravity),
-            ("g", Unit::Gravity),
-        ],
-        SensorKind::Gyr => &[
-            ("rads", Unit::RadianPerSecond),
-            ("radps", Unit::RadianPerSecond),
-            ("rads1", Unit::RadianPerSecond),
-            ("degs", Unit::DegreePerSecond),
-            ("degps", Unit::DegreePerSecond),
-            ("dps", Unit::DegreePerSecond),
-        ],
-        SensorKind::Mag => &[
-            ("ut", Unit::MicroTesla),
-            ("µt", Unit::MicroTesla),
-            ("nt", Unit::NanoTesla),
-            ("mgauss", Unit::MilliGauss),
-            ("mg", Unit::MilliGauss),
-            ("gauss", Unit::Gauss),
-        ],
-    };
-    let counts = ["counts", "lsb", "raw"].map(|ending| (ending, Unit::Counts));
-    let bare: String = name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
-    // The unit stands apart from the name: `ax_g`, `Acc X [g]`; in `mag` the g does not.
-    let apart = name.trim_end_matches([']', ')']).rsplit(|c: char| " _[(".contains(c)).next().unwrap_or(name);
-    let apart = apart != name;
-    let found = endings.iter().copied().chain(counts).find(|(ending, _)| bare.ends_with(ending));
-    found.filter(|_| apart).map(|(_, unit)| unit)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::{
     manifest::{Counts, Manifest},
-    read::columns::NAMES,
+    read::{column_guess::unit_behind, columns::NAMES},
     sensor_kind::SensorKind,
     unit::{TimeUnit, Unit},
 };
@@ -83,7 +83,7 @@ impl Mapping {
         let mut mapping = Self::default();
         if let Some(name) = time {
             mapping.add(name, "t")?;
-            mapping.time = unit_of_name(name);
+            mapping.time = unit_of_time(name);
         }
         for text in map {
             mapping.map(text)?;
@@ -229,17 +229,9 @@ fn stated(kind: SensorKind, text: &str) -> Option<Stated> {
     Some(Stated::Counts(number * unit(of.trim())?.per_si()?))
 }
 
-/// The unit of times in a column's name, such as `timestamp_ms`, `time [s]` or `t(us)`.
-pub(crate) fn unit_of_name(name: &str) -> Option<TimeUnit> {
-    let parts = name.split(|c: char| !c.is_alphanumeric()).filter(|part| !part.is_empty());
-    // The first part is the time's own name.
-    match parts.skip(1).last()?.to_lowercase().as_str() {
-        "s" | "sec" | "secs" | "second" | "seconds" => Some(TimeUnit::Second),
-        "ms" | "msec" | "millis" | "milliseconds" => Some(TimeUnit::Millisecond),
-        "us" | "µs" | "usec" | "micros" | "microseconds" => Some(TimeUnit::Microsecond),
-        "ns" | "nsec" | "nanos" | "nanoseconds" => Some(TimeUnit::Nanosecond),
-        _ => None,
-    }
+/// The unit of times that stands behind a column's name, such as `timestamp_ms`, `time [s]` or `t(us)`.
+pub(crate) fn unit_of_time(name: &str) -> Option<TimeUnit> {
+    TimeUnit::try_from(unit_behind("t", name)?.to_owned()).ok()
 }
 
 fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {

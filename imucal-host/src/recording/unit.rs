@@ -84,6 +84,16 @@ impl Unit {
         }
     }
 
+    /// The SI side of a sensor: m/s², rad/s, µT.
+    #[must_use]
+    pub fn si(kind: SensorKind) -> Self {
+        match kind {
+            SensorKind::Acc => Self::MetrePerSecondSquared,
+            SensorKind::Gyr => Self::RadianPerSecond,
+            SensorKind::Mag => Self::MicroTesla,
+        }
+    }
+
     /// The units of [`Unit::of`] as a list for a message.
     #[must_use]
     pub fn list(kind: SensorKind) -> String {

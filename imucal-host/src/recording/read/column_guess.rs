@@ -46,15 +46,79 @@ const WHOLE: [(&str, &str); 18] = [
     ("qz", "refqz"),
 ];
 
-/// Units that stand behind a name, of the quantities whose names begin so.
-const UNITS: [(&str, &[&str]); 6] = [
-    ("acc", &["ms2", "mps2", "mss", "g", "mg", "counts", "lsb", "raw"]),
-    ("gyr", &["rads", "radps", "radsec", "degs", "degps", "degsec", "dps", "counts", "lsb", "raw"]),
-    ("mag", &["ut", "µt", "nt", "mg", "mgauss", "g", "gauss", "counts", "lsb", "raw"]),
-    ("temp", &["c", "degc", "°c", "celsius"]),
-    ("gimbal", &["rad", "deg"]),
-    ("t", &["s", "sec", "secs", "seconds", "ms", "msec", "us", "µs", "usec", "ns", "nsec"]),
+/// Units that stand behind a name, of the quantities whose names begin so, and as the manifest has them.
+const UNITS: [(&str, &[(&str, &str)]); 6] = [
+    (
+        "acc",
+        &[
+            ("ms2", "m/s^2"),
+            ("mps2", "m/s^2"),
+            ("mss", "m/s^2"),
+            ("mg", "mg"),
+            ("g", "g"),
+            ("counts", "counts"),
+            ("lsb", "counts"),
+            ("raw", "counts"),
+        ],
+    ),
+    (
+        "gyr",
+        &[
+            ("rads", "rad/s"),
+            ("radps", "rad/s"),
+            ("radsec", "rad/s"),
+            ("degs", "deg/s"),
+            ("degps", "deg/s"),
+            ("degsec", "deg/s"),
+            ("dps", "deg/s"),
+            ("counts", "counts"),
+            ("lsb", "counts"),
+            ("raw", "counts"),
+        ],
+    ),
+    (
+        "mag",
+        &[
+            ("ut", "uT"),
+            ("µt", "uT"),
+            ("nt", "nT"),
+            ("mg", "mG"),
+            ("mgauss", "mG"),
+            ("g", "G"),
+            ("gauss", "G"),
+            ("counts", "counts"),
+            ("lsb", "counts"),
+            ("raw", "counts"),
+        ],
+    ),
+    ("temp", &[("c", "degC"), ("degc", "degC"), ("°c", "degC"), ("celsius", "degC")]),
+    ("gimbal", &[("rad", "rad"), ("deg", "deg")]),
+    (
+        "t",
+        &[
+            ("s", "s"),
+            ("sec", "s"),
+            ("secs", "s"),
+            ("seconds", "s"),
+            ("ms", "ms"),
+            ("msec", "ms"),
+            ("us", "us"),
+            ("µs", "us"),
+            ("usec", "us"),
+            ("ns", "ns"),
+            ("nsec", "ns"),
+        ],
+    ),
 ];
+
+/// The unit, as the manifest has it, that stands apart behind a column's name: `ax_g`, `Gyro X [deg/s]`, `timestamp_ms`.
+/// In `mag` the g does not.
+pub(crate) fn unit_behind(quantity: &str, name: &str) -> Option<&'static str> {
+    let (_, units) = UNITS.iter().find(|(known, _)| *known == quantity)?;
+    let (_, last) = name.trim_end_matches([']', ')', ' ']).rsplit_once([' ', '_', '[', '('])?;
+    let last = bare(last);
+    units.iter().find(|(ending, _)| *ending == last).map(|(_, unit)| *unit)
+}
 
 /// The absent column that an unknown name probably means, and whether a unit stands behind the name.
 pub(crate) fn meant(name: &str, absent: &[&'static str]) -> Option<(&'static str, bool)> {
@@ -104,7 +168,8 @@ fn is_with_unit(bare: &str, known: &str) -> bool {
         "t" => known == "t",
         quantity => known.starts_with(quantity),
     });
-    let mut stems = units.flat_map(|(_, units)| units.iter().filter_map(|unit| bare.strip_suffix(*unit)));
+    let mut stems =
+        units.flat_map(|(_, units)| units.iter().filter_map(|(ending, _)| bare.strip_suffix(*ending)));
     stems.any(|stem| plain(stem) == plain(&super::column_guess::bare(known)))
 }
 
