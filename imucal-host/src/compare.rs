@@ -160,9 +160,8 @@ fn of_sensor(kind: SensorKind, a: &StoredTriad, b: &StoredTriad) -> Result<Senso
     if a.unit_in != b.unit_in {
         return Err(CompareFault::Units { sensor: kind, a: a.unit_in, b: b.unit_in });
     }
-    let matrix = |rows: &[[f64; 3]; 3]| Matrix3::from_fn(|row, column| rows[row][column]);
     let bias_a = at_reference(a, b);
-    let (gain_a, gain_b) = (matrix(&a.gain), matrix(&b.gain));
+    let (gain_a, gain_b) = (a.triad().gain, b.triad().gain);
     let inverse = gain_b.try_inverse().ok_or(CompareFault::Singular { sensor: kind })?;
     let mut error = gain_a * inverse;
     if a.field_norm.is_some() || b.field_norm.is_some() {
@@ -270,8 +269,7 @@ mod tests {
         let gyr = after.gyr.as_mut().expect("calibrated");
         let turn = nalgebra::Rotation3::new(Vector3::new(0.0, 0.0, 2e-3)).into_inner();
         let skew = Matrix3::new(1.003, 0.0, 0.0, 0.0, 1.0, 5e-4, 0.0, 5e-4, 1.0);
-        let own = Matrix3::from_fn(|row, column| gyr.gain[row][column]);
-        let changed = turn * skew * own;
+        let changed = turn * skew * gyr.triad().gain;
         gyr.gain = std::array::from_fn(|row| std::array::from_fn(|column| changed[(row, column)]));
         let comparison = compare(&before, &after, false).expect("of one unit");
         let gyr = comparison.sensors.iter().find(|sensor| sensor.sensor == SensorKind::Gyr).expect("both");

@@ -16,7 +16,10 @@ use imucal_core::{
 use nalgebra::Vector3;
 
 use crate::{
-    allan::drawn::{Drawn, Source},
+    allan::{
+        drawn::{Drawn, Source},
+        process::per_sample,
+    },
     recording::{Manifest, Nominal, Recording, SensorKind, Triple, Unit, manifest::Counts},
     store::{
         StoredCalibration, StoredTriad,
@@ -123,12 +126,8 @@ fn temperatures(ideal: &Recording) -> Vec<f64> {
 }
 
 fn ideal_values(ideal: &Recording, kind: SensorKind) -> Option<Vec<Vector3<f64>>> {
-    let simulated = ideal.simulated.as_ref().and_then(|simulated| match kind {
-        SensorKind::Acc => simulated.acc.as_ref(),
-        SensorKind::Gyr => simulated.gyr.as_ref(),
-        SensorKind::Mag => simulated.mag.as_ref(),
-    });
-    simulated.cloned().or_else(|| ideal.sensor(kind).map(|triple| triple.values.clone()))
+    let simulated = ideal.simulated.as_ref().and_then(|simulated| simulated.sensor(kind));
+    simulated.map(<[_]>::to_vec).or_else(|| ideal.sensor(kind).map(|triple| triple.values.clone()))
 }
 
 /// How raw values are written: by their unit, or for counts by the calibration itself.
@@ -167,7 +166,7 @@ fn add_noise(values: &mut [Vector3<f64>], kind: SensorKind, drawing: Drawing<'_>
 
 /// Coefficients in samples.
 fn drawn(axis: &NoiseOfAxis, interval: f64) -> Drawn {
-    let white = axis.white.value.unwrap_or(0.0) / interval.sqrt();
+    let white = per_sample(axis.white.value.unwrap_or(0.0), 1.0 / interval);
     match axis.bias_std.value.zip(axis.correlation_time.value) {
         Some((std, time)) => Drawn { white, markov: Some((std, time / interval)), ..Drawn::default() },
         None => Drawn {

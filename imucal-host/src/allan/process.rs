@@ -63,6 +63,11 @@ impl Kind {
     }
 }
 
+/// Standard deviation of a sample's white noise: N is a density, and a sample has half its rate of bandwidth, twice-sided.
+pub fn per_sample(density: f64, rate: f64) -> f64 {
+    density * rate.sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,7 +8,7 @@ use super::{
     coefficients::{Axis, Estimator, Sums},
     stillness::{Moved, Stillness},
 };
-use crate::recording::SensorKind;
+use crate::recording::{SensorKind, Unit};
 
 /// Samples from which the interval and a constant are taken before the first is used.
 const HEAD: usize = 1024;
@@ -47,7 +47,7 @@ pub enum Refusal {
         /// What moved.
         moved: Moved,
         /// Unit of the sizes.
-        unit: &'static str,
+        unit: Unit,
     },
     /// The inertial sensors moved, and so did this one.
     #[error("the {by} moved, and this sensor with it")]
@@ -274,18 +274,9 @@ impl SensorStream {
         };
         let moved = running.stillness.moved();
         if let Some(moved) = moved.filter(|moved| moved.spoils) {
-            return Err(Refusal::NotStill { moved, unit: si_unit(self.kind) });
+            return Err(Refusal::NotStill { moved, unit: Unit::si(self.kind) });
         }
         running.noise(self.kind, moved)
-    }
-}
-
-/// SI unit of a sensor, in words.
-pub fn si_unit(kind: SensorKind) -> &'static str {
-    match kind {
-        SensorKind::Acc => "m/s^2",
-        SensorKind::Gyr => "rad/s",
-        SensorKind::Mag => "uT",
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::{
     Ending, load,
@@ -28,7 +28,7 @@ pub(super) struct Arguments {
     calibration: PathBuf,
     /// The program that reads it
     #[arg(long, value_name = "TARGET")]
-    to: To,
+    to: Target,
     /// The noise of the unit, by `imucal noise --json`
     #[arg(long, value_name = "NOISE.json")]
     noise: Option<PathBuf>,
@@ -45,41 +45,6 @@ pub(super) struct Arguments {
     overwrite: Overwrite,
     #[command(flatten)]
     reading: Reading,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum To {
-    /// Kalibr's imu.yaml: noise
-    Kalibr,
-    /// A Gazebo sensor: noise and bias
-    Sdf,
-    /// A Python module that needs numpy alone: forward model and its inverse
-    Python,
-    /// A C99 header that corrects samples, with the bits of the core
-    CHeader,
-    /// ROS: imu_calib's YAML and covariances of messages
-    Ros,
-    /// PX4's parameters
-    Px4,
-    /// ArduPilot's parameters
-    Ardupilot,
-    /// Every number, a row each
-    Csv,
-}
-
-impl From<To> for Target {
-    fn from(to: To) -> Self {
-        match to {
-            To::Kalibr => Self::Kalibr,
-            To::Sdf => Self::Sdf,
-            To::Python => Self::Python,
-            To::CHeader => Self::CHeader,
-            To::Ros => Self::Ros,
-            To::Px4 => Self::Px4,
-            To::Ardupilot => Self::Ardupilot,
-            To::Csv => Self::Csv,
-        }
-    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
@@ -111,7 +76,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         causes: &causes,
         rate: arguments.rate,
     };
-    let document = match export::document(arguments.to.into(), &given) {
+    let document = match export::document(arguments.to, &given) {
         Ok(document) => document,
         Err(refusal) => return Ok(refuse(&refusal)),
     };

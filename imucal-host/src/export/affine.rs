@@ -1,14 +1,10 @@
 //! A calibration between SI units, for targets that have gain and bias and nothing else.
 
 use imucal_core::triad::Triad;
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Matrix3, Rotation3};
 
 use super::{ExportError, Inputs};
-use crate::{
-    allan::sensor::si_unit,
-    recording::{SensorKind, Unit},
-    store::StoredTriad,
-};
+use crate::recording::{SensorKind, Unit};
 
 /// A stored triad in SI units; `None` where the sensor is not calibrated.
 pub(super) fn si_triad(
@@ -18,20 +14,14 @@ pub(super) fn si_triad(
 ) -> Result<Option<Triad<f64>>, ExportError> {
     let calibration = inputs.calibration.ok_or(ExportError::NoCalibration { target })?;
     let Some(stored) = calibration.triad(kind) else { return Ok(None) };
-    let wrong = |found| ExportError::WrongUnit { target, sensor: kind, found, expected: si_unit(kind) };
+    let wrong = |found| ExportError::WrongUnit { target, sensor: kind, found, expected: Unit::si(kind) };
     let si = |unit: Unit| {
         let known = unit.per_si().filter(|_| unit != Unit::Arbitrary);
         known.ok_or_else(|| wrong(unit))
     };
     let (raw, calibrated) = (si(stored.unit_in)?, si(stored.unit_out)?);
-    let triad = triad(stored).in_unit(0.0, 1.0 / raw);
+    let triad = stored.triad().in_unit(0.0, 1.0 / raw);
     Ok(Some(Triad { gain: triad.gain / calibrated, ..triad }))
-}
-
-/// Gain and bias as they are stored.
-pub(super) fn triad(stored: &StoredTriad) -> Triad<f64> {
-    let gain = Matrix3::from_fn(|row, column| stored.gain[row][column]);
-    Triad { gain, bias: Vector3::from(stored.bias) }
 }
 
 /// A gain as a rotation after a symmetric matrix, G = R S: S keeps all lengths right.

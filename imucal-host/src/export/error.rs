@@ -53,7 +53,7 @@ pub enum ExportError {
         /// Unit of the calibration.
         found: Unit,
         /// What the target takes.
-        expected: &'static str,
+        expected: Unit,
     },
     /// The rate is not one.
     #[error("--rate: found {found}, expected a number of samples a second above 0")]

@@ -28,22 +28,23 @@ pub use error::ExportError;
 
 /// A program that a calibration or its noise is written for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Target {
-    /// Kalibr's imu.yaml.
+    /// Kalibr's imu.yaml: noise
     Kalibr,
-    /// The sensor of a Gazebo model.
+    /// A Gazebo sensor: noise and bias
     Sdf,
-    /// A Python module that needs numpy alone.
+    /// A Python module that needs numpy alone: forward model and its inverse
     Python,
-    /// A C99 header.
+    /// A C99 header that corrects samples, with the bits of the core
     CHeader,
-    /// ROS: imu_calib and covariances of messages.
+    /// ROS: imu_calib's YAML and covariances of messages
     Ros,
-    /// PX4's parameters.
+    /// PX4's parameters
     Px4,
-    /// ArduPilot's parameters.
+    /// ArduPilot's parameters
     Ardupilot,
-    /// Every number, a row each.
+    /// Every number, a row each
     Csv,
 }
 

@@ -12,7 +12,7 @@ use super::{
     affine::{self, higher_terms, no_errors},
     level::{self, Level},
 };
-use crate::recording::SensorKind;
+use crate::{allan::process::per_sample, recording::SensorKind};
 
 const TARGET: &str = "ros";
 
@@ -61,7 +61,7 @@ fn covariance(inputs: &Inputs<'_>, kind: SensorKind) -> Result<Option<String>, E
     let variance = |axis: &Option<_>| {
         let level =
             axis.as_ref().and_then(|axis: &crate::store::noise_file::NoiseOfAxis| Level::of(&axis.white));
-        level.map_or(0.0, |level| level::per_sample(level.value, rate).powi(2))
+        level.map_or(0.0, |level| per_sample(level.value, rate).powi(2))
     };
     let [x, y, z] = [variance(&sensor.axes[0]), variance(&sensor.axes[1]), variance(&sensor.axes[2])];
     let unit = &sensor.unit;

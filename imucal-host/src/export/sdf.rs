@@ -14,8 +14,8 @@ use super::{
     terms_without_a_place,
 };
 use crate::{
-    allan::sensor::si_unit,
-    recording::{SensorKind, unit::MICROTESLA_PER_TESLA},
+    allan::process::per_sample,
+    recording::{SensorKind, Unit, unit::MICROTESLA_PER_TESLA},
     store::noise_file::{NoiseOfAxis, NoiseOfSensor},
 };
 
@@ -106,8 +106,8 @@ fn of_axis(
 ) -> Result<(), ExportError> {
     let About { kind, name, rate, mean } = *about;
     let (unit, scale) = match kind {
-        SensorKind::Mag => ("T", 1.0 / MICROTESLA_PER_TESLA),
-        _ => (si_unit(kind), 1.0),
+        SensorKind::Mag => ("T".to_owned(), 1.0 / MICROTESLA_PER_TESLA),
+        _ => (Unit::si(kind).to_string(), 1.0),
     };
     let white = Level::of(&axis.white).ok_or_else(|| ExportError::NotKnown {
         target: TARGET,
@@ -115,7 +115,7 @@ fn of_axis(
         what: "white noise",
         why: axis.white.reason.clone().unwrap_or_default(),
     })?;
-    let (deviation, density) = (level::per_sample(white.value, rate) * scale, white.value * scale);
+    let (deviation, density) = (per_sample(white.value, rate) * scale, white.value * scale);
     let remark = white.remark();
     let mean = mean * scale;
     // Writing to a string cannot fail.

@@ -2,7 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use imucal_core::record::{self, DecodeError, Defect, EncodeError, HigherOrder, Order};
+use imucal_core::{
+    record::{self, DecodeError, Defect, EncodeError, HigherOrder, Order},
+    triad::Triad,
+};
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 pub mod form;
@@ -103,6 +107,15 @@ pub struct StoredTriad {
     /// Quadratic, cubic and cross terms, where they were calibrated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nonlinearity: Option<StoredNonlinearity>,
+}
+
+impl StoredTriad {
+    /// Gain and bias to compute with.
+    #[must_use]
+    pub fn triad(&self) -> Triad<f64> {
+        let gain = Matrix3::from_fn(|row, column| self.gain[row][column]);
+        Triad { gain, bias: Vector3::from(self.bias) }
+    }
 }
 
 /// Where a triad comes from; see [`imucal_core::record::Provenance`].
@@ -373,7 +386,7 @@ impl StoredTriad {
     fn of(model: &str, fit: &FitSummary) -> Self {
         let triad = fit.raw_triad();
         let (gain_std, bias_std) = fit.raw_std();
-        let rows = |m: &nalgebra::Matrix3<f64>| std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]));
+        let rows = |m: &Matrix3<f64>| std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]));
         Self {
             model: model.into(),
             unit_in: fit.unit_in,

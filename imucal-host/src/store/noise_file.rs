@@ -8,7 +8,7 @@ use crate::{
     allan::{
         Noise,
         coefficients::{Axis, Coefficient, Deviation},
-        sensor::{Refusal, SensorNoise, si_unit},
+        sensor::{Refusal, SensorNoise},
     },
     file::{Limits, ReadFault, limits::Size},
     recording::{SensorKind, Unit},
@@ -180,8 +180,8 @@ impl NoiseFile {
             let (_, found) = noise.sensors.iter().find(|(known, _)| *known == kind)?;
             // Of arbitrary units no µT are known.
             let arbitrary = noise.manifest.units.of(kind) == Unit::Arbitrary;
-            let unit = if arbitrary { Unit::Arbitrary.to_string() } else { si_unit(kind).to_owned() };
-            Some(NoiseOfSensor::new(found, &unit))
+            let unit = if arbitrary { Unit::Arbitrary } else { Unit::si(kind) };
+            Some(NoiseOfSensor::new(found, &unit.to_string()))
         };
         let sensor = &noise.manifest.sensor;
         Self {

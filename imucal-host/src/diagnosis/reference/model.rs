@@ -88,10 +88,8 @@ fn unsure(kind: SensorKind, stored: &StoredTriad) -> f64 {
 
 /// `gain · (raw − bias)` as a triad from nominal SI values to SI ones.
 fn si(stored: &StoredTriad, nominal: Nominal) -> Triad<f64> {
-    let gain = Matrix3::from_fn(|row, column| stored.gain[row][column]);
-    let raw = Triad { gain, bias: Vector3::from(stored.bias) };
     // A nominal value is (raw − offset) / per_unit; a calibrated one has no offset.
-    let nominal_in = raw.in_unit(-nominal.offset / nominal.per_unit, 1.0 / nominal.per_unit);
+    let nominal_in = stored.triad().in_unit(-nominal.offset / nominal.per_unit, 1.0 / nominal.per_unit);
     let per_si = stored.unit_out.per_si().unwrap_or(nominal.per_unit);
     Triad { gain: nominal_in.gain / per_si, ..nominal_in }
 }
