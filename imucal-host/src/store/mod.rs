@@ -2,25 +2,23 @@
 
 use std::path::{Path, PathBuf};
 
-use imucal_core::{
-    record::{self, DecodeError, Defect, EncodeError, HigherOrder, Order},
-    triad::Triad,
-};
-use nalgebra::{Matrix3, Vector3};
+use imucal_core::record::{self, DecodeError, Defect, EncodeError, HigherOrder, Order};
 use serde::{Deserialize, Serialize};
 
 pub mod form;
 pub mod higher_order;
 pub mod noise_file;
 pub mod record_form;
+mod triad;
 pub mod watch_file;
 
 pub use higher_order::{StoredCurvature, StoredNonlinearity, StoredTemperatureQuality};
+pub use triad::{StoredProvenance, StoredTemperature, StoredTriad};
 
 use crate::{
     calibrate::{Calibration, FitSummary, SensorOutcome},
     file::{Limits, OutputError, OutputSet, ReadFault, limits::Size},
-    recording::{SensorKind, Unit},
+    recording::SensorKind,
 };
 
 /// What the first line of the TOML says.
@@ -62,90 +60,6 @@ pub struct StoredSensor {
     /// Serial number, empty where unknown.
     #[serde(default)]
     pub serial: String,
-}
-
-/// One sensor's calibration: `calibrated = gain · (raw − bias)` and how good it was.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StoredTriad {
-    /// Model's name.
-    pub model: String,
-    /// Unit of raw values.
-    pub unit_in: Unit,
-    /// Unit of calibrated values.
-    pub unit_out: Unit,
-    /// `unit_out` per `unit_in`, by rows.
-    pub gain: [[f64; 3]; 3],
-    /// `unit_in`.
-    pub bias: [f64; 3],
-    /// Standard errors of the gain; 0 for an entry that is not estimated.
-    pub gain_std: [[f64; 3]; 3],
-    /// Standard errors of the bias.
-    pub bias_std: [f64; 3],
-    /// Rms residual, `unit_out`; rad a turn for the gyroscope.
-    pub rms: f64,
-    /// The same for observations left out of the fit.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub held_out_rms: Option<f64>,
-    /// Observations used.
-    pub observations: u32,
-    /// Parameters estimated.
-    pub parameters: u8,
-    /// Condition of the normalised Jacobian.
-    pub condition: f64,
-    /// Share of the sphere of directions seen.
-    pub coverage: f64,
-    /// Length of the field where it was not known beforehand, `unit_in`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub field_norm: Option<f64>,
-    /// Serial of the unit and day of the calibration, where they are not the file's.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub provenance: Option<StoredProvenance>,
-    /// Temperature terms, where they were calibrated.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub temperature: Option<StoredTemperature>,
-    /// Quadratic, cubic and cross terms, where they were calibrated.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub nonlinearity: Option<StoredNonlinearity>,
-}
-
-impl StoredTriad {
-    /// Gain and bias to compute with.
-    #[must_use]
-    pub fn triad(&self) -> Triad<f64> {
-        let gain = Matrix3::from_fn(|row, column| self.gain[row][column]);
-        Triad { gain, bias: Vector3::from(self.bias) }
-    }
-}
-
-/// Where a triad comes from; see [`imucal_core::record::Provenance`].
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StoredProvenance {
-    /// Serial number, empty where unknown.
-    #[serde(default)]
-    pub serial: String,
-    /// Day it was made; in TOML as YYYY-MM-DD.
-    #[serde(with = "record_form::date_text")]
-    pub date: record::Date,
-}
-
-/// Temperature terms; see [`imucal_core::temperature`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StoredTemperature {
-    /// °C.
-    pub reference: f64,
-    /// `unit_in` per kelvin.
-    pub bias_slope: [f64; 3],
-    /// Per kelvin.
-    pub scale_slope: [f64; 3],
-    /// How well they are known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub quality: Option<StoredTemperatureQuality>,
-    /// The second order.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub curvature: Option<StoredCurvature>,
 }
 
 /// Why a calibration could not be read.
@@ -386,7 +300,7 @@ impl StoredTriad {
     fn of(model: &str, fit: &FitSummary) -> Self {
         let triad = fit.raw_triad();
         let (gain_std, bias_std) = fit.raw_std();
-        let rows = |m: &Matrix3<f64>| std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]));
+        let rows = |m: &nalgebra::Matrix3<f64>| std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]));
         Self {
             model: model.into(),
             unit_in: fit.unit_in,

@@ -1,0 +1,92 @@
+//! One sensor of a stored calibration.
+
+use imucal_core::{record, triad::Triad};
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::{StoredCurvature, StoredNonlinearity, StoredTemperatureQuality, record_form};
+use crate::recording::Unit;
+
+/// One sensor's calibration: `calibrated = gain · (raw − bias)` and how good it was.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StoredTriad {
+    /// Model's name.
+    pub model: String,
+    /// Unit of raw values.
+    pub unit_in: Unit,
+    /// Unit of calibrated values.
+    pub unit_out: Unit,
+    /// `unit_out` per `unit_in`, by rows.
+    pub gain: [[f64; 3]; 3],
+    /// `unit_in`.
+    pub bias: [f64; 3],
+    /// Standard errors of the gain; 0 for an entry that is not estimated.
+    pub gain_std: [[f64; 3]; 3],
+    /// Standard errors of the bias.
+    pub bias_std: [f64; 3],
+    /// Rms residual, `unit_out`; rad a turn for the gyroscope.
+    pub rms: f64,
+    /// The same for observations left out of the fit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out_rms: Option<f64>,
+    /// Observations used.
+    pub observations: u32,
+    /// Parameters estimated.
+    pub parameters: u8,
+    /// Condition of the normalised Jacobian.
+    pub condition: f64,
+    /// Share of the sphere of directions seen.
+    pub coverage: f64,
+    /// Length of the field where it was not known beforehand, `unit_in`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field_norm: Option<f64>,
+    /// Serial of the unit and day of the calibration, where they are not the file's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub provenance: Option<StoredProvenance>,
+    /// Temperature terms, where they were calibrated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<StoredTemperature>,
+    /// Quadratic, cubic and cross terms, where they were calibrated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nonlinearity: Option<StoredNonlinearity>,
+}
+
+impl StoredTriad {
+    /// Gain and bias to compute with.
+    #[must_use]
+    pub fn triad(&self) -> Triad<f64> {
+        let gain = Matrix3::from_fn(|row, column| self.gain[row][column]);
+        Triad { gain, bias: Vector3::from(self.bias) }
+    }
+}
+
+/// Where a triad comes from; see [`imucal_core::record::Provenance`].
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StoredProvenance {
+    /// Serial number, empty where unknown.
+    #[serde(default)]
+    pub serial: String,
+    /// Day it was made; in TOML as YYYY-MM-DD.
+    #[serde(with = "record_form::date_text")]
+    pub date: record::Date,
+}
+
+/// Temperature terms; see [`imucal_core::temperature`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StoredTemperature {
+    /// °C.
+    pub reference: f64,
+    /// `unit_in` per kelvin.
+    pub bias_slope: [f64; 3],
+    /// Per kelvin.
+    pub scale_slope: [f64; 3],
+    /// How well they are known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quality: Option<StoredTemperatureQuality>,
+    /// The second order.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curvature: Option<StoredCurvature>,
+}
