@@ -14,6 +14,10 @@
 //! | M − 1 | its diagonal: error of the scale; its antisymmetric part: rotation; the rest: angles between axes |
 //!
 //! A parameter has moved where |z| is beyond what the largest of so many healthy ones exceeds once in a hundred times (Bonferroni).
+//! Gains are compared only where both calibrations have the same axes and field: a hand gives an upper triangular gain of the
+//! accelerometer, a rig a full one in its own axes, and a magnetometer in an unknown field has determinant 1. Elsewhere M would say
+//! nothing of the unit, and the biases alone, in raw units, are compared.
+//!
 //! The biases are compared at B's reference temperature. Not looked at: correlations between parameters, slopes of temperature
 //! and nonlinear terms.
 
@@ -98,6 +102,13 @@ pub struct SensorComparison {
     pub limit: f64,
     /// β.
     pub bias_error: [f64; 3],
+    /// What M says; `None` where the gains are in other axes or of another field, and the biases alone are compared.
+    pub gain: Option<GainComparison>,
+}
+
+/// What M says.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GainComparison {
     /// Error of the scale of each axis, a share.
     pub scale_error: [f64; 3],
     /// Rotation vector of the axes, rad.
@@ -142,9 +153,16 @@ pub fn compare(
         return Err(CompareFault::Serials { a: serials[0].clone(), b: serials[1].clone() });
     }
     let (mut sensors, mut only_one) = (Vec::new(), Vec::new());
+    // The other sensors are in the axes of the accelerometer.
+    let acc = a.acc.as_ref().zip(b.acc.as_ref());
     for kind in SensorKind::ALL {
         match (a.triad(kind), b.triad(kind)) {
-            (Some(a), Some(b)) => sensors.push(of_sensor(kind, a, b)?),
+            (Some(a), Some(b)) => {
+                let axes = acc.unwrap_or((a, b));
+                let alike = [(a, b), axes].iter().all(|(a, b)| estimated(a) == estimated(b));
+                let comparable = alike && a.field_norm.is_some() == b.field_norm.is_some();
+                sensors.push(of_sensor(kind, a, b, comparable)?);
+            }
             (None, None) => {}
             _ => only_one.push(kind),
         }
@@ -156,21 +174,24 @@ pub fn compare(
     Ok(Comparison { format: FORMAT, days, sensors, only_one })
 }
 
-fn of_sensor(kind: SensorKind, a: &StoredTriad, b: &StoredTriad) -> Result<SensorComparison, CompareFault> {
+/// Which entries of the gain are estimated: what its axes are.
+fn estimated(triad: &StoredTriad) -> [[bool; 3]; 3] {
+    triad.gain_std.map(|row| row.map(|std| std > 0.0))
+}
+
+fn of_sensor(
+    kind: SensorKind,
+    a: &StoredTriad,
+    b: &StoredTriad,
+    comparable: bool,
+) -> Result<SensorComparison, CompareFault> {
     if a.unit_in != b.unit_in {
         return Err(CompareFault::Units { sensor: kind, a: a.unit_in, b: b.unit_in });
     }
     let bias_a = at_reference(a, b);
     let (gain_a, gain_b) = (a.triad().gain, b.triad().gain);
     let inverse = gain_b.try_inverse().ok_or(CompareFault::Singular { sensor: kind })?;
-    let mut error = gain_a * inverse;
-    if a.field_norm.is_some() || b.field_norm.is_some() {
-        // Gains of determinant 1: their common scale says nothing.
-        error /= error.determinant().cbrt();
-    }
-    error -= Matrix3::identity();
-    let half = |r: usize, c: usize, sign: f64| 0.5 * (error[(r, c)] + sign * error[(c, r)]);
-    let mut parameters = parameters(a, b, &bias_a);
+    let mut parameters = parameters(a, b, &bias_a, comparable);
     let chances = Normal::standard();
     let limit = -chances.inverse_cdf(0.5 * FALSE_ALARMS / parameters.len().max(1) as f64);
     parameters.iter_mut().for_each(|parameter| parameter.moved = parameter.z.abs() > limit);
@@ -180,10 +201,22 @@ fn of_sensor(kind: SensorKind, a: &StoredTriad, b: &StoredTriad) -> Result<Senso
         parameters,
         limit,
         bias_error: (gain_a * (Vector3::from(b.bias) - bias_a)).into(),
-        scale_error: error.diagonal().into(),
-        rotation: [half(2, 1, -1.0), half(0, 2, -1.0), half(1, 0, -1.0)],
-        skew: [2.0 * half(1, 2, 1.0), 2.0 * half(2, 0, 1.0), 2.0 * half(0, 1, 1.0)],
+        gain: comparable.then(|| GainComparison::of(gain_a * inverse, a.field_norm.is_some())),
     })
+}
+
+impl GainComparison {
+    /// Of M; gains of determinant 1 say nothing of a common scale.
+    fn of(m: Matrix3<f64>, unit_determinant: bool) -> Self {
+        let m = if unit_determinant { m / m.determinant().cbrt() } else { m };
+        let error = m - Matrix3::identity();
+        let half = |r: usize, c: usize, sign: f64| 0.5 * (error[(r, c)] + sign * error[(c, r)]);
+        Self {
+            scale_error: error.diagonal().into(),
+            rotation: [half(2, 1, -1.0), half(0, 2, -1.0), half(1, 0, -1.0)],
+            skew: [2.0 * half(1, 2, 1.0), 2.0 * half(2, 0, 1.0), 2.0 * half(0, 1, 1.0)],
+        }
+    }
 }
 
 /// The first bias at the second's reference temperature, where both have one.
@@ -196,7 +229,7 @@ fn at_reference(a: &StoredTriad, b: &StoredTriad) -> Vector3<f64> {
 }
 
 /// The parameters that both have estimated; without a verdict.
-fn parameters(a: &StoredTriad, b: &StoredTriad, bias_a: &Vector3<f64>) -> Vec<Moved> {
+fn parameters(a: &StoredTriad, b: &StoredTriad, bias_a: &Vector3<f64>, with_gains: bool) -> Vec<Moved> {
     const AXES: [char; 3] = ['x', 'y', 'z'];
     let of = |name: String, (a, a_std): (f64, f64), (b, b_std): (f64, f64)| {
         let std_error = a_std.hypot(b_std);
@@ -218,7 +251,7 @@ fn parameters(a: &StoredTriad, b: &StoredTriad, bias_a: &Vector3<f64>) -> Vec<Mo
         let name = format!("bias_{}", AXES[axis]);
         of(name, (bias_a[axis], a.bias_std[axis]), (b.bias[axis], b.bias_std[axis]))
     });
-    gains.chain(biases).collect()
+    gains.filter(|_| with_gains).chain(biases).collect()
 }
 
 #[cfg(test)]
@@ -273,9 +306,36 @@ mod tests {
         gyr.gain = std::array::from_fn(|row| std::array::from_fn(|column| changed[(row, column)]));
         let comparison = compare(&before, &after, false).expect("of one unit");
         let gyr = comparison.sensors.iter().find(|sensor| sensor.sensor == SensorKind::Gyr).expect("both");
-        assert!((gyr.rotation[2] + 2e-3).abs() < 1e-5 && gyr.rotation[0].abs() < 1e-5, "{:?}", gyr.rotation);
-        assert!((gyr.scale_error[0] + 3e-3).abs() < 2e-5, "{:?}", gyr.scale_error);
-        assert!((gyr.skew[0] + 1e-3).abs() < 2e-5, "{:?}", gyr.skew);
+        let GainComparison { scale_error, rotation, skew } = gyr.gain.expect("the same axes");
+        assert!((rotation[2] + 2e-3).abs() < 1e-5 && rotation[0].abs() < 1e-5, "{rotation:?}");
+        assert!((scale_error[0] + 3e-3).abs() < 2e-5, "{scale_error:?}");
+        assert!((skew[0] + 1e-3).abs() < 2e-5, "{skew:?}");
+    }
+
+    #[test]
+    fn of_a_unit_in_other_axes_or_of_another_field_the_biases_alone_are_compared() {
+        // As on a rig that holds the unit 0.3 rad off: full gains, all entries of which are estimated.
+        let before = calibrated(3);
+        let mut after = before.clone();
+        let turn = nalgebra::Rotation3::new(Vector3::new(0.1, 0.2, 0.2)).into_inner();
+        for triad in [&mut after.acc, &mut after.gyr, &mut after.mag].into_iter().flatten() {
+            let turned = turn * triad.triad().gain;
+            triad.gain = std::array::from_fn(|row| std::array::from_fn(|column| turned[(row, column)]));
+            triad.gain_std = triad.gain_std.map(|row| row.map(|std| std.max(1e-9)));
+        }
+        let comparison = compare(&before, &after, false).expect("of one unit");
+        assert_eq!(comparison.sensors.len(), 3);
+        for sensor in &comparison.sensors {
+            assert!(!sensor.has_moved() && sensor.gain.is_none(), "{sensor:?}");
+            assert_eq!(sensor.parameters.len(), 3);
+        }
+        let mut scaled = before.clone();
+        let mag = scaled.mag.as_mut().expect("calibrated");
+        mag.field_norm = if mag.field_norm.is_some() { None } else { Some(1.0) };
+        let comparison = compare(&before, &scaled, false).expect("of one unit");
+        let without: Vec<_> =
+            comparison.sensors.iter().filter(|s| s.gain.is_none()).map(|s| s.sensor).collect();
+        assert_eq!(without, [SensorKind::Mag]);
     }
 
     #[test]

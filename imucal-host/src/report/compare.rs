@@ -5,7 +5,7 @@ use super::{
     table::words,
 };
 use crate::{
-    compare::{Comparison, SensorComparison},
+    compare::{Comparison, GainComparison, SensorComparison},
     recording::{SensorKind, unit::STANDARD_GRAVITY},
 };
 
@@ -55,12 +55,19 @@ fn meaning(sensor: &SensorComparison) -> String {
         SensorKind::Gyr => (sensor.bias_error.map(f64::to_degrees), "°/s", 4),
         SensorKind::Mag => (sensor.bias_error, "µT", 3),
     };
+    let mut text = format!(
+        "  With the first calibration, where the second is right:\n    bias off by     {} {unit}\n",
+        three(bias, decimals)
+    );
+    let Some(GainComparison { scale_error, rotation, skew }) = sensor.gain else {
+        return text + "    gains           not compared: they are in other axes, or of another field\n";
+    };
     let degrees = |angles: [f64; 3]| three(angles.map(f64::to_degrees), 4);
-    format!(
-        "  With the first calibration, where the second is right:\n    bias off by     {} {unit}\n    scale off by    {} %\n    axes turned by  {}°\n    angles off by   {}° (yz, zx, xy)\n",
-        three(bias, decimals),
-        three(sensor.scale_error.map(|share| 100.0 * share), 4),
-        degrees(sensor.rotation),
-        degrees(sensor.skew)
-    )
+    text += &format!(
+        "    scale off by    {} %\n    axes turned by  {}°\n    angles off by   {}° (yz, zx, xy)\n",
+        three(scale_error.map(|share| 100.0 * share), 4),
+        degrees(rotation),
+        degrees(skew)
+    );
+    text
 }

@@ -16,19 +16,29 @@ pub fn guess(guess: &LayoutGuess, command: &str, path: &Path) -> String {
         let meaning = column.meaning.unwrap_or("not known, and kept as it is");
         text += &format!("  {name:<width$}  {meaning}, first {}\n", shown(&column.first));
     }
-    for kind in &guess.unknown_units {
-        text += &format!(
-            "  The unit of {kind} is not clear: add it to --unit, such as {kind}={}\n",
-            if *kind == crate::recording::SensorKind::Gyr {
-                "deg/s, or 16.4/deg/s for counts"
-            } else {
-                "g, or 16384/g for counts"
-            }
-        );
-    }
     let mut words = vec!["imucal".to_owned(), command.to_owned(), quoted(&path.display().to_string())];
-    words.extend(guess.options.iter().map(|option| quoted(option)));
-    text + &format!("Then this reads it:\n  {}", words.join(" "))
+    words.extend(with_unknown_units(guess).iter().map(|option| quoted(option)));
+    let how = if guess.unknown_units.is_empty() {
+        "Then this reads it:"
+    } else {
+        "Then this reads it, with a unit such as g or deg/s in place of UNIT, or for counts how many make one, such as 16384/g:"
+    };
+    text + &format!("{how}\n  {}", words.join(" "))
+}
+
+/// The options, and a place for each unit that neither name nor numbers say.
+fn with_unknown_units(guess: &LayoutGuess) -> Vec<String> {
+    let mut options = guess.options.clone();
+    let unknown: Vec<String> = guess.unknown_units.iter().map(|kind| format!("{kind}=UNIT")).collect();
+    if unknown.is_empty() {
+        return options;
+    }
+    let unknown = unknown.join(",");
+    match options.iter().position(|option| option == "--unit").and_then(|at| options.get_mut(at + 1)) {
+        Some(units) => *units = format!("{units},{unknown}"),
+        None => options.extend(["--unit".to_owned(), unknown]),
+    }
+    options
 }
 
 fn shown(text: &str) -> String {
@@ -49,6 +59,21 @@ fn quoted(word: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recording::SensorKind;
+
+    #[test]
+    fn a_unit_that_is_not_clear_has_its_place_in_the_command() {
+        let of = |options: &[&str]| {
+            let guess = LayoutGuess {
+                columns: Vec::new(),
+                options: options.iter().map(|option| (*option).to_owned()).collect(),
+                unknown_units: vec![SensorKind::Gyr],
+            };
+            super::guess(&guess, "calibrate", Path::new("log.csv"))
+        };
+        assert!(of(&[]).ends_with("in place of UNIT, or for counts how many make one, such as 16384/g:\n  imucal calibrate log.csv --unit gyr=UNIT"));
+        assert!(of(&["--unit", "acc=g"]).ends_with("--unit acc=g,gyr=UNIT"));
+    }
 
     #[test]
     fn a_word_with_blanks_or_quotes_is_quoted_for_a_shell() {
