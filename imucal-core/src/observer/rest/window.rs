@@ -31,7 +31,7 @@ pub(super) fn window<T: Scalar>(quarters: [&Stretch<T>; 4]) -> Option<Window<T>>
     Some(Window { variance: squares / (a + b + c + d - T::one()), rate })
 }
 
-/// Mean by weights; zero where all are. By components: see [`Moments::push`].
+/// Mean by weights; zero where all are. By components, as in [`crate::observation::Moments::push`].
 fn weighted<T: Scalar>(means: [Vector3<T>; 4], weights: [T; 4]) -> Vector3<T> {
     let (mut sum, mut total) = (Vector3::zeros(), T::zero());
     for (mean, weight) in means.into_iter().zip(weights) {
