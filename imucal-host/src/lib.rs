@@ -90,6 +90,8 @@ pub mod blind;
 
 pub mod report;
 
+pub mod page;
+
 pub mod study;
 
 #[cfg(feature = "cli")]

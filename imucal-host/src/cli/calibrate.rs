@@ -8,6 +8,7 @@ use imucal_core::record::Date;
 use super::{
     Ending,
     columns::{self, Columns},
+    html::Html,
     output,
     overwrite::{Overwrite, Planned, files_of},
     progress::Progress,
@@ -23,6 +24,7 @@ use crate::{
     },
     file::OutputSet,
     observe::pose,
+    page,
     recording::{Recording, SensorKind},
     report,
     store::{StoredCalibration, form::Form},
@@ -48,6 +50,8 @@ pub(super) struct Arguments {
     /// Write everything as JSON; `-` prints it instead of the table
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    html: Html,
     /// Use this multiple of the initial rest's variance for the rest test instead of trying 2 to 10
     #[arg(long, value_name = "MULTIPLE", value_parser = multiple)]
     threshold: Option<f64>,
@@ -128,7 +132,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     drop(progress);
     let json = serde_json::to_string_pretty(&report::json::calibration(&calibration))? + "\n";
     print(arguments, &calibration, &json)?;
-    write(arguments, &calibration, &json, files)?;
+    write(arguments, (&recording, &calibration), &json, files)?;
     Ok(ending(arguments, &calibration, &named))
 }
 
@@ -137,6 +141,7 @@ fn outputs(arguments: &Arguments) -> Vec<Planned> {
     [(&arguments.out, Form::Toml), (&arguments.record, Form::Record), (&json_file(arguments), Form::Json)]
         .into_iter()
         .filter_map(|(path, form)| Some(Planned::calibration(path.as_ref()?, form)))
+        .chain(arguments.html.planned())
         .collect()
 }
 
@@ -244,7 +249,7 @@ fn print(arguments: &Arguments, calibration: &Calibration, json: &str) -> anyhow
 /// Writes all files that were asked for, or none; those that hold sensors only where there is one.
 fn write(
     arguments: &Arguments,
-    calibration: &Calibration,
+    (recording, calibration): (&Recording, &Calibration),
     json: &str,
     mut files: OutputSet,
 ) -> anyhow::Result<()> {
@@ -254,6 +259,8 @@ fn write(
     if let Some(path) = json_file(arguments) {
         files.add(&path, json.as_bytes())?;
     }
+    let parts = || vec![page::calibration::calibration(calibration, recording)];
+    arguments.html.add(&mut files, recording, &parts)?;
     for path in arguments.out.iter().chain(&arguments.record).filter(|_| nothing) {
         warn(&format!("{}: not written, since no sensor was accepted", path.display()));
     }

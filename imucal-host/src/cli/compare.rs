@@ -1,17 +1,19 @@
 //! `imucal compare`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
 
 use super::{
-    Ending, load, output,
+    Ending,
+    html::Html,
+    load, output,
     overwrite::{Overwrite, Planned},
     reading::Reading,
     refuse,
 };
-use crate::{compare::compare, report};
+use crate::{compare::compare, page, report};
 
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  imucal compare unit-2025.toml unit-2026.toml")]
@@ -27,13 +29,16 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     #[command(flatten)]
+    html: Html,
+    #[command(flatten)]
     overwrite: Overwrite,
     #[command(flatten)]
     reading: Reading,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let outputs: Vec<Planned> = arguments.json.iter().map(Planned::new).collect();
+    let outputs: Vec<Planned> =
+        arguments.json.iter().map(Planned::new).chain(arguments.html.planned()).collect();
     let inputs = [arguments.first.clone(), arguments.second.clone()];
     let mut files = arguments.overwrite.plan(&inputs, &outputs)?;
     let mut both = Vec::new();
@@ -54,6 +59,22 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             + "\n";
         files.add(path, json.as_bytes())?;
     }
+    let title = format!("{} to {}", name(&arguments.first), name(&arguments.second));
+    let inputs = [("first", arguments.first.as_path()), ("second", &arguments.second)];
+    let facts = |provenance: page::Provenance| {
+        let unit = &both[1].sensor;
+        let days = format!("{} days", comparison.days);
+        Ok(provenance
+            .with("unit", &unit.name)
+            .with("serial number", &unit.serial)
+            .with("between them", &days))
+    };
+    let parts = || vec![page::comparison::comparison(&comparison)];
+    arguments.html.add_of(&mut files, &title, &inputs, &facts, &parts)?;
     files.commit()?;
     Ok(Ending::Done)
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

@@ -9,6 +9,7 @@ use imucal_core::record::{CalibrationRecord, HigherOrder};
 use super::{
     Ending,
     calibrate::today,
+    html::Html,
     output::{self, say},
     overwrite::{Overwrite, Planned},
 };
@@ -22,6 +23,7 @@ use crate::{
         samples::{self, Samples},
     },
     file::OutputSet,
+    page::{self, Provenance},
     recording::{Recording, SensorKind},
     report::{
         self,
@@ -35,8 +37,11 @@ use crate::{
 /// The effect that is in the recording but not in the calibration, and its size in multiples of its usual one.
 const WITHHELD: (&str, f64) = ("acc.scale_cubic", 3.0);
 
+/// The page of calibration and diagnosis.
+const PAGE: &str = "demo.html";
+
 /// What the demo writes, all of it at its end.
-const WRITTEN: [(&str, &str); 8] = [
+const WRITTEN: [(&str, &str); 9] = [
     ("rig.csv.gz", "the recording"),
     ("rig.toml", "its manifest: units, site, sensor"),
     ("calibration.toml", "the calibration for people"),
@@ -45,6 +50,7 @@ const WRITTEN: [(&str, &str); 8] = [
     ("rig-calibrated.csv.gz", "the recording corrected through the core"),
     ("rig-calibrated.toml", "its manifest"),
     ("diagnosis.json", "the diagnosis, for programs"),
+    (PAGE, "all of it with drawings, for a browser"),
 ];
 
 #[derive(Args, Debug)]
@@ -52,6 +58,8 @@ pub(super) struct Arguments {
     /// Folder for what the demo writes
     #[arg(long, value_name = "DIR", default_value = "imucal-demo")]
     out: PathBuf,
+    #[command(flatten)]
+    html: Html,
     #[command(flatten)]
     overwrite: Overwrite,
 }
@@ -94,6 +102,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     output::text(&report::diagnosis::page(&diagnosis))?;
     let json = serde_json::to_string_pretty(&diagnosis)? + "\n";
     files.add(&out.join("diagnosis.json"), json.as_bytes())?;
+    let provenance =
+        Provenance::new(today()).with("recording", "rig.csv.gz, simulated").with_recording(&recording);
+    let parts =
+        [page::calibration::calibration(&calibration, &recording), page::diagnosis::diagnosis(&diagnosis)];
+    let page = page::page("imucal demo: a simulated unit on a rig", &provenance, &parts);
+    for path in [Some(out.join(PAGE).as_path()), arguments.html.path()].into_iter().flatten() {
+        files.add(path, page.as_bytes())?;
+    }
     files.commit()?;
     let named = diagnosis.causes.iter().any(|cause| cause.effect == WITHHELD.0);
     say!(
@@ -121,7 +137,8 @@ fn planned(arguments: &Arguments) -> anyhow::Result<OutputSet> {
             out.display()
         )
     })?;
-    let planned: Vec<Planned> = WRITTEN.iter().map(|(file, _)| Planned::new(out.join(file))).collect();
+    let written = WRITTEN.iter().map(|(file, _)| Planned::new(out.join(file)));
+    let planned: Vec<Planned> = written.chain(arguments.html.planned()).collect();
     let earlier = WRITTEN.iter().all(|(file, _)| out.join(file).exists());
     arguments.overwrite.or(earlier).plan(&[], &planned)
 }

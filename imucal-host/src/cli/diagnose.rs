@@ -9,6 +9,7 @@ use imucal_core::watch::WatchSummary;
 use super::{
     Ending,
     columns::{self, Columns},
+    html::Html,
     load, output,
     overwrite::{Overwrite, Planned, files_of},
     own_effects,
@@ -22,6 +23,7 @@ use crate::{
     diagnosis::{Diagnosis, Options, Verdict, diagnose, proposal::confirmation},
     effect::{CATALOGUE, Effect, user},
     file::OutputSet,
+    page,
     recording::{self, Recording, Stream, Warning},
     report,
     store::watch_file,
@@ -61,6 +63,8 @@ pub(super) struct Arguments {
     /// Write everything as JSON; `-` prints it instead of the report
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    html: Html,
     /// List every effect: what it is, its usual size, what a recording needs to show it, what it may be mistaken for
     #[arg(long)]
     list: bool,
@@ -95,7 +99,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     inputs.extend(arguments.sim.iter().flat_map(|path| files_of(path)));
     inputs.extend(arguments.effects.clone());
     inputs.extend(arguments.watch.clone());
-    let files = arguments.overwrite.plan(&inputs, &written.map(Planned::new).collect::<Vec<_>>())?;
+    let written: Vec<Planned> = written.map(Planned::new).chain(arguments.html.planned()).collect();
+    let mut files = arguments.overwrite.plan(&inputs, &written)?;
     let recording = columns::read(path, &arguments.columns, arguments.reading)?;
     let model = arguments.model.as_deref().map(|path| load(path, arguments.reading)).transpose()?;
     let model = match model {
@@ -111,6 +116,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let progress = Progress::start();
     let diagnosis = diagnose(&recording, &options, &|stage| progress.stage(stage));
     drop(progress);
+    arguments.html.add(&mut files, &recording, &|| vec![page::diagnosis::diagnosis(&diagnosis)])?;
     print(arguments, &diagnosis, files)?;
     Ok(if diagnosis.verdict == Verdict::NotTestable { Ending::Refused } else { Ending::Done })
 }

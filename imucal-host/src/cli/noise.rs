@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use super::{
     Ending,
     columns::{self, Columns},
+    html::Html,
     output::{self, say},
     overwrite::{Overwrite, Planned, files_of},
     reading::Reading,
@@ -15,7 +16,7 @@ use super::{
 use crate::{
     allan::{self, sensor::Refusal},
     export::{self, Inputs, Target},
-    report,
+    page, report,
     store::noise_file::NoiseFile,
 };
 
@@ -27,6 +28,8 @@ pub(super) struct Arguments {
     /// Write everything as JSON; `-` prints it
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    html: Html,
     /// Print the settings of another program in place of the tables
     #[arg(long, value_name = "TARGET")]
     to: Option<To>,
@@ -52,7 +55,8 @@ enum To {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let on_screen = arguments.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
     anyhow::ensure!(!(on_screen && arguments.to.is_some()), "--json -: found --to too, expected one of them");
-    let outputs: Vec<Planned> = arguments.json.iter().filter(|_| !on_screen).map(Planned::new).collect();
+    let json = arguments.json.iter().filter(|_| !on_screen).map(Planned::new);
+    let outputs: Vec<Planned> = json.chain(arguments.html.planned()).collect();
     let mut files = arguments.overwrite.plan(&files_of(&arguments.recording), &outputs)?;
     let mapping = arguments.columns.mapping()?;
     let noise = allan::noise(&arguments.recording, &mapping, &arguments.reading.limits())
@@ -63,8 +67,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let file = NoiseFile::new(&noise, warnings);
     if let Some(path) = arguments.json.as_ref().filter(|_| !on_screen) {
         files.add(path, file.text().as_bytes())?;
-        files.commit()?;
     }
+    let facts = |provenance: page::Provenance| {
+        Ok(provenance.with("unit", &file.name).with("serial number", &file.serial))
+    };
+    let inputs = [("recording", arguments.recording.as_path())];
+    let parts = || vec![page::noise::noise(&file)];
+    arguments.html.add_of(&mut files, &file.recording, &inputs, &facts, &parts)?;
+    files.commit()?;
     let estimated = noise.sensors.iter().any(|(_, found)| found.is_ok());
     match arguments.to {
         _ if on_screen => output::text(&file.text())?,

@@ -73,6 +73,9 @@ pub struct Diagnosis {
     /// What the drift watch of the unit's device has seen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub watch: Option<Watched>,
+    /// For each sensor whose gap follows something, the residual over that: for drawings, and not in the JSON.
+    #[serde(skip)]
+    pub profiles: Vec<Profile>,
 }
 
 impl Diagnosis {
@@ -172,6 +175,36 @@ pub struct Place {
     pub p_value: f64,
     /// How it follows.
     pub detail: String,
+}
+
+/// The residual of one axis over a driver.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Profile {
+    /// `acc`, `gyr` or `mag`.
+    pub sensor: String,
+    /// `x`, `y` or `z`.
+    pub axis: String,
+    /// Unit of the residual.
+    pub unit: String,
+    /// The driver that the sensor follows most.
+    pub driver: String,
+    /// The function of it that the axis follows most.
+    pub function: String,
+    /// Means, in the order of the driver.
+    pub bins: Vec<ProfileBin>,
+}
+
+/// Means over the blocks in which a driver is much the same.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProfileBin {
+    /// Mean of the function, in standard deviations of it; of the time, s.
+    pub driver: f64,
+    /// Mean residual before the causes are added.
+    pub before: f64,
+    /// And after.
+    pub after: f64,
+    /// Standard error of both by white noise.
+    pub std: f64,
 }
 
 /// An effect that is asserted.

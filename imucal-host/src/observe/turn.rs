@@ -40,6 +40,11 @@ impl TurnData {
         Turn { blocks: &self.blocks, durations: Durations::Each(&self.durations), before, after }
     }
 
+    /// Sum of the rates' integrals, bias taken off, rad, nominal: near to the rotation vector of a turn about one axis.
+    pub fn angle(&self) -> Vector3<f64> {
+        self.blocks.iter().map(|block| block.s0).sum()
+    }
+
     /// The same turn with its rates, bias taken off, multiplied: s0 and s1 by the matrix, c by its cofactors.
     pub fn stretched(mut self, stretch: &Matrix3<f64>) -> Self {
         self.blocks.iter_mut().for_each(|block| *block = compression::stretched(block, stretch));

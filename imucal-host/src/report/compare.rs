@@ -47,7 +47,7 @@ fn of_sensor(sensor: &SensorComparison) -> String {
 }
 
 /// What the first calibration makes of what the second has right.
-fn meaning(sensor: &SensorComparison) -> String {
+pub(crate) fn meaning(sensor: &SensorComparison) -> String {
     let three =
         |values: [f64; 3], decimals: usize| values.map(|value| format!("{value:+.decimals$}")).join(", ");
     let (bias, unit, decimals) = match sensor.sensor {

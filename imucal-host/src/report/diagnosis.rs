@@ -10,13 +10,13 @@ use super::{
 use crate::{
     diagnosis::{
         Diagnosis, Verdict,
-        finding::{Amount, Cause, Gap, Place, Proposal, ProposalStatus},
+        finding::{Absent, Amount, Cause, Experiment, Gap, NotTestable, Place, Proposal, ProposalStatus},
     },
-    effect::{self, Effect},
+    effect,
     recording::manifest::ReferenceKind,
 };
 
-mod change;
+pub(crate) mod change;
 
 /// Drivers that are printed; the JSON has all.
 const PLACES: usize = 6;
@@ -58,7 +58,7 @@ fn write_page(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
 }
 
 /// The contract's word for a verdict.
-fn verdict_name(verdict: Verdict) -> &'static str {
+pub(crate) fn verdict_name(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Explained => "explained",
         Verdict::Ambiguous => "ambiguous",
@@ -69,7 +69,7 @@ fn verdict_name(verdict: Verdict) -> &'static str {
     }
 }
 
-fn sentence(diagnosis: &Diagnosis) -> String {
+pub(crate) fn sentence(diagnosis: &Diagnosis) -> String {
     let names: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.effect.as_str()).collect();
     let (causes, one) = (listed(&names), names.len() == 1);
     let closed = closed(diagnosis);
@@ -109,7 +109,7 @@ fn closed(diagnosis: &Diagnosis) -> String {
 }
 
 /// `97 % (95 to 98 %)`; without an interval, the share alone.
-fn share_words(share: f64, [low, high]: [f64; 2]) -> String {
+pub(crate) fn share_words(share: f64, [low, high]: [f64; 2]) -> String {
     let percent = |share: f64| 100.0 * share;
     match low.is_finite() && high.is_finite() {
         true => format!("{:.0} % ({:.0} to {:.0} %)", percent(share), percent(low), percent(high)),
@@ -117,7 +117,7 @@ fn share_words(share: f64, [low, high]: [f64; 2]) -> String {
     }
 }
 
-fn place_words(place: &Place) -> String {
+pub(crate) fn place_words(place: &Place) -> String {
     match place.detail.is_empty() {
         true => format!("{} of {}", place.driver, place.sensor),
         false => format!("{} of {} ({})", place.driver, place.sensor, place.detail),
@@ -160,25 +160,16 @@ fn write_causes(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
             if diagnosis.causes.len() == 1 { "cause".to_owned() } else { format!("cause {}", index + 1) };
         writeln!(text, "\n{heading}: {}", cause.effect)?;
         let certain = finite(cause.probability, certainty);
-        let share = match cause.gap_closed.filter(|share| share.is_finite()) {
-            Some(share) => {
-                let ends = cause.gap_closed_ci95.unwrap_or([f64::NAN; 2]);
-                format!("closes {} of the gap", share_words(share, ends))
-            }
-            None => "was corrected or left out before the gap was measured".to_owned(),
-        };
-        let material = if cause.material { "" } else { "; too small to matter" };
-        text.push_str(&hanging("  ", &format!("probability {certain}; {share}{material}")));
+        text.push_str(&hanging("  ", &format!("probability {certain}; {}", closing(cause))));
         let amounts: Vec<String> = cause.parameters.iter().map(amount).collect();
         text.push_str(&hanging("  how much:  ", &amounts.join("; ")));
-        let known = effect::find(&cause.effect);
-        let own = diagnosis.user_effects.iter().find(|own| own.effect == cause.effect);
-        let words = known.map(|effect| (effect.words.cause, effect.words.remedy));
-        if let Some((what, remedy)) = words.or_else(|| own.map(|own| (&*own.cause, &*own.remedy))) {
+        if let Some((what, remedy)) = cause_and_remedy(diagnosis, cause) {
             text.push_str(&hanging("  what:      ", what));
             text.push_str(&hanging("  to do:     ", remedy));
         }
-        write_equivalents(text, known, cause);
+        for other in equivalents(cause) {
+            text.push_str(&hanging("  or else:   ", &other));
+        }
     }
     let asserted = |id: &String| diagnosis.causes.iter().any(|cause| cause.effect == **id);
     let others: Vec<&str> =
@@ -189,20 +180,43 @@ fn write_causes(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
     Ok(())
 }
 
-fn write_equivalents(text: &mut String, effect: Option<&Effect>, cause: &Cause) {
-    for other in &cause.equivalents {
-        let confusables = effect.map(|effect| &*effect.confusables).unwrap_or_default();
-        let parted = confusables.iter().find(|confusable| confusable.id == *other);
-        let parted = parted.map_or(String::new(), |known| format!("; distinguish by: {}", known.parted_by));
-        text.push_str(&hanging("  or else:   ", &format!("{other}{parted}")));
-    }
+/// What a cause closes, and whether that matters.
+pub(crate) fn closing(cause: &Cause) -> String {
+    let share = match cause.gap_closed.filter(|share| share.is_finite()) {
+        Some(share) => {
+            let ends = cause.gap_closed_ci95.unwrap_or([f64::NAN; 2]);
+            format!("closes {} of the gap", share_words(share, ends))
+        }
+        None => "was corrected or left out before the gap was measured".to_owned(),
+    };
+    let material = if cause.material { "" } else { "; too small to matter" };
+    format!("{share}{material}")
+}
+
+/// What an effect is and what to do about it: of the catalogue, or of the user's file.
+pub(crate) fn cause_and_remedy<'d>(diagnosis: &'d Diagnosis, cause: &Cause) -> Option<(&'d str, &'d str)> {
+    let own = diagnosis.user_effects.iter().find(|own| own.effect == cause.effect);
+    let words = effect::find(&cause.effect).map(|effect| (effect.words.cause, effect.words.remedy));
+    words.or_else(|| own.map(|own| (&*own.cause, &*own.remedy)))
+}
+
+/// Effects that this recording cannot distinguish from a cause, and by what they could be.
+pub(crate) fn equivalents(cause: &Cause) -> Vec<String> {
+    let confusables = effect::find(&cause.effect).map(|effect| &*effect.confusables).unwrap_or_default();
+    let one = |other: &String| {
+        let known = confusables.iter().find(|confusable| confusable.id == *other);
+        let distinguished =
+            known.map_or(String::new(), |known| format!("; distinguish by: {}", known.parted_by));
+        format!("{other}{distinguished}")
+    };
+    cause.equivalents.iter().map(one).collect()
 }
 
 /// A shorter time than this is given in milliseconds, s.
 const SHORT: f64 = 0.1;
 
 /// `x 1.90 ± 0.02 uT`.
-fn amount(amount: &Amount) -> String {
+pub(crate) fn amount(amount: &Amount) -> String {
     let is_short =
         amount.unit == "s" && amount.value.is_some_and(|value| value != 0.0 && value.abs() < SHORT);
     let (scale, unit) = if is_short { (1e3, "ms") } else { (1.0, amount.unit.as_str()) };
@@ -254,16 +268,19 @@ fn write_experiments(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
     }
     writeln!(text, "\nwhat to record next")?;
     for experiment in &diagnosis.next_experiment {
-        let names: Vec<&str> = experiment.separates.iter().map(String::as_str).collect();
-        let [from, to] = [experiment.distinguishability_from, experiment.to].map(|d| finite(d, plain));
-        let words = format!(
-            "{}: separates {} by {to} standard deviations of the noise instead of {from}",
-            experiment.instruction,
-            listed(&names)
-        );
-        text.push_str(&hanging("  - ", &words));
+        text.push_str(&hanging("  - ", &experiment_words(experiment)));
     }
     Ok(())
+}
+
+pub(crate) fn experiment_words(experiment: &Experiment) -> String {
+    let names: Vec<&str> = experiment.separates.iter().map(String::as_str).collect();
+    let [from, to] = [experiment.distinguishability_from, experiment.to].map(|d| finite(d, plain));
+    format!(
+        "{}: separates {} by {to} standard deviations of the noise instead of {from}",
+        experiment.instruction,
+        listed(&names)
+    )
 }
 
 fn write_absent(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
@@ -271,14 +288,16 @@ fn write_absent(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
         return Ok(());
     }
     writeln!(text, "\nabsent: each would have been detected at this size or larger")?;
-    let one = |absent: &crate::diagnosis::finding::Absent| {
-        let size = finite(absent.minimum_detectable, |size| format!("{size:.1e}"));
-        let unit = if absent.unit == "-" { "" } else { absent.unit.as_str() };
-        format!("{} {size} {unit}", absent.effect).trim_end().to_owned()
-    };
-    let all: Vec<String> = diagnosis.absent.iter().map(one).collect();
+    let all: Vec<String> = diagnosis.absent.iter().map(absent_words).collect();
     text.push_str(&hanging("  ", &all.join("; ")));
     Ok(())
+}
+
+/// An effect and the size from which it would have been seen.
+pub(crate) fn absent_words(absent: &Absent) -> String {
+    let size = finite(absent.minimum_detectable, |size| format!("{size:.1e}"));
+    let unit = if absent.unit == "-" { "" } else { absent.unit.as_str() };
+    format!("{} {size} {unit}", absent.effect).trim_end().to_owned()
 }
 
 fn write_not_testable(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
@@ -286,27 +305,31 @@ fn write_not_testable(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
         return Ok(());
     }
     writeln!(text, "\nnot testable with this recording")?;
-    // Effects with one reason stand together.
+    for words in not_testable_words(&diagnosis.not_testable) {
+        text.push_str(&hanging("  ", &words));
+    }
+    Ok(())
+}
+
+/// Effects that a recording cannot show; those with one reason stand together.
+pub(crate) fn not_testable_words(all: &[NotTestable]) -> Vec<String> {
     let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
-    for effect in &diagnosis.not_testable {
+    for effect in all {
         match reasons.iter_mut().find(|(because, _)| *because == effect.because) {
             Some((_, effects)) => effects.push(&effect.effect),
             None => reasons.push((&effect.because, vec![&effect.effect])),
         }
     }
-    for (because, effects) in reasons {
-        text.push_str(&hanging("  ", &format!("{}: {because}", effects.join(", "))));
-    }
-    Ok(())
+    reasons.into_iter().map(|(because, effects)| format!("{}: {because}", effects.join(", "))).collect()
 }
 
 /// A probability in percent that does not round to certainty.
-fn certainty(probability: f64) -> String {
+pub(crate) fn certainty(probability: f64) -> String {
     if probability > 0.9995 { "> 99.9 %".to_owned() } else { format!("{:.1} %", 100.0 * probability) }
 }
 
 /// A p-value.
-fn p_value(value: f64) -> String {
+pub(crate) fn p_value(value: f64) -> String {
     match value {
         p if !p.is_finite() => "unknown".to_owned(),
         p if p < 1e-99 => "<1e-99".to_owned(),

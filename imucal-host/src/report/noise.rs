@@ -41,14 +41,17 @@ fn of_sensor(kind: SensorKind, sensor: &NoiseOfSensor) -> String {
     text.push_str(&format!("  {:<30}", "least deviation"));
     sensor.axes.iter().for_each(|axis| text.push_str(&format!(" {:>21}", least(axis))));
     text.push('\n');
-    text.push_str(&reasons(sensor));
+    for (name, why) in reasons(sensor) {
+        text.push_str(&hanging(&format!("  no {name}: "), &why));
+    }
     text
 }
 
 /// A coefficient's name and where an axis has it.
-type Row = (&'static str, fn(&NoiseOfAxis) -> &Figure);
+pub(crate) type Row = (&'static str, fn(&NoiseOfAxis) -> &Figure);
 
-const FIGURES: [Row; 6] = [
+/// The coefficients, in the order in which they are shown.
+pub(crate) const FIGURES: [Row; 6] = [
     ("N white", |axis| &axis.white),
     ("B bias instability", |axis| &axis.bias_instability),
     ("K random walk", |axis| &axis.random_walk),
@@ -77,20 +80,18 @@ fn interval(value: f64, low: f64, high: f64) -> String {
 }
 
 /// Why coefficients have no value, each reason once.
-fn reasons(sensor: &NoiseOfSensor) -> String {
-    let mut text = String::new();
-    for (name, of) in FIGURES {
-        let mut said: Vec<String> = Vec::new();
-        for (axis, found) in ["x", "y", "z"].into_iter().zip(&sensor.axes) {
-            let Some(reason) = found.as_ref().and_then(|found| of(found).reason.clone()) else { continue };
-            said.push(format!("{axis}: {reason}"));
-        }
-        if let Some(first) = said.first() {
-            let more = if said.len() > 1 { "; other axes in the JSON" } else { "" };
-            text.push_str(&hanging(&format!("  no {name}: "), &format!("{first}{more}")));
-        }
-    }
-    text
+pub(crate) fn reasons(sensor: &NoiseOfSensor) -> Vec<(&'static str, String)> {
+    let of_figure = |(name, of): Row| {
+        let axes = ["x", "y", "z"].into_iter().zip(&sensor.axes);
+        let mut said = axes.filter_map(|(axis, found)| {
+            let reason = of(found.as_ref()?).reason.clone()?;
+            Some(format!("{axis}: {reason}"))
+        });
+        let first = said.next()?;
+        let more = if said.next().is_some() { "; other axes in the JSON" } else { "" };
+        Some((name, format!("{first}{more}")))
+    };
+    FIGURES.into_iter().filter_map(of_figure).collect()
 }
 
 #[cfg(test)]

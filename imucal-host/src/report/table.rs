@@ -26,7 +26,7 @@ pub fn words(kind: SensorKind) -> &'static str {
 }
 
 /// What an observation of the sensor is called, many of them.
-fn observations(kind: SensorKind, fit: &FitSummary) -> &'static str {
+pub(crate) fn observations(kind: SensorKind, fit: &FitSummary) -> &'static str {
     match kind {
         SensorKind::Gyr if fit.rig.is_some() => "motions",
         SensorKind::Acc => "rests",
@@ -162,12 +162,21 @@ fn write_fit(text: &mut String, kind: SensorKind, fit: &FitSummary) -> fmt::Resu
     write_notes(text, fit)
 }
 
-fn rms_text(kind: SensorKind, fit: &FitSummary, rms: f64) -> String {
+/// A residual in the words of its sensor.
+pub(crate) fn rms_text(kind: SensorKind, fit: &FitSummary, rms: f64) -> String {
     match kind {
         SensorKind::Gyr if fit.rig.is_some() => format!("{} a motion", degrees(rms, 3)),
         SensorKind::Gyr => format!("{} a turn", degrees(rms, 3)),
         _ => format!("{} {}", plain(rms), fit.unit_out),
     }
+}
+
+/// What else a fit has found, a sentence each.
+pub(crate) fn notes(fit: &FitSummary) -> Vec<String> {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let _ = write_notes(&mut text, fit);
+    text.lines().map(|line| line.trim().to_owned()).collect()
 }
 
 fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {

@@ -23,6 +23,7 @@ fn nothing(recording: &Recording) -> Diagnosis {
         user_effects: Vec::new(),
         proposals: Vec::new(),
         watch: None,
+        profiles: Vec::new(),
         next_experiment: Vec::new(),
     }
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::{
     confounded_episode, credible, cross_validation,
     decision::Evidence,
-    detectability, estimates, experiment, fault, model_error,
+    detectability, estimates, experiment, fault, model_error, profile,
     reference_clock::{self, Clock},
     reference_error,
     shares::{self, Closed},
@@ -47,6 +47,7 @@ pub fn untestable(recording: &Recording, why: String) -> Diagnosis {
         user_effects: Vec::new(),
         proposals: Vec::new(),
         watch: None,
+        profiles: Vec::new(),
     }
 }
 
@@ -197,6 +198,8 @@ pub fn answer(
     let closed = clock.as_ref().map_or(&tested.closed, |clock| &clock.closed);
     let places = located(explained, &tested, clock.as_ref(), found.is_empty())?;
     let mut gap = asserted.part("the table of the gap", table(explained, clock.as_ref()));
+    let profiles =
+        asserted.part("the profile of the gap", profiles(explained, &tested, clock.as_ref(), &places));
     asserted.take_out_errors(&preparation.model, &settings.verdict);
     let evidence = Evidence {
         causes: &found,
@@ -232,6 +235,7 @@ pub fn answer(
         remarks: asserted.remarks,
         gap,
         places,
+        profiles,
         causes: asserted.causes,
         credible_set: asserted.credible_set,
         gap_closed_total: total.map(|share| share.value),
@@ -319,6 +323,17 @@ fn outweighed(causes: &mut Vec<Cause>, explained: &Solution<'_>, tested: &Tested
 fn table(explained: &Solution<'_>, clock: Option<&Clock<'_>>) -> Result<Vec<finding::Gap>, DiagnosisError> {
     let (linear, set) = seen_from(explained, clock);
     shares::table(linear, set, &explained.best.noise)
+}
+
+/// The residual over what each sensor follows most.
+fn profiles(
+    explained: &Solution<'_>,
+    tested: &Tested,
+    clock: Option<&Clock<'_>>,
+    places: &[Place],
+) -> Result<Vec<finding::Profile>, DiagnosisError> {
+    let (linear, set) = seen_from(explained, clock);
+    profile::profiles(linear, set, &explained.best.noise, &tested.drivers, places)
 }
 
 /// The covariates that the gap depends on: before the causes are added, or where there is none, still.

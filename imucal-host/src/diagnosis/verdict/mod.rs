@@ -16,6 +16,7 @@
 //! | [`reference_error`] | causes that an error of the source could stand for are taken out |
 //! | [`fault`] | shares of faults of the recording itself |
 //! | [`detectability`] | what is absent, and from what size on it would have been detected |
+//! | [`profile`] | the residual over what a sensor follows most, for drawings |
 //! | [`experiment`] | what to record next to distinguish what is ambiguous |
 //! | [`decision`] | the verdict, decided once from all of these |
 //! | [`answer`] | the diagnosis, put together once |
@@ -32,6 +33,7 @@ pub mod estimates;
 pub mod experiment;
 pub mod fault;
 pub mod model_error;
+pub mod profile;
 pub mod reference_clock;
 pub mod reference_error;
 pub mod shares;

@@ -22,7 +22,7 @@ use crate::{
         finding::Gap,
         library::evidence::Projected,
         mixed_model::{
-            design::{Design, LOOSE, Normal},
+            design::{Channel, Design, LOOSE, Normal},
             noise::Noise,
         },
         search::linearisation::Linearisation,
@@ -284,12 +284,20 @@ fn held_out(folds: Folds<'_>, places: &[usize], baseline: usize) -> Result<Vec<F
         .collect()
 }
 
-/// Root mean squares of each channel's block means, before and after, and what noise alone would leave.
-pub fn table(
+/// A channel's block means, before and after a set is fitted with the baseline.
+pub struct Left {
+    /// What the baseline leaves.
+    pub before: DVector<f64>,
+    /// What baseline and set leave.
+    pub after: DVector<f64>,
+}
+
+/// What is left of each channel, in the design's order.
+pub fn left(
     linear: &Linearisation<'_>,
     set: &[&'static Effect],
     noise: &Noise,
-) -> Result<Vec<Gap>, DiagnosisError> {
+) -> Result<Vec<Left>, DiagnosisError> {
     let precisions = linear.precisions(noise);
     let solve = |fitted: &[usize]| {
         let amounts = linear.design.normal(&precisions, fitted).amounts();
@@ -297,18 +305,29 @@ pub fn table(
     };
     let all = linear.fitted(set);
     let (before, after) = (solve(&linear.baseline)?, solve(&all)?);
-    let gaps = linear.design.channels.iter().map(|channel| {
+    let of = |channel: &Channel| Left {
+        before: channel.less(&linear.baseline, &before),
+        after: channel.less(&all, &after),
+    };
+    Ok(linear.design.channels.iter().map(of).collect())
+}
+
+/// Root mean squares of each channel's block means, before and after, and what noise alone would leave.
+pub fn table(
+    linear: &Linearisation<'_>,
+    set: &[&'static Effect],
+    noise: &Noise,
+) -> Result<Vec<Gap>, DiagnosisError> {
+    let left = left(linear, set, noise)?;
+    let gaps = linear.design.channels.iter().zip(&left).map(|(channel, left)| {
         let counts = &linear.scene.counts[channel.kind as usize];
-        let rms = |fitted: &[usize], amounts: &DVector<f64>| {
-            let residual = channel.less(fitted, amounts);
-            weighted(counts, |block| residual[block] * residual[block])
-        };
+        let rms = |residual: &DVector<f64>| weighted(counts, |block| residual[block] * residual[block]);
         Gap {
             sensor: channel.kind.prefix().to_owned(),
             axis: linear.scene.axis(channel.kind, channel.axis).to_owned(),
             unit: si(channel.kind),
-            rms_before: rms(&linear.baseline, &before),
-            rms_after: rms(&all, &after),
+            rms_before: rms(&left.before),
+            rms_after: rms(&left.after),
             noise_floor: weighted(counts, |block| linear.weighing.variance(channel, noise, block)),
         }
     });

@@ -26,20 +26,29 @@ pub fn write_changes(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
         return Ok(());
     }
     writeln!(text, "\nwhat to change in the simulator, what closes most of the gap first")?;
+    let (own, of_reference) = changes(diagnosis);
+    for (at, words) in own.iter().enumerate() {
+        text.push_str(&hanging(&format!("  {}. ", at + 1), words));
+    }
+    for words in of_reference {
+        text.push_str(&hanging("  -  ", &words));
+    }
+    Ok(())
+}
+
+/// The sensors' changes, those that close most first; then what is no sensor's.
+pub(crate) fn changes(diagnosis: &Diagnosis) -> (Vec<String>, Vec<String>) {
     let mut causes: Vec<&Cause> = diagnosis.causes.iter().filter(|cause| !is_of_reference(cause)).collect();
     let closed = |cause: &Cause| cause.gap_closed.filter(|share| share.is_finite()).unwrap_or(-1.0);
     causes.sort_by(|a, b| closed(b).total_cmp(&closed(a)));
-    for (at, cause) in causes.iter().enumerate() {
-        text.push_str(&hanging(&format!("  {}. ", at + 1), &change(cause)));
-    }
-    for cause in diagnosis.causes.iter().filter(|cause| is_of_reference(cause)) {
+    let of_reference = diagnosis.causes.iter().filter(|cause| is_of_reference(cause)).map(|cause| {
         let words = match cause.effect == motion_mismatch::ID {
             true => motion(cause),
             false => change(cause),
         };
-        text.push_str(&hanging("  -  ", &format!("{words}: not the sensor")));
-    }
-    Ok(())
+        format!("{words}: not the sensor")
+    });
+    (causes.into_iter().map(change).collect(), of_reference.collect())
 }
 
 fn is_of_reference(cause: &Cause) -> bool {
@@ -124,6 +133,12 @@ pub fn write_remainder(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result 
         return Ok(());
     }
     writeln!(text, "\nwhat remains")?;
+    text.push_str(&hanging("  ", &remainder(diagnosis)));
+    Ok(())
+}
+
+/// What is left, in words.
+pub(crate) fn remainder(diagnosis: &Diagnosis) -> String {
     let above = |gap: &&Gap| gap.rms_after > ABOVE_NOISE * gap.noise_floor;
     let left: Vec<String> = diagnosis
         .gap
@@ -135,14 +150,12 @@ pub fn write_remainder(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result 
         })
         .collect();
     let unknown = matches!(diagnosis.verdict, Verdict::Unknown | Verdict::Partly);
-    let words = match (left.is_empty(), unknown) {
+    match (left.is_empty(), unknown) {
         (true, false) => "nothing beyond the noise of this recording".to_owned(),
         (true, true) => "something below the noise of a block, whose cause is unknown".to_owned(),
         (false, true) => format!("{}; its cause is unknown", left.join("; ")),
         (false, false) => left.join("; "),
-    };
-    text.push_str(&hanging("  ", &words));
-    Ok(())
+    }
 }
 
 #[cfg(test)]

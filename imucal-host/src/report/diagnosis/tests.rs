@@ -61,6 +61,7 @@ fn diagnosis(verdict: Verdict) -> Diagnosis {
         user_effects: Vec::new(),
         proposals: Vec::new(),
         watch: None,
+        profiles: Vec::new(),
         next_experiment: vec![Experiment {
             separates: vec!["mag.bias_step".into(), "mag.bias_drift".into()],
             instruction: "hold the first pose again, 120 s".into(),
