@@ -22,6 +22,7 @@ mod json_contract;
 mod mapping;
 mod outputs;
 mod overwriting;
+mod pages;
 mod printing;
 mod trials;
 mod watching;

@@ -1,5 +1,6 @@
 //! Shared fixtures of the cross-crate tests.
 
+pub mod browser;
 pub mod call_stack;
 pub mod clouds;
 pub mod coprocessor;

@@ -82,9 +82,10 @@ fn sensor(outcome: &SensorOutcome, recording: &Recording, calibration: &Calibrat
         @for suspicion in &outcome.suspicions { p { "Follows " (suspicion.follows.name()) ": " (suspicion.detail) "." } }
         @if let Some(fit) = &outcome.fit {
             @if outcome.verdict.is_err() { p class="note" { "For information only, the refused fit:" } }
-            (parameters(fit))
-            (quality(outcome.kind, fit))
-            (drawings(outcome, fit, recording, calibration))
+            div class="columns" {
+                div { (parameters(fit)) (quality(outcome.kind, fit)) }
+                (drawings(outcome, fit, recording, calibration))
+            }
         }
     }
 }
@@ -111,13 +112,21 @@ fn parameters(fit: &FitSummary) -> Markup {
                     tr {
                         td { (entry_name(number)) }
                         td { (figures(value, std)) }
-                        @if std > 0.0 { td { (format!("{std:.1e}")) } td { (format!("{:.1e}", 2.0 * std)) } }
+                        @if std > 0.0 { td { (two_digits(std)) } td { (two_digits(2.0 * std)) } }
                         @else { td { "held" } td {} }
                         td { (unit) }
                     }
                 }
             }
         } }
+    }
+}
+
+/// An error in two digits.
+fn two_digits(std: f64) -> String {
+    match std.log10().floor() as i32 {
+        exponent @ -3..2 => format!("{std:.*}", usize::try_from(1 - exponent).unwrap_or(0)),
+        _ => format!("{std:.1e}"),
     }
 }
 

@@ -113,7 +113,7 @@ fn sentences<S: AsRef<str>>(heading: &str, all: &[S]) -> Markup {
     html! {
         @if !all.is_empty() {
             h3 { (heading) }
-            ul { @for one in all { li { (one.as_ref()) } } }
+            ul class=[(all.len() > 8).then_some("many")] { @for one in all { li { (one.as_ref()) } } }
         }
     }
 }

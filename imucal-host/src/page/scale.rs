@@ -104,16 +104,19 @@ impl Scale {
         (first..=last).step_by(every).filter_map(tick).collect()
     }
 
-    /// Where no two powers of ten are within reach: 1, 2 and 5 times them.
+    /// Where no two powers of ten are within reach: round values, at their logarithms.
     fn within_a_decade(&self) -> Vec<Tick> {
-        let (first, last) = (self.from.floor() as i32, self.to.ceil() as i32);
-        let all = (first..=last).flat_map(|decade| [1, 2, 5].map(|mantissa| (mantissa, decade)));
-        let tick = |(mantissa, decade): (i32, i32)| {
-            let at = self.share(f64::from(mantissa) * 10f64.powi(decade))?;
-            let label = if mantissa == 1 { power(decade) } else { format!("{mantissa}·{}", power(decade)) };
-            (0.0..=1.0).contains(&at).then_some(Tick { at, label })
+        let (low, high) = (10f64.powf(self.from), 10f64.powf(self.to));
+        let decade = high.log10().floor() as i32;
+        let factor = if (-2..4).contains(&decade) { 0 } else { decade };
+        let unit = 10f64.powi(factor);
+        let plain = Self { exponent: 0, ..Self::between(low / unit, high / unit) };
+        let one = |tick: Tick| {
+            let value = plain.from + tick.at * (plain.to - plain.from);
+            let label = if factor == 0 { tick.label } else { format!("{}·{}", tick.label, power(factor)) };
+            Some(Tick { at: self.share(value * unit)?, label })
         };
-        all.filter_map(tick).collect()
+        plain.steps().into_iter().filter_map(one).collect()
     }
 }
 
@@ -164,7 +167,9 @@ mod tests {
     #[test]
     fn a_logarithmic_axis_has_powers_of_ten() {
         assert_eq!(labels(&Scale::logarithmic([0.01, 1000.0])), ["10⁻²", "10⁻¹", "1", "10", "100", "10³"]);
-        assert_eq!(labels(&Scale::logarithmic([2.0, 6.0])), ["2·1", "5·1"]);
+        assert_eq!(labels(&Scale::logarithmic([2.0, 6.0])), ["2", "3", "4", "5", "6"]);
+        assert_eq!(labels(&Scale::logarithmic([0.02, 0.03])), ["0.020", "0.025", "0.030"]);
+        assert_eq!(labels(&Scale::logarithmic([2e-5, 3e-5])), ["2.0·10⁻⁵", "2.5·10⁻⁵", "3.0·10⁻⁵"]);
     }
 
     proptest! {
