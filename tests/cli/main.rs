@@ -24,6 +24,7 @@ mod outputs;
 mod overwriting;
 mod pages;
 mod printing;
+mod terminal;
 mod trials;
 mod watching;
 

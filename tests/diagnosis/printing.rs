@@ -17,7 +17,7 @@ fn the_report_is_all_that_is_printed_and_the_json_file_says_the_same() {
         assert!(ended.out.contains(cause["effect"].as_str().unwrap()), "{ended:#?}");
     }
     assert!(ended.out.contains("gap, rms of means over blocks") && !ended.out.contains("NaN"), "{ended:#?}");
-    assert!(ended.out.lines().all(|line| line.chars().count() <= 100), "{ended:#?}");
+    assert!(ended.out.lines().all(|line| line.chars().count() <= 80), "{ended:#?}");
 }
 
 #[test]

@@ -34,6 +34,11 @@ pub fn run<A: AsRef<OsStr>>(program: &str, variables: &[(&str, &str)], arguments
     Ended { status: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
 }
 
+/// Text on one line, with one blank where there were more.
+fn flat(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 impl Ended {
     /// Asserts the exit status.
     ///
@@ -58,14 +63,15 @@ impl Ended {
         self
     }
 
-    /// Asserts that standard output holds all of the parts.
+    /// Asserts that standard output holds all of the parts, wherever its lines are broken.
     ///
     /// # Panics
     ///
     /// Where one is missing.
     pub fn printing(self, parts: &[&str]) -> Self {
+        let flat = flat(&self.out);
         for part in parts {
-            assert!(self.out.contains(part), "`{part}` is missing in {self:#?}");
+            assert!(self.out.contains(part) || flat.contains(part), "`{part}` is missing in {self:#?}");
         }
         self
     }

@@ -19,6 +19,7 @@ use super::{
 use crate::apply;
 
 #[derive(Args, Debug)]
+#[command(after_help = "Example:\n  imucal apply tumble.csv --calibration unit.bin --out tumble-si.csv")]
 pub(super) struct Arguments {
     /// The recording to correct
     recording: PathBuf,

@@ -34,6 +34,7 @@ use crate::{
 };
 
 #[derive(Args, Debug)]
+#[command(after_help = "Example:\n  imucal blind --cases 40")]
 pub(super) struct Arguments {
     /// What is simulated: rig, or robot: pairs of a recording and its simulator's stream
     #[arg(long, value_name = "WORLD", default_value = "rig", value_parser = world)]
@@ -110,7 +111,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     };
     say!("Set of nonce {}.", folder.nonce().hex());
     let (table, misses) = scored(&folder)?;
-    output::text(&table)?;
+    output::document(&table)?;
     for line in misses.iter().filter(|_| arguments.misses) {
         say!("{line}");
     }

@@ -31,6 +31,9 @@ use crate::{
 };
 
 #[derive(Args, Debug)]
+#[command(
+    after_help = "Example:\n  imucal calibrate tumble.csv --out unit.toml --record unit.bin --html unit.html"
+)]
 pub(super) struct Arguments {
     /// The recording: NAME.csv, NAME.csv.gz (or NAME.parquet), with its manifest NAME.toml in the same folder
     recording: PathBuf,
@@ -241,7 +244,7 @@ fn ending(arguments: &Arguments, calibration: &Calibration, named: &[SensorKind]
 
 fn print(arguments: &Arguments, calibration: &Calibration, json: &str) -> anyhow::Result<()> {
     match (&arguments.json, json_file(arguments)) {
-        (Some(_), None) => output::text(json),
+        (Some(_), None) => output::document(json),
         _ => output::text(&report::table::table(calibration)),
     }
 }

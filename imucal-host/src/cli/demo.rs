@@ -54,6 +54,7 @@ const WRITTEN: [(&str, &str); 9] = [
 ];
 
 #[derive(Args, Debug)]
+#[command(after_help = "Example:\n  imucal demo --out demo")]
 pub(super) struct Arguments {
     /// Folder for what the demo writes
     #[arg(long, value_name = "DIR", default_value = "imucal-demo")]

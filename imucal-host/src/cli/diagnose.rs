@@ -30,6 +30,7 @@ use crate::{
 };
 
 #[derive(Args, Debug)]
+#[command(after_help = "Example:\n  imucal diagnose robot.csv --sim simulated.csv --html gap.html")]
 pub(super) struct Arguments {
     /// The recording to diagnose: NAME.csv, NAME.csv.gz (or NAME.parquet), with its manifest NAME.toml in the same folder
     #[arg(required_unless_present = "list")]
@@ -191,17 +192,20 @@ fn print(arguments: &Arguments, diagnosis: &Diagnosis, mut files: OutputSet) -> 
     if let Some(path) = arguments.proposals.as_ref().filter(|_| !proposed.is_empty()) {
         files.add(path, proposed.as_bytes())?;
     }
-    let mut page = report::diagnosis::page(diagnosis);
+    let mut printed = None;
     if let Some(path) = &arguments.json {
         let text =
             serde_json::to_string_pretty(diagnosis).context("the diagnosis cannot be spelt as JSON")? + "\n";
         match path.as_os_str() == "-" {
-            true => page = text,
+            true => printed = Some(text),
             false => files.add(path, text.as_bytes())?,
         }
     }
     files.commit()?;
-    output::text(&page)
+    match printed {
+        Some(json) => output::document(&json),
+        None => output::text(&report::diagnosis::page(diagnosis)),
+    }
 }
 
 #[cfg(test)]

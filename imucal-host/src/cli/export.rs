@@ -81,7 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Err(refusal) => return Ok(refuse(&refusal)),
     };
     let Some(out) = &arguments.out else {
-        output::text(&document.text)?;
+        output::document(&document.text)?;
         return Ok(Ending::Done);
     };
     files.add(out, document.text.as_bytes())?;

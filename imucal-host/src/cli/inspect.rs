@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use imucal_core::triad::Triad;
+use nalgebra::Matrix3;
 
 use super::{
     Ending, load,
@@ -13,14 +15,15 @@ use crate::{
     diagnosis::watched::Watched,
     recording::SensorKind,
     report::{
-        measure::{measure, percent, plain, rounded},
-        table::words,
+        measure::{percent, plain, rounded},
+        table::{parameters, words},
         watch,
     },
     store::{StoredTriad, watch_file},
 };
 
 #[derive(Args, Debug)]
+#[command(after_help = "Example:\n  imucal inspect unit.bin")]
 pub(super) struct Arguments {
     /// The calibration: TOML or record; or the summary of a device's drift watch
     calibration: PathBuf,
@@ -79,18 +82,8 @@ fn print_triad(kind: SensorKind, triad: &StoredTriad) -> anyhow::Result<()> {
         triad.unit_out,
         triad.unit_in
     );
-    for row in 0..3 {
-        let gain: Vec<String> =
-            (0..3).map(|column| measure(triad.gain[row][column], triad.gain_std[row][column])).collect();
-        say!(
-            "  {}  {:>26} {:>26} {:>26}   {:>22}",
-            ["x", "y", "z"][row],
-            gain[0],
-            gain[1],
-            gain[2],
-            measure(triad.bias[row], triad.bias_std[row])
-        );
-    }
+    let std = Triad { gain: rows(triad.gain_std), bias: triad.bias_std.into() };
+    output::text(&parameters(&Triad { gain: rows(triad.gain), bias: triad.bias.into() }, &std))?;
     let unit = if kind == SensorKind::Gyr { "rad a turn".into() } else { triad.unit_out.to_string() };
     let held = triad.held_out_rms.map_or_else(|| "not known".into(), plain);
     say!(
@@ -105,4 +98,8 @@ fn print_triad(kind: SensorKind, triad: &StoredTriad) -> anyhow::Result<()> {
         say!("  made on {}, serial {}", own.date, or_unknown(&own.serial));
     }
     Ok(())
+}
+
+fn rows(entries: [[f64; 3]; 3]) -> Matrix3<f64> {
+    Matrix3::from_fn(|row, column| entries[row][column])
 }

@@ -4,7 +4,7 @@ use std::{path::Path, process::ExitCode};
 
 use clap::{Parser, Subcommand};
 
-use self::reading::Reading;
+use self::{output::Volume, reading::Reading};
 use crate::{
     effect::{self, Effect},
     file::Limits,
@@ -28,6 +28,7 @@ mod html;
 mod import;
 mod inspect;
 mod interrupt;
+mod manual;
 mod noise;
 mod output;
 mod overwrite;
@@ -40,10 +41,26 @@ mod verify;
 
 /// Calibrates inertial and magnetic sensors from recordings, through the code that runs on their microcontroller.
 #[derive(Debug, Parser)]
-#[command(name = "imucal", version, about, max_term_width = 100)]
+#[command(name = "imucal", version, about, max_term_width = 80)]
 struct Cli {
+    /// Print errors, refusals and what was asked for as a document only
+    #[arg(long, short, global = true, conflicts_with = "verbose", help_heading = "How much is printed")]
+    quiet: bool,
+    /// Print each stage of the work and when it began
+    #[arg(long, short, global = true, help_heading = "How much is printed")]
+    verbose: bool,
     #[command(subcommand)]
     command: Command,
+}
+
+impl Cli {
+    fn volume(&self) -> Volume {
+        match (self.quiet, self.verbose) {
+            (true, _) => Volume::Quiet,
+            (_, true) => Volume::Verbose,
+            _ => Volume::Usual,
+        }
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -82,6 +99,8 @@ enum Command {
     Diagnose(diagnose::Arguments),
     /// Run sealed trials of the diagnosis, and print how often it was right.
     Blind(blind::Arguments),
+    /// Print completions of commands and options for a shell, or write the manual's pages.
+    Manual(manual::Arguments),
 }
 
 /// How a command ended, when nothing went wrong on the way.
@@ -95,9 +114,10 @@ enum Ending {
 
 /// Runs the program: 0 done, 1 refused or a check failed, 2 bad usage or unreadable input.
 pub fn run() -> ExitCode {
-    let command = Cli::parse().command;
+    let cli = Cli::parse();
+    output::set_volume(cli.volume());
     interrupt::watch();
-    let result = match command {
+    let result = match cli.command {
         Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments),
         Command::Apply(arguments) => apply::run(&arguments),
@@ -115,6 +135,7 @@ pub fn run() -> ExitCode {
         Command::Study(arguments) => study::run(&arguments),
         Command::Diagnose(arguments) => diagnose::run(&arguments),
         Command::Blind(arguments) => blind::run(&arguments),
+        Command::Manual(arguments) => manual::run(&arguments),
     };
     match result {
         Ok(Ending::Done) => ExitCode::SUCCESS,

@@ -77,8 +77,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     files.commit()?;
     let estimated = noise.sensors.iter().any(|(_, found)| found.is_ok());
     match arguments.to {
-        _ if on_screen => output::text(&file.text())?,
-        Some(To::Json) => output::text(&file.text())?,
+        _ if on_screen => output::document(&file.text())?,
+        Some(To::Json) => output::document(&file.text())?,
         Some(to) if estimated => return print(&file, to),
         _ => output::text(&report::noise::noise(&file))?,
     }
@@ -98,7 +98,7 @@ fn print(file: &NoiseFile, to: To) -> anyhow::Result<Ending> {
     let inputs = Inputs { noise: Some(file), ..Inputs::default() };
     match export::document(target, &inputs) {
         Ok(document) => {
-            output::text(&document.text)?;
+            output::document(&document.text)?;
             Ok(Ending::Done)
         }
         Err(refusal) => {

@@ -35,6 +35,7 @@ use crate::{
 const NEAR: usize = 8;
 
 #[derive(Args, Debug)]
+#[command(after_help = "Example:\n  imucal simulate --programme full --effect acc.scale_cubic --out rig.csv")]
 pub(super) struct Arguments {
     /// The recording: NAME.csv or NAME.csv.gz; the manifest NAME.toml is written to the same folder
     #[arg(long, value_name = "REC", required_unless_present = "list")]

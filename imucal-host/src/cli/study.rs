@@ -6,6 +6,7 @@ use super::{Ending, output};
 use crate::study::{coverage, recovery, trust, units};
 
 #[derive(Args, Debug)]
+#[command(after_help = "Example:\n  imucal study trust")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     study: Study,
@@ -55,14 +56,14 @@ enum Study {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     match arguments.study {
-        Study::Coverage { runs, seed } => output::text(&coverage::report(runs, seed))?,
-        Study::Recovery { runs, seed } => output::text(&recovery::report(seed, runs)?)?,
+        Study::Coverage { runs, seed } => output::document(&coverage::report(runs, seed))?,
+        Study::Recovery { runs, seed } => output::document(&recovery::report(seed, runs)?)?,
         Study::Trust { each, faulty, seed } => {
             let (text, kept) = trust::report(each, faulty, seed);
-            output::text(&text)?;
+            output::document(&text)?;
             return Ok(if kept { Ending::Done } else { Ending::Refused });
         }
-        Study::Units { seed } => output::text(&units::report(seed)?)?,
+        Study::Units { seed } => output::document(&units::report(seed)?)?,
     }
     Ok(Ending::Done)
 }

@@ -28,6 +28,7 @@ use crate::{
 };
 
 #[derive(Args, Debug)]
+#[command(after_help = "Example:\n  imucal verify tumble.csv --calibration unit.bin --device qemu")]
 pub(super) struct Arguments {
     /// The recording to replay
     recording: PathBuf,
@@ -186,7 +187,7 @@ fn print_fit(fit: &FitEquivalence) -> anyhow::Result<()> {
     );
     for p in &fit.parameters {
         say!(
-            "  {:<8} {:>14.8} {:>14.8}  difference {:>9.1e} = {:>7.1} ulp = {:.4} standard errors",
+            "  {:<8} {:>14.8} {:>14.8} {:>9.1e} = {:>7.1} ulp = {:.4} std errors",
             p.name,
             p.device,
             p.reference,

@@ -24,23 +24,24 @@ fn of_sensor(kind: SensorKind, sensor: &NoiseOfSensor) -> String {
     let rate = sensor.rate.unwrap_or(f64::NAN);
     let mut text =
         format!("{}: {} samples at {} Hz, {}\n", words(kind), sensor.samples, plain(rate), sensor.unit);
-    text.push_str(&format!("  {:<30} {:>21} {:>21} {:>21}\n", "", "x", "y", "z"));
-    for (name, of) in FIGURES {
-        let cells: Vec<String> = sensor.axes.iter().map(|axis| cell(axis.as_ref().map(of))).collect();
-        let head =
-            sensor.known_axes().next().map_or(String::new(), |axis| format!("{name}, {}", of(axis).unit));
-        text.push_str(&format!("  {head:<30}"));
-        cells.iter().for_each(|cell| text.push_str(&format!(" {cell:>21}")));
-        text.push('\n');
-    }
-    let least = |axis: &Option<NoiseOfAxis>| {
-        axis.as_ref().map_or(String::from("–"), |axis| {
-            format!("{} at {} s", plain(axis.least_deviation), plain(axis.least_at))
-        })
+    let row = |name: &str, of: &dyn Fn(&NoiseOfAxis) -> String| {
+        let mut row = format!("  {name:<18}");
+        for axis in &sensor.axes {
+            row += &format!(" {:>17}", axis.as_ref().map_or_else(|| String::from("–"), of));
+        }
+        row + "\n"
     };
-    text.push_str(&format!("  {:<30}", "least deviation"));
-    sensor.axes.iter().for_each(|axis| text.push_str(&format!(" {:>21}", least(axis))));
-    text.push('\n');
+    text += &format!("  {:<18} {:>17} {:>17} {:>17}\n", "", "x", "y", "z");
+    for (name, of) in FIGURES {
+        text += &row(name, &|axis| cell(of(axis)));
+    }
+    text += &row("least deviation", &|axis| plain(axis.least_deviation));
+    text += &row("  at, s", &|axis| plain(axis.least_at));
+    if let Some(axis) = sensor.known_axes().next() {
+        let unit = |(name, of): &Row| format!("{} {}", name.split(' ').next().unwrap_or(name), of(axis).unit);
+        let units: Vec<String> = FIGURES.iter().map(unit).collect();
+        text.push_str(&hanging("  units: ", &units.join("; ")));
+    }
     for (name, why) in reasons(sensor) {
         text.push_str(&hanging(&format!("  no {name}: "), &why));
     }
@@ -61,8 +62,7 @@ pub(crate) const FIGURES: [Row; 6] = [
 ];
 
 /// A value with its interval, or the most that it may be.
-fn cell(figure: Option<&Figure>) -> String {
-    let Some(figure) = figure else { return "–".into() };
+fn cell(figure: &Figure) -> String {
     match (figure.value, figure.interval, figure.at_most) {
         (Some(value), Some([low, high]), _) => interval(value, low, high),
         (_, _, Some(most)) => format!("< {most:.2e}"),

@@ -1,7 +1,7 @@
 //! Sentences and lists that fit a terminal.
 
 /// Widest line, characters.
-const WIDTH: usize = 100;
+const WIDTH: usize = 80;
 
 /// Words behind `head`, broken at blanks, further lines indented as far; ends its last line.
 pub fn hanging(head: &str, words: &str) -> String {
@@ -23,6 +23,22 @@ pub fn hanging(head: &str, words: &str) -> String {
     }
     text.push('\n');
     text
+}
+
+/// Text whose long lines are broken at blanks, further lines indented by two more than the line; short lines stay.
+pub fn fitted(text: &str) -> String {
+    let one = |line: &str| {
+        if line.chars().count() <= WIDTH {
+            return line.to_owned();
+        }
+        let words = line.trim_start();
+        let indent = " ".repeat(line.len() - words.len());
+        let (first, rest) = words.split_once(' ').unwrap_or((words, ""));
+        // The first word stands where it stood; the others hang two further in.
+        let broken = hanging(&format!("{indent}  "), &format!("{first} {rest}"));
+        format!("{indent}{}", broken.trim_start().trim_end())
+    };
+    text.split('\n').map(one).collect::<Vec<_>>().join("\n")
 }
 
 /// `a, b and c`.

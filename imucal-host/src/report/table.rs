@@ -2,6 +2,8 @@
 
 use std::fmt::{self, Write};
 
+use imucal_core::triad::Triad;
+
 use super::{
     measure::{degrees, measure, measured_degrees, percent, plain, rounded},
     model,
@@ -69,21 +71,21 @@ fn write_comparison(text: &mut String, comparison: &Comparison) -> fmt::Result {
     writeln!(text, "{}: models compared", words(comparison.kind))?;
     writeln!(
         text,
-        "  {:<5} {:<52} {:>10} {:>10} {:>10} {:>10} {:>9}",
-        "model", "adds", "parameters", "rms", "held out", "2nd half", "p-value"
+        "  {:<5} {:>10} {:>10} {:>10} {:>10} {:>9}",
+        "model", "parameters", "rms", "held out", "2nd half", "p-value"
     )?;
     for (step, p_value) in &comparison.rungs {
         writeln!(
             text,
-            "  {:<5} {:<52} {:>10} {:>10} {:>10} {:>10} {:>9}",
+            "  {:<5} {:>10} {:>10} {:>10} {:>10} {:>9}",
             step.name,
-            step.adds,
             step.free,
             plain(step.rms),
             step.held_out_rms.map_or_else(|| "-".into(), plain),
             step.second_half_rms.map_or_else(|| "-".into(), plain),
             p_value.filter(|p| !p.is_nan()).map_or_else(|| "-".into(), |p| format!("{p:.1e}"))
         )?;
+        writeln!(text, "        {}", step.adds)?;
     }
     writeln!(text, "  use {}: {}", comparison.chosen, comparison.why)
 }
@@ -136,12 +138,7 @@ fn write_fit(text: &mut String, kind: SensorKind, fit: &FitSummary) -> fmt::Resu
     let triad = fit.raw_triad();
     let (gain_std, bias_std) = fit.raw_std();
     writeln!(text, "  calibrated [{}] = gain · (raw [{}] − bias)", fit.unit_out, fit.unit_in)?;
-    for (row, axis) in ["x", "y", "z"].into_iter().enumerate() {
-        let gain: Vec<String> =
-            (0..3).map(|column| measure(triad.gain[(row, column)], gain_std[(row, column)])).collect();
-        let bias = measure(triad.bias[row], bias_std[row]);
-        writeln!(text, "  {axis}  {:>26} {:>26} {:>26}   {bias:>22}", gain[0], gain[1], gain[2])?;
-    }
+    text.push_str(&parameters(&triad, &Triad { gain: gain_std, bias: bias_std }));
     let held = fit.held_out_rms.map_or_else(|| "not known".into(), |rms| rms_text(kind, fit, rms));
     writeln!(
         text,
@@ -160,6 +157,20 @@ fn write_fit(text: &mut String, kind: SensorKind, fit: &FitSummary) -> fmt::Resu
         fit.termination.name()
     )?;
     write_notes(text, fit)
+}
+
+/// Three rows of the gain and one of the bias, each entry with its standard error; ends its lines.
+pub(crate) fn parameters(value: &Triad<f64>, std: &Triad<f64>) -> String {
+    let row = |name: &str, entries: [String; 3]| {
+        let [x, y, z] = entries;
+        format!("  {name:<4} {x:>24} {y:>24} {z:>24}\n")
+    };
+    let gain = |row: usize| {
+        std::array::from_fn(|column| measure(value.gain[(row, column)], std.gain[(row, column)]))
+    };
+    let bias = std::array::from_fn(|axis| measure(value.bias[axis], std.bias[axis]));
+    let rows = ["x", "y", "z"].into_iter().enumerate().map(|(at, axis)| row(axis, gain(at)));
+    rows.chain([row("bias", bias)]).collect()
 }
 
 /// A residual in the words of its sensor.

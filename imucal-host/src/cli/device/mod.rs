@@ -32,6 +32,7 @@ use crate::{
 };
 
 #[derive(Args, Debug)]
+#[command(after_help = "Example:\n  imucal device get --device serial:/dev/ttyACM0 --out unit.bin")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     command: Command,
