@@ -96,7 +96,7 @@ fn the_demo_writes_a_page_with_calibration_and_diagnosis() {
         "What the acc follows",
         "Rests and motions",
     ];
-    is_laid_out(&folder, "demo.html", 10, &says);
+    is_laid_out(&folder, "demo.html", 9, &says);
 }
 
 #[test]

@@ -99,7 +99,7 @@ impl Scale {
         if last <= first {
             return self.within_a_decade();
         }
-        let every = (last - first) as usize / TICKS + 1;
+        let every = (last - first) as usize / (TICKS + 1) + 1;
         let tick = |decade| Some(Tick { at: self.share(10f64.powi(decade))?, label: power(decade) });
         (first..=last).step_by(every).filter_map(tick).collect()
     }
