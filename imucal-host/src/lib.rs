@@ -94,6 +94,8 @@ pub mod page;
 
 pub mod study;
 
+pub mod batch;
+
 #[cfg(feature = "cli")]
 pub mod cli;
 
