@@ -129,7 +129,7 @@ impl Search {
             // Links to folders are not followed: they may lead back.
             if entry.file_type().map_err(failed)?.is_dir() {
                 self.folder(&path, method, found)?;
-            } else if path.is_file() && Format::of(&path).is_ok() {
+            } else if is_recording(&path) {
                 found.push(Found::new(path, None, method.clone()));
             }
         }
@@ -168,7 +168,7 @@ impl Search {
                 path: fault.path().to_path_buf(),
                 cause: fault.into(),
             })?;
-            if path.is_file() && Format::of(&path).is_ok() && !self.is_excluded(&path) {
+            if is_recording(&path) && !self.is_excluded(&path) {
                 found.push(Found::new(path, None, method.clone()));
             }
         }
@@ -195,6 +195,11 @@ impl Found {
     fn new(path: PathBuf, name: Option<String>, method: Method) -> Self {
         Self { place: place(&path), path, name, method }
     }
+}
+
+/// A file by the name of a recording; a link that leads nowhere is one that cannot be read.
+fn is_recording(path: &Path) -> bool {
+    Format::of(path).is_ok() && fs::metadata(path).map_or(true, |found| found.is_file())
 }
 
 /// A name of a file, without a folder.

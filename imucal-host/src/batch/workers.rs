@@ -69,7 +69,7 @@ impl Batch {
         may_replace: &Place<'_>,
         heard: &(dyn Fn(usize) + Sync),
     ) -> Result<Vec<Done>, BatchFault> {
-        self.check()?;
+        self.prepare()?;
         let jobs = self.jobs.max(1);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).stack_size(STACK).build();
         let pool = pool.map_err(|cause| BatchFault::Threads { jobs, cause: cause.to_string() })?;
@@ -91,13 +91,17 @@ impl Batch {
         Ok(done.into_iter().map(|(_, one)| one).collect())
     }
 
-    /// The folder takes files, and none of them would be a recording's own.
-    fn check(&self) -> Result<(), BatchFault> {
+    /// Makes the folder of the outputs, which must take files, and none that would be a recording's own.
+    ///
+    /// # Errors
+    ///
+    /// [`BatchFault`].
+    pub fn prepare(&self) -> Result<(), BatchFault> {
         let entries = self.out.join(entry::FOLDER);
         fs::create_dir_all(&entries).map_err(|cause| BatchFault::Folder { path: self.out.clone(), cause })?;
         for folder in [&self.out, &entries] {
             // A part is made and dropped.
-            OutputSet::default().create(&folder.join("probe"))?;
+            OutputSet::default().create(&folder.join(".imucal-probe"))?;
         }
         let manifests: std::collections::BTreeSet<PathBuf> = self
             .sources

@@ -92,13 +92,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         [Some(&arguments.out), arguments.summary.as_ref()].into_iter().flatten().cloned().collect();
     let mut sources = find(&arguments.recordings, &excluded, &method)?;
     let inputs: Vec<PathBuf> = sources.iter().map(|source| source.path.clone()).collect();
-    let (table_file, json_file) = planned(arguments, &inputs)?;
     if let Some(shard) = arguments.shard {
         sources = shard.of(sources);
     }
     let jobs =
         arguments.jobs.or_else(|| std::thread::available_parallelism().ok().map(Into::into)).unwrap_or(1);
     let batch = Batch { sources, out: arguments.out.clone(), jobs };
+    batch.prepare()?;
+    let (table_file, json_file) = planned(arguments, &inputs)?;
     let done = worked(arguments, &batch)?;
     said(&done);
     let entries: Vec<Entry> = done.into_iter().map(|done| done.entry).collect();

@@ -36,7 +36,7 @@ fn drawn(count: usize, rng: &mut ChaCha8Rng) -> Vec<Entry> {
 }
 
 #[test]
-fn a_batch_of_healthy_units_has_an_outlier_less_than_once_in_a_hundred_times() {
+fn healthy_units_have_an_outlier_less_than_once_in_a_hundred_batches() {
     let mut rng = ChaCha8Rng::seed_from_u64(20);
     for (count, batches) in [(8, 4000), (9, 4000), (11, 3000), (16, 2000), (40, 1000)] {
         let alarms = (0..batches).filter(|_| !outliers(&drawn(count, &mut rng)).outliers.is_empty()).count();
