@@ -197,3 +197,6 @@ impl Column {
         text.unwrap_or_default()
     }
 }
+
+#[cfg(test)]
+mod tests;
