@@ -2,13 +2,11 @@
 
 use std::{
     collections::BTreeMap,
-    fs::File,
-    io::{self, Read},
+    io,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use super::{
     parameter::{self, Parameter},
@@ -16,7 +14,10 @@ use super::{
 };
 use crate::{
     calibrate::{Calibration, SensorOutcome, Status, request::Request},
-    file::Limits,
+    file::{
+        Limits,
+        digest::{sha256, sha256_of},
+    },
     recording::{Manifest, SensorKind},
     store::form::Form,
 };
@@ -180,7 +181,7 @@ impl Entry {
     }
 
     pub(super) fn add_output(&mut self, form: Form, content: &[u8]) {
-        self.outputs.insert(ending(form).to_owned(), sha256(content));
+        self.outputs.insert(ending(form).to_owned(), sha256_of(content));
     }
 
     /// Where the entry of a name is kept.
@@ -204,7 +205,7 @@ impl Entry {
     pub(super) fn outdated(&self, now: &Self, out: &Path) -> Option<&'static str> {
         let output = |(ending, sum): (&String, &String)| {
             let content = Limits::default().read_large(&output_path(out, &self.name, ending));
-            content.is_ok_and(|content| sha256(&content) == *sum)
+            content.is_ok_and(|content| sha256_of(&content) == *sum)
         };
         if self.input != now.input || self.recording != now.recording {
             Some("the recording has changed")
@@ -237,34 +238,11 @@ pub(super) fn output_path(out: &Path, name: &str, ending: &str) -> PathBuf {
 impl Input {
     /// Of the files of a recording.
     pub(super) fn of(samples: &Path) -> io::Result<Self> {
-        let (size, sha256) = digest(samples)?;
+        let (size, of_samples) = sha256(samples)?;
         let manifest = Manifest::path_beside(samples).filter(|path| path.is_file());
-        let manifest_sha256 = manifest.map(|path| digest(&path)).transpose()?.map(|(_, sum)| sum);
-        Ok(Self { size, sha256, manifest_sha256 })
+        let manifest_sha256 = manifest.map(|path| sha256(&path)).transpose()?.map(|(_, sum)| sum);
+        Ok(Self { size, sha256: of_samples, manifest_sha256 })
     }
-}
-
-/// Size and SHA-256 of a file.
-fn digest(path: &Path) -> io::Result<(u64, String)> {
-    let (mut file, mut hasher, mut size) = (File::open(path)?, Sha256::new(), 0);
-    let mut buffer = vec![0; 1 << 16];
-    loop {
-        match file.read(&mut buffer)? {
-            0 => return Ok((size, hexadecimal(&hasher.finalize()))),
-            count => {
-                hasher.update(buffer.get(..count).unwrap_or_default());
-                size += count as u64;
-            }
-        }
-    }
-}
-
-fn sha256(content: &[u8]) -> String {
-    hexadecimal(&Sha256::digest(content))
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// The sensors of a calibration.

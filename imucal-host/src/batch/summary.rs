@@ -81,10 +81,10 @@ pub fn table(entries: &[Entry], outliers: &Outliers) -> Table {
         ("held_out_rms".into(), number(&|sensor| sensor.held_out_rms)),
     ];
     for name in (0..12).map(entry_name) {
-        measured(&mut table, &name, &number, |sensor| &sensor.stored);
+        table.extend(measured(&rows, &name, |sensor| &sensor.stored));
     }
     for name in OF_SENSOR {
-        measured(&mut table, name, &number, |sensor| &sensor.of_sensor);
+        table.extend(measured(&rows, name, |sensor| &sensor.of_sensor));
     }
     let unlike = |(entry, sensor): &Row<'_>| {
         let sensor = (*sensor)?.sensor;
@@ -104,16 +104,19 @@ fn rows(entry: &Entry) -> Vec<Row<'_>> {
     }
 }
 
-/// Adds a parameter and its standard error.
-fn measured(
-    table: &mut Table,
-    name: &str,
-    number: &dyn Fn(&dyn Fn(&Sensor) -> Option<f64>) -> Column,
-    of: impl Fn(&Sensor) -> &[Parameter],
-) {
-    let find = |sensor: &Sensor| of(sensor).iter().find(|parameter| parameter.name == name).cloned();
-    table.push((name.to_owned(), number(&|sensor| find(sensor)?.value)));
-    table.push((format!("{name}_std"), number(&|sensor| find(sensor)?.std_error)));
+/// A parameter and its standard error.
+fn measured(rows: &[Row<'_>], name: &str, of: impl Fn(&Sensor) -> &[Parameter]) -> [(String, Column); 2] {
+    let found: Vec<Option<&Parameter>> = rows
+        .iter()
+        .map(|(_, sensor)| of((*sensor)?).iter().find(|parameter| parameter.name == name))
+        .collect();
+    let column = |value: fn(&Parameter) -> Option<f64>| {
+        Column::Number(found.iter().map(|parameter| parameter.and_then(value)).collect())
+    };
+    [
+        (name.to_owned(), column(|parameter| parameter.value)),
+        (format!("{name}_std"), column(|parameter| parameter.std_error)),
+    ]
 }
 
 impl SummaryFormat {
