@@ -65,7 +65,8 @@ pub fn table(entries: &[Entry], outliers: &Outliers) -> Table {
             "reason".into(),
             text(&|(entry, sensor)| match sensor {
                 Some(sensor) => sensor.reason.clone(),
-                None => entry.error.clone(),
+                // In one line: many programs read a table by lines.
+                None => Some(entry.error.as_ref()?.split_whitespace().collect::<Vec<_>>().join(" ")),
             }),
         ),
         ("model".into(), sensors(&|sensor| Some(sensor.model.clone()))),

@@ -39,7 +39,7 @@ pub struct Task<'a> {
     pub out: &'a Path,
     /// Which files may be replaced.
     pub place: &'a Place<'a>,
-    /// Where recordings are fitted.
+    /// Where recordings are read and fitted; they are written outside of it.
     pub pool: &'a rayon::ThreadPool,
 }
 
@@ -55,13 +55,16 @@ const FORMS: [Form; 3] = [Form::Json, Form::Toml, Form::Record];
 impl Task<'_> {
     /// Does a recording, unless an earlier run has.
     pub(super) fn run(&self, source: &Source) -> Done {
-        let begun = Entry::begun(source, Input::of(&source.path).ok());
-        let former = Entry::read(self.out, &source.name);
-        let again = former.as_ref().and_then(|former| former.outdated(&begun, self.out));
+        let (begun, former, again) = self.pool.install(|| {
+            let begun = Entry::begun(source, Input::of(&source.path).ok());
+            let former = Entry::read(self.out, &source.name);
+            let again = former.as_ref().and_then(|former| former.outdated(&begun, self.out));
+            (begun, former, again)
+        });
         if let Some(entry) = former.filter(|former| again.is_none() && former.input.is_some()) {
             return Done { entry, before: true, again: None };
         }
-        let entry = match guarded(|| self.outcome(source, begun.clone())) {
+        let entry = match guarded(|| self.pool.install(|| self.outcome(source, begun.clone()))) {
             Ok(outcome) => self.write(source, outcome),
             Err(panic) => {
                 let why =
@@ -88,7 +91,7 @@ impl Task<'_> {
                 return Outcome { entry: begun.without(Standing::Unreadable, why), outputs: Vec::new() };
             }
         };
-        let calibration = self.pool.install(|| calibrate(&recording, &method.request.options(), &|_| {}));
+        let calibration = calibrate(&recording, &method.request.options(), &|_| {});
         self.calibrated(source, begun, &calibration)
     }
 

@@ -1,7 +1,8 @@
 //! Several recordings at a time.
 //!
-//! Each worker does one recording after another and fits it in a pool that all share. So there are never more recordings in memory
-//! than workers, and the last of them uses what the others have left idle.
+//! Each worker does one recording after another, and reads and fits it in a pool of threads that all share. There is one worker more
+//! than threads: while one waits for the disk, no thread is idle. So there is at most one recording more in memory than threads, and
+//! the last recordings use what the others have left idle.
 
 use std::{
     fs,
@@ -53,7 +54,7 @@ pub struct Batch {
     pub sources: Vec<Source>,
     /// Folder of the outputs.
     pub out: PathBuf,
-    /// Recordings at a time, and threads that fit them.
+    /// Threads that read and fit.
     pub jobs: usize,
 }
 
@@ -85,7 +86,9 @@ impl Batch {
                 heard(done.len());
             }
         };
-        std::thread::scope(|scope| (0..jobs.min(self.sources.len())).for_each(|_| drop(scope.spawn(work))));
+        std::thread::scope(|scope| {
+            (0..(jobs + 1).min(self.sources.len())).for_each(|_| drop(scope.spawn(work)))
+        });
         let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
         done.sort_by_key(|(index, _)| *index);
         Ok(done.into_iter().map(|(_, one)| one).collect())

@@ -47,7 +47,7 @@ pub(super) struct Arguments {
     /// Folder of the calibrations: NAME.json, and NAME.toml and NAME.bin where a sensor was accepted
     #[arg(long, value_name = "OUTDIR")]
     out: PathBuf,
-    /// Recordings at a time; one for each processor unless given
+    /// Processors to use; all unless given
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     jobs: Option<usize>,
     /// Do every n-th recording in the order of names, beginning with the i-th
