@@ -207,7 +207,7 @@ fn of_sensor(
 
 impl GainComparison {
     /// Of M; gains of determinant 1 say nothing of a common scale.
-    fn of(m: Matrix3<f64>, unit_determinant: bool) -> Self {
+    pub(crate) fn of(m: Matrix3<f64>, unit_determinant: bool) -> Self {
         let m = if unit_determinant { m / m.determinant().cbrt() } else { m };
         let error = m - Matrix3::identity();
         let half = |r: usize, c: usize, sign: f64| 0.5 * (error[(r, c)] + sign * error[(c, r)]);

@@ -17,7 +17,7 @@
 //!              │   rests,      acc, gyr, mag      │   corrects   the same on a
 //!              │   motions     fit, examination   │              microcontroller
 //!              │   noise, ellipsoid               └─► equivalence: f32 through the core against f64
-//!              └──────────────────────────────────────────────────────► report, study ─► cli
+//!              └──────────────────────────────────────────────► report, study ─► batch ─► cli
 //! ```
 //!
 //! | stage | goes in | comes out |
@@ -34,7 +34,9 @@
 //! | [`diagnosis`] | a recording, effects | where the gap lies, its causes, what to record next |
 //! | [`blind`], [`study`] | simulated recordings | how often answers and standard errors are right |
 //! | [`export`] | a calibration, a unit's noise | files of other programs, and what they cannot say |
-//! | [`report`], `cli` | any of these | text, JSON, exit status |
+//! | [`report`] | any of these | text, JSON |
+//! | [`batch`] | many recordings | their calibrations, a summary, units that are unlike the others |
+//! | `cli` | a command line | files, text, exit status |
 //!
 //! A calibration of the core itself is described in [`imucal_core`].
 //!
@@ -44,7 +46,7 @@
 //! | --- | --- |
 //! | `cli`, by default | the program `imucal` and the module `cli` |
 //! | `serial`, by default | devices at a serial port; without it [`device`] reaches those behind TCP and QEMU |
-//! | `parquet` | recordings in Parquet |
+//! | `parquet` | recordings and summaries of batches in Parquet |
 //!
 //! A program that uses the library takes it with `default-features = false`.
 
@@ -93,6 +95,8 @@ pub mod report;
 pub mod page;
 
 pub mod study;
+
+pub mod batch;
 
 #[cfg(feature = "cli")]
 pub mod cli;

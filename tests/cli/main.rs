@@ -9,6 +9,7 @@ use imucal_tests::simulated;
 use tempfile::TempDir;
 
 mod applying;
+mod batching;
 mod capturing;
 mod comparing;
 mod end_to_end;

@@ -13,6 +13,7 @@ use crate::{
 };
 
 mod apply;
+mod batch;
 mod blind;
 mod calibrate;
 mod capture;
@@ -24,6 +25,7 @@ mod demo;
 mod device;
 mod diagnose;
 mod export;
+mod fitting;
 mod html;
 mod import;
 mod inspect;
@@ -67,6 +69,8 @@ impl Cli {
 enum Command {
     /// Fit all models that a recording supports, with standard errors; refuse what it does not determine.
     Calibrate(calibrate::Arguments),
+    /// Calibrate many units at once, and name those that are unlike the others.
+    Batch(batch::Arguments),
     /// Guide through a calibration session of a device: what to do next, how sure each sensor is, when it is enough.
     Capture(capture::Arguments),
     /// Correct a recording with the core's code, as a device does.
@@ -110,6 +114,8 @@ enum Ending {
     Done,
     /// The data were read, but the answer is a refusal or a failed check.
     Refused,
+    /// Of many inputs, some are unreadable.
+    Unreadable,
 }
 
 /// Runs the program: 0 done, 1 refused or a check failed, 2 bad usage or unreadable input.
@@ -119,6 +125,7 @@ pub fn run() -> ExitCode {
     interrupt::watch();
     let result = match cli.command {
         Command::Calibrate(arguments) => calibrate::run(&arguments),
+        Command::Batch(arguments) => batch::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments),
         Command::Apply(arguments) => apply::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
@@ -140,6 +147,7 @@ pub fn run() -> ExitCode {
     match result {
         Ok(Ending::Done) => ExitCode::SUCCESS,
         Ok(Ending::Refused) => ExitCode::from(1),
+        Ok(Ending::Unreadable) => ExitCode::from(2),
         Err(error) => {
             output::report("error", &format_args!("{error:#}"));
             ExitCode::from(2)

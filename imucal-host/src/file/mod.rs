@@ -4,6 +4,7 @@
 //! What is no plain file (`/dev/null`, `/dev/stdout`, a FIFO) is written through. No other module opens a file to
 //! replace it.
 
+pub mod digest;
 pub mod limits;
 pub mod output_error;
 pub mod output_set;

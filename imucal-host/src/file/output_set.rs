@@ -49,7 +49,7 @@ impl OutputSet {
         let to = match Target::of(path)? {
             Target::Stream(stream) => Destination::Stream { stream, bytes: Vec::new() },
             Target::File { path: target, found } => {
-                part::sweep(folder_of(&target));
+                part::sweep_once(folder_of(&target));
                 let part = Part::next_to(&target, found.as_ref()).map_err(OutputError::system(path))?;
                 let spared = self.replaceable.as_ref().is_some_and(|files| !files.contains(&target));
                 Destination::File { target, spared, part }

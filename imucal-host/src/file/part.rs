@@ -130,8 +130,19 @@ pub fn abandon_parts() -> Abandoned {
     Abandoned(parts)
 }
 
+/// The folders that this process has swept: once is enough, and a folder may have many files.
+static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// Sweeps a folder that this process is about to write into, the first time.
+pub(super) fn sweep_once(folder: &Path) {
+    let first = SWEPT.lock().unwrap_or_else(PoisonError::into_inner).insert(folder.to_path_buf());
+    if first {
+        sweep(folder);
+    }
+}
+
 /// Removes the parts in a folder whose processes are gone.
-pub(super) fn sweep(folder: &Path) {
+fn sweep(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         if is_part(&entry.file_name()) && entry.file_type().is_ok_and(|kind| kind.is_file()) {
             remove_stale(&entry.path());

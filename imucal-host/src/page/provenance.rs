@@ -1,16 +1,12 @@
 //! What a result comes from: what was read, its hash, by which version, and when.
 
-use std::{
-    fs::File,
-    io::{self, Read},
-    path::Path,
-};
+use std::{io, path::Path};
 
 use imucal_core::record::Date;
 use maud::{Markup, html};
-use sha2::{Digest, Sha256};
 
 use crate::{
+    file::digest::sha256,
     recording::{Recording, manifest::site::Site},
     report::measure::plain,
 };
@@ -75,28 +71,6 @@ impl Provenance {
             } }
         }
     }
-}
-
-/// A file's length and SHA-256.
-///
-/// # Errors
-///
-/// What the system says of a file that cannot be read.
-pub fn sha256(path: &Path) -> io::Result<(u64, String)> {
-    let mut file = File::open(path)?;
-    let mut hash = Sha256::new();
-    let mut buffer = vec![0; 1 << 16];
-    let mut bytes = 0;
-    loop {
-        let read = file.read(&mut buffer)?;
-        if read == 0 {
-            break;
-        }
-        hash.update(&buffer[..read]);
-        bytes += read as u64;
-    }
-    let hex = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    Ok((bytes, hex))
 }
 
 /// The day of an absolute clock that counts from 1970; empty for any other.

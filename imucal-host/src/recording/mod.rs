@@ -27,7 +27,7 @@ mod warning;
 mod write;
 mod write_error;
 
-use self::format::Format;
+pub(crate) use self::format::Format;
 pub use self::{
     epoch::Epoch,
     manifest::{Manifest, site::LEAST_DIP},

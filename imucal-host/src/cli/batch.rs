@@ -1,0 +1,215 @@
+//! `imucal batch`
+
+use std::{
+    fs::File,
+    io::{BufReader, Read},
+    path::{Path, PathBuf},
+};
+
+use anyhow::Context;
+use clap::Args;
+
+use super::{
+    Ending,
+    calibrate::today,
+    columns::Columns,
+    fitting::Fitting,
+    output,
+    overwrite::{Overwrite, Planned},
+    progress::Progress,
+    reading::Reading,
+};
+use crate::{
+    batch::{
+        Batch, Done, Entry, Method, Shard, Standing, find,
+        outlier::{Outliers, outliers},
+        report::{self, Counts},
+        summary::{self, SummaryFormat},
+    },
+    file::{Limits, OutputSet},
+};
+
+/// Names of recordings that a line gives at most.
+const NAMED: usize = 3;
+
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Exit status: 0 if every recording was calibrated as `imucal calibrate` ends with 0; 1 if one was refused; 2 if one \
+                  is unreadable or failed. The other recordings are done all the same.\n\n\
+                  Example:\n  imucal batch recordings --out calibrations --summary units.csv\n\n\
+                  Started again with the same options it does what is left. On several machines, each with --shard 1/3 and so on, \
+                  then once without --shard for the summary of all."
+)]
+pub(super) struct Arguments {
+    /// Recordings: a folder, with the folders in it; a pattern in quotes, such as 'data/**/*.csv'; a list as TOML or CSV; or files
+    #[arg(required = true, value_name = "DIR|GLOB|LIST")]
+    recordings: Vec<PathBuf>,
+    /// Folder of the calibrations: NAME.json, and NAME.toml and NAME.bin where a sensor was accepted
+    #[arg(long, value_name = "OUTDIR")]
+    out: PathBuf,
+    /// Processors to use; all unless given
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    jobs: Option<usize>,
+    /// Do every n-th recording in the order of names, beginning with the i-th
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Write a row for each recording and sensor: FILE.csv or FILE.parquet
+    #[arg(long, value_name = "FILE", value_parser = summary_file)]
+    summary: Option<PathBuf>,
+    /// Write everything as JSON; `-` prints it instead of the text
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    #[command(flatten)]
+    fitting: Fitting,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|jobs| *jobs > 0).ok_or_else(|| "expected a whole number above 0".into())
+}
+
+fn summary_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match SummaryFormat::of(&path) {
+        Ok(_) => Ok(path),
+        Err(expected) => Err(format!("expected {expected}")),
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let method = Method {
+        request: arguments.fitting.request(false)?,
+        mapping: arguments.columns.mapping()?,
+        limits: arguments.reading.limits(),
+        date: today(),
+    };
+    let excluded: Vec<PathBuf> =
+        [Some(&arguments.out), arguments.summary.as_ref()].into_iter().flatten().cloned().collect();
+    let mut sources = find(&arguments.recordings, &excluded, &method)?;
+    let inputs: Vec<PathBuf> = sources.iter().map(|source| source.path.clone()).collect();
+    if let Some(shard) = arguments.shard {
+        sources = shard.of(sources);
+    }
+    let jobs =
+        arguments.jobs.or_else(|| std::thread::available_parallelism().ok().map(Into::into)).unwrap_or(1);
+    let batch = Batch { sources, out: arguments.out.clone(), jobs };
+    batch.prepare()?;
+    let (table_file, json_file) = planned(arguments, &inputs)?;
+    let done = worked(arguments, &batch)?;
+    said(&done);
+    let entries: Vec<Entry> = done.into_iter().map(|done| done.entry).collect();
+    finished(arguments, &entries, table_file, json_file)
+}
+
+/// Files of an earlier batch are its own; others are spared without --force.
+fn planned(arguments: &Arguments, inputs: &[PathBuf]) -> anyhow::Result<(OutputSet, OutputSet)> {
+    let plan = |path: Option<&PathBuf>, own: bool| {
+        let outputs: Vec<Planned> = path.map(Planned::new).into_iter().collect();
+        arguments.overwrite.or(own).plan(inputs, &outputs)
+    };
+    let summary = arguments.summary.as_ref();
+    let own = summary.is_some_and(|path| SummaryFormat::of(path).is_ok_and(|format| format.is_summary(path)));
+    let json = json_file(arguments);
+    Ok((plan(summary, own)?, plan(json, json.is_some_and(|path| is_report(path)))?))
+}
+
+fn json_file(arguments: &Arguments) -> Option<&PathBuf> {
+    arguments.json.as_ref().filter(|path| path.as_os_str() != "-")
+}
+
+/// A file that an earlier batch has written as JSON.
+fn is_report(path: &Path) -> bool {
+    let read = File::open(path).map(|file| BufReader::new(file.take(Limits::default().size)));
+    let head = read.ok().and_then(|file| serde_json::from_reader::<_, serde_json::Value>(file).ok());
+    head.is_some_and(|head| head["format"] == report::FORMAT)
+}
+
+fn worked(arguments: &Arguments, batch: &Batch) -> anyhow::Result<Vec<Done>> {
+    let may_replace = |inputs: &[PathBuf], outputs: &[(PathBuf, crate::store::form::Form)]| {
+        let outputs: Vec<Planned> =
+            outputs.iter().map(|(path, form)| Planned::calibration(path, *form)).collect();
+        arguments.overwrite.plan(inputs, &outputs).map_err(|fault| format!("{fault:#}"))
+    };
+    let progress = Progress::start();
+    let all = batch.sources.len();
+    Ok(batch.run(&may_replace, &|done| progress.stage(&format!("{done} of {all} recordings")))?)
+}
+
+/// What is no calibration, and what was done again.
+fn said(done: &[Done]) {
+    for entry in done.iter().map(|done| &done.entry) {
+        let word = entry.standing.name();
+        if let Some(why) = &entry.error {
+            output::report(word, why);
+        } else if entry.standing == Standing::Refused {
+            let sensors: Vec<String> = entry
+                .sensors
+                .iter()
+                .map(|sensor| match &sensor.reason {
+                    Some(reason) => format!("{} {} ({reason})", sensor.sensor, sensor.status),
+                    None => format!("{} {}", sensor.sensor, sensor.status),
+                })
+                .collect();
+            let sensors = if sensors.is_empty() { "it has no sensor".to_owned() } else { sensors.join(", ") };
+            output::report(word, &format_args!("{}: {sensors}", entry.recording));
+        }
+    }
+    let mut reasons: Vec<&str> = done.iter().filter_map(|done| done.again).collect();
+    reasons.sort_unstable();
+    reasons.dedup();
+    for reason in reasons {
+        let names: Vec<&str> = done
+            .iter()
+            .filter(|done| done.again == Some(reason))
+            .map(|done| done.entry.name.as_str())
+            .collect();
+        let more = if names.len() > NAMED { ", …" } else { "" };
+        let first: Vec<&str> = names.iter().copied().take(NAMED).collect();
+        output::report("again", &format_args!("{} ({}{more}): {reason}", names.len(), first.join(", ")));
+    }
+    let before = done.iter().filter(|done| done.before).count();
+    if before > 0 {
+        output::report("resumed", &format_args!("{before} of {} recordings were already done", done.len()));
+    }
+}
+
+fn finished(
+    arguments: &Arguments,
+    entries: &[Entry],
+    mut table_file: OutputSet,
+    mut json_file_set: OutputSet,
+) -> anyhow::Result<Ending> {
+    let found = outliers(entries);
+    let json = serde_json::to_string_pretty(&report::json(entries, &found))
+        .context("the batch cannot be spelt as JSON")?
+        + "\n";
+    if let Some(path) = &arguments.summary {
+        table_file.add(path, &summary_bytes(path, entries, &found)?)?;
+    }
+    if let Some(path) = json_file(arguments) {
+        json_file_set.add(path, json.as_bytes())?;
+    }
+    table_file.commit()?;
+    json_file_set.commit()?;
+    let counts = Counts::of(entries);
+    match (&arguments.json, json_file(arguments)) {
+        (Some(_), None) => output::text(&json)?,
+        _ => output::text(&(report::text(&found) + &counts.line()))?,
+    }
+    Ok(match entries.iter().map(|entry| entry.standing.exit_status()).max() {
+        Some(0) | None => Ending::Done,
+        Some(1) => Ending::Refused,
+        Some(_) => Ending::Unreadable,
+    })
+}
+
+fn summary_bytes(path: &Path, entries: &[Entry], found: &Outliers) -> anyhow::Result<Vec<u8>> {
+    let format = SummaryFormat::of(path).map_err(|expected| anyhow::anyhow!("expected {expected}"))?;
+    let bytes = format.bytes(&summary::table(entries, found));
+    bytes.with_context(|| format!("{}: cannot be written", path.display()))
+}
