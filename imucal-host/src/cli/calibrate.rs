@@ -35,7 +35,8 @@ use crate::{
     after_help = "Example:\n  imucal calibrate tumble.csv --out unit.toml --record unit.bin --html unit.html"
 )]
 pub(super) struct Arguments {
-    /// The recording: NAME.csv, NAME.csv.gz (or NAME.parquet), with its manifest NAME.toml in the same folder
+    /// The recording: NAME.csv, NAME.csv.gz or NAME.parquet, with its manifest NAME.toml in the same folder; or a log, NAME.mcap or
+    /// NAME.bag
     recording: PathBuf,
     /// Models by sensor, e.g. acc=T9,gyr=K9,mag=E9: a letter and the number of parameters. From rests: acc=T9 (gain and
     /// bias) or T6 (scale and bias, from six faces), gyr=K9 (gain), mag=E9 (ellipsoid). On a rig: acc=I14 (gain, bias and
