@@ -19,6 +19,7 @@ mod importing;
 #[cfg(unix)]
 mod interrupting;
 mod json_contract;
+mod logs;
 mod mapping;
 mod outputs;
 mod overwriting;

@@ -64,7 +64,7 @@ pub fn read_folder(
         series.add(POSITION, z_up::positions(&columns.values));
         all.push(series);
     }
-    let mut table = join(folder, &all, limits)?;
+    let mut table = join(folder, all, limits)?;
     table.warnings.splice(0..0, warnings);
     assemble(folder, manifest, table)
 }

@@ -30,11 +30,14 @@ pub(crate) struct Series {
     pub(crate) slots: Vec<usize>,
     /// Column by column.
     pub(crate) columns: Vec<Vec<f64>>,
+    /// The usual step of its stamps, ns.
+    interval: i64,
 }
 
 impl Series {
     pub(crate) fn new(name: String, stamps_ns: Vec<i64>) -> Self {
-        Self { name, stamps_ns, slots: Vec::new(), columns: Vec::new() }
+        let interval = interval(&stamps_ns);
+        Self { name, stamps_ns, slots: Vec::new(), columns: Vec::new(), interval }
     }
 
     /// Adds a group of columns, unless none of its rows knows anything.
@@ -43,10 +46,6 @@ impl Series {
             self.slots.extend(first..first + columns.len());
             self.columns.extend(columns);
         }
-    }
-
-    fn interval(&self) -> i64 {
-        interval(&self.stamps_ns)
     }
 
     fn at(&self, column: usize, row: usize) -> f64 {
@@ -61,7 +60,7 @@ impl Series {
         if from == time {
             return Some(all(before));
         }
-        let to = to.filter(|to| to - from <= GAP.saturating_mul(self.interval()))?;
+        let to = to.filter(|to| to - from <= GAP.saturating_mul(self.interval))?;
         let share = (time - from) as f64 / (to - from) as f64;
         let (one, mut other): (Vec<f64>, Vec<f64>) = (all(before), all(before + 1));
         let attitude = self.attitude();
@@ -96,12 +95,13 @@ fn interval(stamps: &[i64]) -> i64 {
 }
 
 /// One table of all series, with the stamps of the first as its rows.
-pub(crate) fn join(path: &Path, series: &[Series], limits: &Limits) -> Result<Table, ReadError> {
-    let Some((first, others)) = series.split_first() else {
+pub(crate) fn join(path: &Path, mut series: Vec<Series>, limits: &Limits) -> Result<Table, ReadError> {
+    let Some((first, others)) = series.split_first_mut() else {
         return Err(ReadError::NoRows { path: path.to_path_buf() });
     };
     let names: Vec<&str> = std::iter::once(TIME)
-        .chain(series.iter().flat_map(|each| each.slots.iter().copied()))
+        .chain(first.slots.iter().copied())
+        .chain(others.iter().flat_map(|each| each.slots.iter().copied()))
         .map(|slot| NAMES[slot])
         .collect();
     let layout = Layout::new(&names, path)?;
@@ -114,11 +114,11 @@ pub(crate) fn join(path: &Path, series: &[Series], limits: &Limits) -> Result<Ta
         let time = table.clock.take_integer(*stamp);
         table.columns[TIME].push(time);
     }
-    for (slot, column) in first.slots.iter().zip(&first.columns) {
-        table.columns[*slot].clone_from(column);
+    for (slot, column) in first.slots.iter().zip(std::mem::take(&mut first.columns)) {
+        table.columns[*slot] = column;
     }
     for other in others {
-        let placed = place(&first.stamps_ns, other, &mut table);
+        let placed = place(&first.stamps_ns, first.interval, other, &mut table);
         table.warnings.extend(placed.warning(path, other));
     }
     table.refuse_infinite(path)?;
@@ -148,12 +148,12 @@ impl Placed {
     }
 }
 
-fn place(rows: &[i64], series: &Series, table: &mut Table) -> Placed {
+fn place(rows: &[i64], longest: i64, series: &Series, table: &mut Table) -> Placed {
     for slot in &series.slots {
         table.columns[*slot] = vec![f64::NAN; rows.len()];
     }
     let mut placed = Placed::default();
-    let (mut last, longest) = (None, interval(rows));
+    let mut last = None;
     for stamp in &series.stamps_ns {
         let next = rows.partition_point(|row| row < stamp);
         let distance = |row: &usize| rows.get(*row).map_or(i64::MAX, |at| (at - stamp).abs());
@@ -197,15 +197,15 @@ mod tests {
         series("/imu", slot_of(SensorKind::Acc), &samples, 3)
     }
 
-    fn joined(all: &[Series]) -> Table {
-        join(Path::new("run.bag"), all, &Limits::default()).unwrap()
+    fn joined<const N: usize>(all: [Series; N]) -> Table {
+        join(Path::new("run.bag"), all.into(), &Limits::default()).unwrap()
     }
 
     #[test]
     fn equal_stamps_share_a_row_and_a_slower_series_leaves_rows_empty() {
         let rows = imu(5);
         let warm = series("/warm", TEMPERATURE, &[(rows.stamps_ns[1], 20.0), (rows.stamps_ns[4], 23.0)], 1);
-        let table = joined(&[rows, warm]);
+        let table = joined([rows, warm]);
         assert_eq!(table.columns[TIME], [0.0, 0.01, 0.02, 0.03, 0.04]);
         assert_eq!(table.clock.epoch.unwrap().picoseconds(), 1_700_000_000_000_000_789_000);
         let warm = &table.columns[TEMPERATURE];
@@ -220,7 +220,7 @@ mod tests {
         let samples: Vec<(i64, f64)> =
             rows.stamps_ns.iter().enumerate().map(|(k, at)| (at + 3 * MS, k as f64)).collect();
         let late = series("/mag", slot_of(SensorKind::Mag), &samples, 3);
-        let table = joined(&[rows, late]);
+        let table = joined([rows, late]);
         let column = &table.columns[slot_of(SensorKind::Mag)];
         assert!(column[0].is_nan());
         for (row, value) in column.iter().enumerate().skip(1) {
@@ -238,7 +238,7 @@ mod tests {
         rows.stamps_ns[3..].iter_mut().for_each(|at| *at += 1000 * MS);
         let samples =
             [0, 10, 20, 500, 1035, 1045].map(|ms| (begin + ms * MS, if ms == 500 { 99.0 } else { 1.0 }));
-        let table = joined(&[rows, series("/warm", TEMPERATURE, &samples, 1)]);
+        let table = joined([rows, series("/warm", TEMPERATURE, &samples, 1)]);
         let warm = &table.columns[TEMPERATURE];
         assert_eq!(&warm[..3], [1.0; 3]);
         assert!(warm[3..].iter().all(|value| value.is_nan() || *value == 1.0), "{warm:?}");
@@ -252,7 +252,7 @@ mod tests {
         let turn = |k: f64, sign: f64| [sign * (0.1 * k).cos(), 0.0, 0.0, sign * (0.1 * k).sin()];
         let attitudes = [turn(0.0, 1.0), turn(1.0, -1.0), turn(2.0, 1.0)];
         pose.add(REFERENCE, (0..4).map(|part| attitudes.iter().map(|q| q[part]).collect()).collect());
-        let table = joined(&[rows, pose]);
+        let table = joined([rows, pose]);
         for row in [0usize, 1] {
             let part = |at: usize| table.columns[REFERENCE + at][row];
             let angle = 2.0 * (part(3) / part(0)).atan();
@@ -264,7 +264,7 @@ mod tests {
     #[test]
     fn more_rows_than_the_limit_are_refused() {
         let limits = Limits { size: 100, ..Limits::default() };
-        let error = join(Path::new("run.bag"), &[imu(10)], &limits).unwrap_err().to_string();
+        let error = join(Path::new("run.bag"), vec![imu(10)], &limits).unwrap_err().to_string();
         assert!(error.contains("run.bag") && error.contains("--max-size"), "{error}");
     }
 }

@@ -49,14 +49,21 @@ pub(crate) fn read(
         let path = path.to_path_buf();
         warnings.push(Warning::TopicsTaken { path, taken, references: choice.references });
     }
-    let names: Vec<&str> = choice.taken.iter().map(|(_, name)| name.as_str()).collect();
+    let mut names: Vec<&str> = choice.taken.iter().map(|(_, name)| name.as_str()).collect();
+    // A simulator's attitude may stand in the messages of its sensors.
+    names.sort_unstable();
+    names.dedup();
     let reading = log.read(&names).map_err(|error| explained(error, limits))?;
     let of_log =
         |found: &imucal_logs::LogWarning| Warning::Log { path: path.to_path_buf(), found: found.to_string() };
     warnings.extend(reading.warnings.iter().map(of_log));
-    let all = choice.taken.iter().zip(&reading.streams);
-    let series: Vec<Series> = all.map(|((role, _), stream)| series(*role, stream, field_is_stated)).collect();
-    let mut table = join(path, &series, limits)?;
+    let of_role = |(role, name): &(Role, String)| {
+        let stream = reading.streams.iter().find(|stream| stream.topic == *name)?;
+        Some(series(*role, stream, field_is_stated))
+    };
+    let series: Vec<Series> = choice.taken.iter().filter_map(of_role).collect();
+    drop(reading);
+    let mut table = join(path, series, limits)?;
     table.warnings.splice(0..0, warnings);
     Ok(table)
 }
@@ -114,4 +121,77 @@ fn series(role: Role, stream: &Stream, field_is_stated: bool) -> Series {
         }
     }
     series
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::recording::{Mapping, Recording, fixture::assert_says};
+
+    fn fixture(name: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("logs/tests/fixtures").join(name)
+    }
+
+    fn read_topics(name: &str, topics: &[&str], units: &[&str]) -> Result<Recording, String> {
+        let owned = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>();
+        let mapping =
+            Mapping::parse(&[], &owned(units), None).and_then(|all| all.with_topics(&owned(topics)));
+        let mapping = mapping.expect("a mapping");
+        Recording::read_as(&fixture(name), &mapping, &Limits::default()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn each_topic_fills_its_columns_in_units_of_a_recording() {
+        for name in ["ros2-zstd.mcap", "bz2.bag"] {
+            let recording = read_topics(name, &["ref=/vicon/pose"], &[]).unwrap();
+            assert_eq!((recording.rows(), recording.time[39]), (40, 0.39));
+            assert_eq!(recording.epoch.unwrap().picoseconds(), 1_700_000_000_123_456_789_000);
+            assert_eq!(recording.acc.unwrap().values[3].as_slice(), [0.75, -0.5, 9.75]);
+            assert_eq!(recording.gyr.unwrap().values[2].as_slice(), [0.25, -0.5, 0.5]);
+            let mag = recording.mag.unwrap().values;
+            assert!(mag[1].x.is_nan() && (mag[4] - nalgebra::Vector3::new(20.0, 4.0, -40.0)).norm() < 1e-12);
+            let warm = recording.temperature.unwrap();
+            assert!((warm[0], warm[30]) == (20.0, 50.0) && warm[1].is_nan());
+            assert_eq!(recording.position.unwrap()[6], [2.0, 3.0, -3.0]);
+            let texts: Vec<String> = recording.warnings.iter().map(ToString::to_string).collect();
+            assert_says(&texts.join("\n"), &["took /imu/data (sensor_msgs", "as imu", "as mag", "as temp"]);
+            assert!(!texts.iter().any(|text| text.contains("leaves out")), "{texts:?}");
+        }
+    }
+
+    #[test]
+    fn the_attitude_of_a_simulated_sensor_may_be_the_reference() {
+        let topics = ["imu=/imu/data", "ref=/imu/data", "mag=none", "temp=none"];
+        let recording = read_topics("lz4.bag", &topics, &[]).unwrap();
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let attitude = recording.reference.unwrap();
+        let expected = [0.0, half * 1.4, half * 0.2, 0.0];
+        assert!(attitude[0].iter().zip(expected).all(|(found, part)| (found - part).abs() < 1e-15));
+        assert!(attitude[1][0].is_nan() && recording.position.is_none() && recording.mag.is_none());
+    }
+
+    #[test]
+    fn a_field_in_a_unit_of_its_own_is_left_as_it_is() {
+        let recording = read_topics("none.bag", &["imu=/imu/data", "mag=/imu/mag"], &["mag=uT"]).unwrap();
+        assert_eq!(recording.mag.unwrap().values[0].x, 2e-5);
+        let texts: Vec<String> = recording.warnings.iter().map(ToString::to_string).collect();
+        assert_says(&texts.join("\n"), &["none.bag, sensor mag: uT is stated", "ROS are in T"]);
+        let error = read_topics("none.bag", &["imu=/imu/data"], &["acc=g"]).unwrap_err();
+        assert_says(&error, &["m/s^2", "the median length"]);
+    }
+
+    #[test]
+    fn a_log_is_one_part_and_a_long_one_is_refused() {
+        let mapping = Mapping::default().with_topics(&["imu=/imu/data".to_owned()]).unwrap();
+        let mut lengths = Vec::new();
+        let path = fixture("ros2-lz4.mcap");
+        Recording::read_parts(&path, &mapping, &Limits::default(), &mut |part| lengths.push(part.rows()))
+            .unwrap();
+        assert_eq!(lengths, [40]);
+        let limits = Limits { size: 6_000, ..Limits::default() };
+        let error = Recording::read_as(&path, &mapping, &limits).unwrap_err().to_string();
+        assert_says(&error, &["ros2-lz4.mcap", "--max-size"]);
+    }
 }
