@@ -177,37 +177,74 @@ fn record(fields: &[(&str, &[u8])], body: &[u8]) -> Vec<u8> {
     [&length(&head)[..], &head, &length(body), body].concat()
 }
 
-/// Writes a bag without an index, as a recorder that was killed leaves it, of chunks of 500 messages.
+/// Writes a bag of chunks of 500 messages, with its index.
 ///
 /// # Panics
 ///
 /// Where the file cannot be written.
 pub fn write_bag(path: &Path, messages: &[Logged]) {
     let topics = topics(messages);
-    let mut bag = b"#ROSBAG V2.0\n".to_vec();
-    let none = [0; 8];
-    bag.extend(record(
-        &[("op", &[3]), ("index_pos", &none), ("conn_count", &none[..4]), ("chunk_count", &none[..4])],
-        &[b' '; 100],
-    ));
+    let id_of =
+        |topic: &str| topics.iter().position(|other| other.topic == topic).expect("it is listed") as u32;
+    let (mut chunks, mut infos) = (Vec::new(), Vec::new());
+    let begin = MAGIC.len() + bag_header(0, 0, 0).len();
     for (number, messages) in messages.chunks(500).enumerate() {
         let mut chunk = Vec::new();
         if number == 0 {
             topics.iter().enumerate().for_each(|(id, first)| chunk.extend(connection(id as u32, first)));
         }
+        let mut counts = vec![0u32; topics.len()];
         for (at, message) in messages.iter().enumerate() {
-            let id = topics.iter().position(|other| other.topic == message.topic).expect("it is listed");
-            let fields: [(&str, &[u8]); 3] = [
-                ("op", &[2]),
-                ("conn", &(id as u32).to_le_bytes()),
-                ("time", &time(message.recorded_ns().cast_signed())),
-            ];
+            let id = id_of(message.topic);
+            counts[id as usize] += 1;
+            let recorded = time(message.recorded_ns().cast_signed());
+            let fields: [(&str, &[u8]); 3] = [("op", &[2]), ("conn", &id.to_le_bytes()), ("time", &recorded)];
             chunk.extend(record(&fields, &ros1(message, at as u32)));
         }
+        infos.extend(chunk_info((begin + chunks.len()) as u64, messages, &counts));
         let size = (chunk.len() as u32).to_le_bytes();
-        bag.extend(record(&[("op", &[5]), ("compression", b"none"), ("size", &size)], &chunk));
+        chunks.extend(record(&[("op", &[5]), ("compression", b"none"), ("size", &size)], &chunk));
     }
+    let connections: Vec<u8> =
+        topics.iter().enumerate().flat_map(|(id, first)| connection(id as u32, first)).collect();
+    let head =
+        bag_header((begin + chunks.len()) as u64, topics.len() as u32, messages.len().div_ceil(500) as u32);
+    let bag = [MAGIC, &head, &chunks, &connections, &infos].concat();
     fs::write(path, bag).expect("the folder takes files");
+}
+
+const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
+
+fn bag_header(index: u64, connections: u32, chunks: u32) -> Vec<u8> {
+    let (connections, chunks) = (connections.to_le_bytes(), chunks.to_le_bytes());
+    let fields: [(&str, &[u8]); 4] = [
+        ("op", &[3]),
+        ("index_pos", &index.to_le_bytes()),
+        ("conn_count", &connections),
+        ("chunk_count", &chunks),
+    ];
+    record(&fields, &[b' '; 100])
+}
+
+fn chunk_info(place: u64, messages: &[Logged], counts: &[u32]) -> Vec<u8> {
+    let at =
+        |message: Option<&Logged>| time(message.expect("a chunk is not empty").recorded_ns().cast_signed());
+    let (first, last, count) =
+        (at(messages.first()), at(messages.last()), (counts.len() as u32).to_le_bytes());
+    let body: Vec<u8> = counts
+        .iter()
+        .enumerate()
+        .flat_map(|(id, count)| [(id as u32).to_le_bytes(), count.to_le_bytes()].concat())
+        .collect();
+    let fields: [(&str, &[u8]); 6] = [
+        ("op", &[6]),
+        ("ver", &1u32.to_le_bytes()),
+        ("chunk_pos", &place.to_le_bytes()),
+        ("start_time", &first),
+        ("end_time", &last),
+        ("count", &count),
+    ];
+    record(&fields, &body)
 }
 
 fn connection(id: u32, first: &Logged) -> Vec<u8> {

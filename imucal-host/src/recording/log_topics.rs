@@ -208,10 +208,14 @@ impl LogTopics {
     /// poses does not make it one.
     pub(crate) fn choose(&self, there: &[TopicLine]) -> Result<Choice, TopicFault> {
         let mut choice = Choice { taken: Vec::new(), unasked: Vec::new(), references: Vec::new() };
+        // What is asked for wrongly is said first.
+        for (role, topic) in self.asked.iter().filter(|(_, topic)| topic != NONE) {
+            asked(*role, topic, there)?;
+        }
         for role in Role::ALL {
             match self.asked.iter().find(|(other, _)| *other == role) {
                 Some((_, topic)) if topic == NONE => {}
-                Some((_, topic)) => choice.taken.push((role, asked(role, topic, there)?)),
+                Some((_, topic)) => choice.taken.push((role, topic.clone())),
                 None if role == Role::Reference => {
                     let poses = there.iter().filter(|line| line.can_be(role) && !line.can_be(Role::Imu));
                     choice.references = poses.map(|line| line.name.clone()).collect();
@@ -231,8 +235,8 @@ impl LogTopics {
     }
 }
 
-/// A topic that is asked for.
-fn asked(role: Role, topic: &str, there: &[TopicLine]) -> Result<String, TopicFault> {
+/// Whether a topic that is asked for can be it.
+fn asked(role: Role, topic: &str, there: &[TopicLine]) -> Result<(), TopicFault> {
     let same: Vec<&TopicLine> = there.iter().filter(|line| line.name == topic).collect();
     let (Some(first), all) = (same.first(), || there.to_vec()) else {
         let names = there.iter().map(|line| line.name.as_str());
@@ -253,7 +257,7 @@ fn asked(role: Role, topic: &str, there: &[TopicLine]) -> Result<String, TopicFa
         Ok(_) if same.iter().all(|line| line.count == 0) => {
             Err(TopicFault::Silent { role, topic: name, there: all() })
         }
-        Ok(_) => Ok(name),
+        Ok(_) => Ok(()),
     }
 }
 
