@@ -2,7 +2,10 @@
 //!
 //! A bag that was not closed has no index at its end; its chunks are read all the same. Source: the ROS wiki, Bags/Format/2.0.
 
-use std::{collections::HashMap, path::Path};
+use std::{
+    collections::{BTreeMap, HashMap},
+    path::Path,
+};
 
 use crate::{
     compression::{ChunkFault, decompress},
@@ -239,48 +242,62 @@ pub(crate) fn listing(path: &Path, size: u64) -> Result<Option<Listing>, LogErro
     source.skip(MAGIC.len() as u64)?;
     let (mut head, mut body) = (Vec::new(), Vec::new());
     let first = record_head(&mut source, size, &mut head)?;
-    let Some(fields) = first.and_then(|_| Fields::of(&head)) else { return Ok(None) };
-    let places = (fields.u64("index_pos"), fields.u32("chunk_count"), fields.u32("conn_count"));
-    let (Some(place), Some(chunks), Some(expected)) = places else { return Ok(None) };
-    if fields.kind() != Some(BAG) || place == 0 {
+    let fields = first.and_then(|_| Fields::of(&head)).filter(|fields| fields.kind() == Some(BAG));
+    let stated = fields.and_then(|fields| {
+        Some((fields.u64("index_pos")?, fields.u32("chunk_count")?, fields.u32("conn_count")?))
+    });
+    let Some((place, chunks, connections)) = stated.filter(|(place, ..)| *place > 0) else {
         return Ok(None);
-    }
+    };
     source.seek(place)?;
-    let mut connections: HashMap<u32, Connection> = HashMap::new();
-    let (mut counts, mut found): (HashMap<u32, u64>, u32) = (HashMap::new(), 0);
+    let mut index = Index::default();
     while source.left() > 0 {
         let Some(length) = record_head(&mut source, size, &mut head)? else { return Ok(None) };
         if u64::from(length) > source.left().min(size) {
             return Ok(None);
         }
         source.fill(length.into(), &mut body)?;
-        let Some(fields) = Fields::of(&head) else { return Ok(None) };
-        match fields.kind() {
-            Some(CONNECTION) => {
-                let Some(connection) = fields.connection(&body) else { return Ok(None) };
-                connections.insert(connection.id, connection);
+        if Fields::of(&head).and_then(|fields| index.add(&fields, &body)).is_none() {
+            return Ok(None);
+        }
+    }
+    let whole = index.chunks == chunks && index.connections.len() as u64 == u64::from(connections);
+    Ok(whole.then(|| index.listing()))
+}
+
+#[derive(Default)]
+struct Index {
+    connections: BTreeMap<u32, Connection>,
+    counts: HashMap<u32, u64>,
+    chunks: u32,
+}
+
+impl Index {
+    /// Takes a record; `None` if it is none of an index.
+    fn add(&mut self, fields: &Fields<'_>, body: &[u8]) -> Option<()> {
+        match fields.kind()? {
+            CONNECTION => {
+                let connection = fields.connection(body)?;
+                self.connections.insert(connection.id, connection);
             }
-            Some(CHUNK_INFO) => {
-                found += 1;
+            CHUNK_INFO => {
+                self.chunks += 1;
                 for pair in body.as_chunks::<8>().0 {
                     let [a, b, c, d, e, f, g, h] = *pair;
-                    let count = counts.entry(u32::from_le_bytes([a, b, c, d])).or_default();
+                    let count = self.counts.entry(u32::from_le_bytes([a, b, c, d])).or_default();
                     *count += u64::from(u32::from_le_bytes([e, f, g, h]));
                 }
             }
-            _ => return Ok(None),
+            _ => return None,
         }
+        Some(())
     }
-    if found != chunks || connections.len() as u64 != u64::from(expected) {
-        return Ok(None);
-    }
-    let mut listed: Listing = connections
-        .into_values()
-        .map(|connection| {
-            let count = counts.get(&connection.id).copied().unwrap_or(0);
+
+    fn listing(self) -> Listing {
+        let counted = |connection: Connection| {
+            let count = self.counts.get(&connection.id).copied().unwrap_or(0);
             (connection, count)
-        })
-        .collect();
-    listed.sort_by_key(|(connection, _)| connection.id);
-    Ok(Some(listed))
+        };
+        self.connections.into_values().map(counted).collect()
+    }
 }

@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use mcap::{
     MAGIC, parse_record,
-    records::{Channel, Record, op},
+    records::{Channel, Record, Statistics, op},
 };
 
 use crate::{
@@ -219,22 +219,10 @@ impl<'a> ChunkHead<'a> {
 /// What the summary at the file's end says; `None` where it does not say it all.
 pub(crate) fn listing(path: &Path, size: u64) -> Result<Option<Listing>, LogError> {
     let mut source = Source::open(path)?;
-    let Some(begin) = source.left().checked_sub(FOOTER) else { return Ok(None) };
-    source.seek(begin)?;
-    let mut footer = Vec::new();
-    source.fill(FOOTER, &mut footer)?;
-    let start = footer
-        .strip_suffix(MAGIC)
-        .and_then(split_head)
-        .filter(|(opcode, ..)| *opcode == op::FOOTER)
-        .and_then(|(.., body)| body.first_chunk::<8>())
-        .map(|start| u64::from_le_bytes(*start))
-        .filter(|start| *start > 0 && *start < begin);
-    let Some(start) = start else { return Ok(None) };
+    let Some((start, end)) = summary_place(&mut source)? else { return Ok(None) };
     source.seek(start)?;
-    let (mut schemas, mut channels, mut statistics) = (BTreeMap::new(), Vec::new(), None);
-    let mut body = Vec::new();
-    while source.at() < begin {
+    let (mut summary, mut body) = (Summary::default(), Vec::new());
+    while source.at() < end {
         let Some((opcode, length)) = head(&mut source)? else { return Ok(None) };
         if length > source.left() || length > size {
             return Ok(None);
@@ -244,29 +232,65 @@ pub(crate) fn listing(path: &Path, size: u64) -> Result<Option<Listing>, LogErro
             continue;
         }
         source.fill(length, &mut body)?;
-        match parse_record(opcode, &body) {
-            Ok(Record::Schema { header, data }) => {
-                let definition = String::from_utf8_lossy(&data).into_owned();
-                schemas
-                    .insert(header.id, Schema { name: header.name, language: header.encoding, definition });
-            }
-            Ok(Record::Channel(channel)) => channels.push(channel),
-            Ok(Record::Statistics(found)) => statistics = Some(found),
-            _ => return Ok(None),
+        if summary.add(opcode, &body).is_none() {
+            return Ok(None);
         }
     }
-    let Some(counts) = statistics.filter(|found| found.channel_count as usize == channels.len()) else {
-        return Ok(None);
-    };
-    let listed = channels.into_iter().map(|channel| {
-        let count = counts.channel_message_counts.get(&channel.id).copied().unwrap_or(0);
-        let schema = match channel.schema_id {
-            0 => Schema::default(),
-            id => schemas.get(&id)?.clone(),
-        };
-        Some((schema.connection(channel), count))
-    });
-    let listed: Option<Listing> = listed.collect();
-    let total: Option<u64> = listed.as_ref().map(|listed| listed.iter().map(|(_, count)| count).sum());
-    Ok(listed.filter(|_| total == Some(counts.message_count)))
+    Ok(summary.listing())
+}
+
+/// Where the summary begins and ends; `None` where there is no footer or no summary.
+fn summary_place(source: &mut Source<'_>) -> Result<Option<(u64, u64)>, LogError> {
+    let Some(end) = source.left().checked_sub(FOOTER) else { return Ok(None) };
+    source.seek(end)?;
+    let mut footer = Vec::new();
+    source.fill(FOOTER, &mut footer)?;
+    let start = footer
+        .strip_suffix(MAGIC)
+        .and_then(split_head)
+        .filter(|(opcode, ..)| *opcode == op::FOOTER)
+        .and_then(|(.., body)| body.first_chunk::<8>())
+        .map(|start| u64::from_le_bytes(*start))
+        .filter(|start| *start > 0 && *start < end);
+    Ok(start.map(|start| (start, end)))
+}
+
+#[derive(Default)]
+struct Summary {
+    schemas: BTreeMap<u16, Schema>,
+    channels: Vec<Channel>,
+    statistics: Option<Statistics>,
+}
+
+impl Summary {
+    /// Takes a record; `None` if it is damaged.
+    fn add(&mut self, opcode: u8, body: &[u8]) -> Option<()> {
+        match parse_record(opcode, body).ok()? {
+            Record::Schema { header, data } => {
+                let definition = String::from_utf8_lossy(&data).into_owned();
+                let schema = Schema { name: header.name, language: header.encoding, definition };
+                self.schemas.insert(header.id, schema);
+            }
+            Record::Channel(channel) => self.channels.push(channel),
+            Record::Statistics(found) => self.statistics = Some(found),
+            _ => {}
+        }
+        Some(())
+    }
+
+    /// Of all channels; `None` where a schema or a count is missing.
+    fn listing(self) -> Option<Listing> {
+        let counts = self.statistics.filter(|found| found.channel_count as usize == self.channels.len())?;
+        let listed = self.channels.into_iter().map(|channel| {
+            let count = counts.channel_message_counts.get(&channel.id).copied().unwrap_or(0);
+            let schema = match channel.schema_id {
+                0 => Schema::default(),
+                id => self.schemas.get(&id)?.clone(),
+            };
+            Some((schema.connection(channel), count))
+        });
+        let listed: Listing = listed.collect::<Option<_>>()?;
+        let total = listed.iter().fold(0u64, |sum, (_, count)| sum.saturating_add(*count));
+        (total == counts.message_count).then_some(listed)
+    }
 }

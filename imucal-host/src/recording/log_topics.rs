@@ -50,7 +50,7 @@ impl Role {
     }
 }
 
-/// A topic of a log, as far as a message tells of it.
+/// A topic of a log, as far as a message needs it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TopicLine {
     /// Its name.
@@ -69,7 +69,7 @@ impl TopicLine {
     }
 
     /// Name, type and number, as a message says them.
-    pub(crate) fn told(&self) -> String {
+    pub(crate) fn described(&self) -> String {
         format!("{} ({}, {} messages)", self.name, self.type_name, self.count)
     }
 }

@@ -44,8 +44,8 @@ pub(crate) fn read(
     let choice = topics.choose(&lines).map_err(fault)?;
     let mut warnings = Vec::new();
     if !choice.unasked.is_empty() {
-        let told = |(role, line): &(Role, TopicLine)| format!("{} as {}", line.told(), role.name());
-        let taken = choice.unasked.iter().map(told).collect::<Vec<_>>().join(", ");
+        let described = |(role, line): &(Role, TopicLine)| format!("{} as {}", line.described(), role.name());
+        let taken = choice.unasked.iter().map(described).collect::<Vec<_>>().join(", ");
         let path = path.to_path_buf();
         warnings.push(Warning::TopicsTaken { path, taken, references: choice.references });
     }

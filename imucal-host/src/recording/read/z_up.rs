@@ -19,8 +19,8 @@ pub(crate) fn attitudes(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
 fn turned<const N: usize>(columns: &[Vec<f64>], turn: fn([f64; N]) -> [f64; N]) -> Vec<Vec<f64>> {
     let rows = columns.first().map_or(0, Vec::len);
     let mut made = vec![Vec::with_capacity(rows); N];
-    for row in 0..rows {
-        let values = turn(std::array::from_fn(|at| columns[at][row]));
+    let of_row = |row: usize| turn(std::array::from_fn(|at| columns[at][row]));
+    for values in (0..rows).map(of_row) {
         made.iter_mut().zip(values).for_each(|(column, value)| column.push(value));
     }
     made
