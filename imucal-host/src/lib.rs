@@ -22,7 +22,7 @@
 //!
 //! | stage | goes in | comes out |
 //! | --- | --- | --- |
-//! | [`recording`] | a CSV or Parquet file and its manifest | samples in SI, warnings, which rows can be used |
+//! | [`recording`] | a CSV or Parquet file and its manifest, or a robot's log | samples in SI, warnings, which rows can be used |
 //! | [`effect`] | – | the only list of what a simulator may lack; a user's own, from a file |
 //! | [`simulator`] | a movement, effects | what ideal or afflicted sensors put out |
 //! | [`noise`], [`observe`], [`ellipsoid`] | samples | rests, motions, turns, and the noise of their means |
@@ -46,7 +46,8 @@
 //! | --- | --- |
 //! | `cli`, by default | the program `imucal` and the module `cli` |
 //! | `serial`, by default | devices at a serial port; without it [`device`] reaches those behind TCP and QEMU |
-//! | `parquet` | recordings and summaries of batches in Parquet |
+//! | `parquet`, by default | recordings and summaries of batches in Parquet |
+//! | `logs`, by default | robots' logs as recordings: MCAP and ROS 1 bags |
 //!
 //! A program that uses the library takes it with `default-features = false`.
 

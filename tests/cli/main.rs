@@ -20,6 +20,7 @@ mod importing;
 #[cfg(unix)]
 mod interrupting;
 mod json_contract;
+mod logs;
 mod mapping;
 mod outputs;
 mod overwriting;

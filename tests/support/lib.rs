@@ -11,4 +11,5 @@ pub mod golden;
 pub mod part;
 pub mod program;
 pub mod rig;
+pub mod robot_log;
 pub mod simulated;

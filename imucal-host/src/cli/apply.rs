@@ -64,12 +64,16 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     Ok(Ending::Done)
 }
 
-/// `NAME-calibrated.csv.gz` for `NAME.csv.gz`.
+/// `NAME-calibrated.csv.gz` for `NAME.csv.gz`; of a log, which is not written, `NAME-calibrated.csv`.
 fn default_output(path: &Path) -> PathBuf {
     let name = path.file_name().and_then(OsStr::to_str).unwrap_or("recording.csv");
     let lower = name.to_ascii_lowercase();
     let ending = [".csv.gz", ".csv", ".parquet"].into_iter().find(|ending| lower.ends_with(ending));
     // Endings are ASCII, so that the lengths agree and the cut is between characters.
-    let (stem, ending) = name.split_at(name.len() - ending.map_or(0, str::len));
+    let log = [".mcap", ".bag"].into_iter().find(|ending| lower.ends_with(ending));
+    let (stem, ending) = match log {
+        Some(log) => (&name[..name.len() - log.len()], ".csv"),
+        None => name.split_at(name.len() - ending.map_or(0, str::len)),
+    };
     path.with_file_name(format!("{stem}-calibrated{ending}"))
 }

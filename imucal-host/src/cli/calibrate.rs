@@ -30,7 +30,8 @@ use crate::{
     after_help = "Example:\n  imucal calibrate tumble.csv --out unit.toml --record unit.bin --html unit.html"
 )]
 pub(super) struct Arguments {
-    /// The recording: NAME.csv, NAME.csv.gz (or NAME.parquet), with its manifest NAME.toml in the same folder
+    /// The recording: NAME.csv, NAME.csv.gz or NAME.parquet, with its manifest NAME.toml in the same folder; or a log, NAME.mcap or
+    /// NAME.bag
     recording: PathBuf,
     #[command(flatten)]
     fitting: Fitting,

@@ -1,4 +1,4 @@
-//! Files whose columns have other names than a recording's.
+//! Files whose columns have other names than a recording's, and logs whose topics are to be chosen.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::{
     report::layout,
 };
 
-/// What the columns of another program's file are.
+/// What the columns of another program's file are, or which topics of a log are meant.
 #[derive(Args, Clone, Debug)]
 pub(super) struct Columns {
     /// Columns of a file with other names, in the order x, y, z, such as acc=ax,ay,az; also gyr, mag, temp, gimbal,
@@ -28,11 +28,15 @@ pub(super) struct Columns {
     /// The column of times; its unit is stated by --unit t=ms, or by the end of its name (timestamp_ms)
     #[arg(long = "time", value_name = "COLUMN", help_heading = "Another program's file")]
     time: Option<String>,
+    /// A topic of an MCAP file or a ROS 1 bag: imu=/imu/data, mag=, temp=, or ref= for a reference's poses; the only one of a
+    /// sensor is taken without it, and mag=none takes none. Give it once for each
+    #[arg(long = "topic", value_name = "ROLE=TOPIC", help_heading = "A robot's log")]
+    topic: Vec<String>,
 }
 
 impl Columns {
     pub(super) fn mapping(&self) -> anyhow::Result<Mapping> {
-        Ok(Mapping::parse(&self.map, &self.unit, self.time.as_deref())?)
+        Ok(Mapping::parse(&self.map, &self.unit, self.time.as_deref())?.with_topics(&self.topic)?)
     }
 }
 
@@ -65,13 +69,16 @@ pub(super) fn explained(path: &Path, error: ReadError, reading: Reading) -> anyh
     }
 }
 
-/// What the file's columns probably are, where it is not known.
+/// What the file's columns probably are, where it is not known, or the command that chooses a topic.
 fn hint(path: &Path, error: &ReadError, reading: Reading) -> Option<String> {
+    let command = std::env::args().nth(1).unwrap_or_default();
+    if let ReadError::Topics { fault, .. } = error {
+        return Some(layout::command(&command, path, &fault.remedy()?));
+    }
     let unknown = matches!(
         error,
         ReadError::Header { .. } | ReadError::ManifestMissing { .. } | ReadError::Mapping { .. }
     );
     let guess = guess(path, &reading.limits()).filter(|_| unknown)?;
-    let command = std::env::args().nth(1).unwrap_or_default();
     Some(layout::guess(&guess, &command, path))
 }

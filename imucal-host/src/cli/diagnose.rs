@@ -24,7 +24,7 @@ use crate::{
     effect::{CATALOGUE, Effect, user},
     file::OutputSet,
     page,
-    recording::{self, Recording, Stream, Warning},
+    recording::{self, Mapping, Recording, Stream, Warning},
     report,
     store::watch_file,
 };
@@ -32,7 +32,8 @@ use crate::{
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  imucal diagnose robot.csv --sim simulated.csv --html gap.html")]
 pub(super) struct Arguments {
-    /// The recording to diagnose: NAME.csv, NAME.csv.gz (or NAME.parquet), with its manifest NAME.toml in the same folder
+    /// The recording to diagnose: NAME.csv, NAME.csv.gz or NAME.parquet, with its manifest NAME.toml in the same folder; or a log,
+    /// NAME.mcap or NAME.bag
     #[arg(required_unless_present = "list")]
     recording: Option<PathBuf>,
     /// The unit's present model, as `imucal calibrate` wrote it (default: calibrated from the recording)
@@ -42,7 +43,8 @@ pub(super) struct Arguments {
     /// recording
     #[arg(long, value_name = "SIM")]
     sim: Option<PathBuf>,
-    /// Which of several streams in SIM is meant: NAME of columns sim_NAME_acc_x, sim_NAME_gyr_x, … (m/s², rad/s, µT)
+    /// Which of several streams in SIM is meant: NAME of columns sim_NAME_acc_x, sim_NAME_gyr_x, … (m/s², rad/s, µT); of a log, which
+    /// may be that of the recording, a topic of sensor_msgs/Imu
     #[arg(long, value_name = "NAME", requires = "sim")]
     sim_topic: Option<String>,
     /// What the drift watch of the unit's device has seen, as the device wrote it; it is reported next to the diagnosis
@@ -160,9 +162,12 @@ fn stream(
     recording: &Recording,
     reading: Reading,
 ) -> anyhow::Result<Stream> {
-    let simulated = Recording::read_within(path, &reading.limits())?;
+    let is_log = recording::is_log(path);
+    let mapping = if is_log { topics_of(topic)? } else { Mapping::default() };
+    let simulated = Recording::read_as(path, &mapping, &reading.limits())
+        .map_err(|error| columns::explained(path, error, reading))?;
     simulated.warnings.iter().filter(|warning| !is_expected(warning)).for_each(|warning| warn(warning));
-    if let Some(topic) = topic {
+    if let Some(topic) = topic.filter(|_| !is_log) {
         return Stream::of_topic(&simulated, recording, topic).with_context(|| path.display().to_string());
     }
     Stream::beside(&simulated, recording).with_context(|| {
@@ -176,6 +181,14 @@ fn stream(
             path.display()
         )
     })
+}
+
+/// A simulator's topic of a log, and nothing that others have recorded.
+fn topics_of(topic: Option<&str>) -> anyhow::Result<Mapping> {
+    let imu = topic.map(|topic| format!("imu={topic}"));
+    let options: Vec<String> =
+        imu.into_iter().chain(["mag=none".to_owned(), "temp=none".to_owned()]).collect();
+    Ok(Mapping::default().with_topics(&options)?)
 }
 
 /// That a simulator's file has no sensor, or topics beside the one that is meant, is what is asked for.

@@ -1,6 +1,6 @@
 //! `imucal import`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
@@ -13,13 +13,20 @@ use super::{
     reading::Reading,
     warn,
 };
-use crate::recording::{Manifest, read::imu_tk};
+use crate::recording::{
+    Manifest, Recording,
+    read::{euroc, imu_tk},
+};
 
 /// Other people's formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Layout {
     /// One CSV file, with its columns by --map, --unit and --time; fields separated by commas, semicolons or tabs
     Csv,
+    /// An MCAP file or a ROS 1 bag, its topics by --topic
+    Log,
+    /// A folder of EuRoC: mav0/imu0 and, as the reference, its ground truth or Vicon's poses
+    Euroc,
     /// Two text files of imu_tk, lines of `t x y z`: the accelerometer's, then the gyroscope's
     #[value(name = "imu_tk")]
     ImuTk,
@@ -31,7 +38,7 @@ enum Layout {
                   --out log-si.csv"
 )]
 pub(super) struct Arguments {
-    /// One CSV file, or the accelerometer's and the gyroscope's file of imu_tk
+    /// One CSV file, log or folder of EuRoC, or the accelerometer's and the gyroscope's file of imu_tk
     #[arg(required = true, num_args = 1..=2)]
     files: Vec<PathBuf>,
     /// Their layout; without it that of so many files
@@ -64,8 +71,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         None => None,
     };
     let recording = match (arguments.files.as_slice(), arguments.from) {
-        ([csv], None | Some(Layout::Csv)) => {
-            columns::read_with(csv, &arguments.columns, manifest, arguments.reading)?
+        ([folder], Some(Layout::Euroc)) => euroc(folder, manifest, arguments)?,
+        ([folder], None) if euroc::is_folder(folder) => euroc(folder, manifest, arguments)?,
+        ([file], None | Some(Layout::Csv | Layout::Log)) => {
+            columns::read_with(file, &arguments.columns, manifest, arguments.reading)?
         }
         ([acc, gyr], None | Some(Layout::ImuTk)) => {
             let manifest = manifest.context("imu_tk: its files say no units; add --manifest")?;
@@ -73,11 +82,19 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             recording.warnings.iter().for_each(|warning| warn(warning));
             recording
         }
-        (_, Some(Layout::Csv)) => anyhow::bail!("csv: found two files, expected one"),
+        (_, Some(Layout::Csv | Layout::Log | Layout::Euroc)) => {
+            anyhow::bail!("--from: found two files, expected one")
+        }
         _ => anyhow::bail!("imu_tk: found one file, expected the accelerometer's and then the gyroscope's"),
     };
     recording.write_into(&arguments.out, &mut files)?;
     files.commit()?;
     say!("{}: {} rows", arguments.out.display(), recording.rows());
     Ok(Ending::Done)
+}
+
+fn euroc(folder: &Path, manifest: Option<Manifest>, arguments: &Arguments) -> anyhow::Result<Recording> {
+    let recording = euroc::read_folder(folder, manifest, &arguments.reading.limits())?;
+    recording.warnings.iter().for_each(|warning| warn(warning));
+    Ok(recording)
 }

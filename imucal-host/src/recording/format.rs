@@ -8,6 +8,8 @@ pub(crate) enum Format {
     Csv,
     CsvGz,
     Parquet,
+    /// A robot's log: MCAP or a ROS 1 bag.
+    Log,
 }
 
 impl Format {
@@ -20,6 +22,8 @@ impl Format {
             Ok(Self::Csv)
         } else if name.ends_with(".parquet") {
             Ok(Self::Parquet)
+        } else if name.ends_with(".mcap") || name.ends_with(".bag") {
+            Ok(Self::Log)
         } else {
             Err(name.rfind('.').map_or(String::new(), |at| name[at..].to_owned()))
         }

@@ -202,12 +202,12 @@ impl Default for Manifest {
 }
 
 impl Manifest {
-    /// The manifest's path next to a samples file: `NAME.toml` for `NAME.csv`, `NAME.csv.gz` and
-    /// `NAME.parquet`; `None` for a file of another ending.
+    /// The manifest's path next to a samples file: `NAME.toml` for `NAME.csv`, `NAME.csv.gz`,
+    /// `NAME.parquet`, `NAME.mcap` and `NAME.bag`; `None` for a file of another ending.
     #[must_use]
     pub fn path_beside(samples: &Path) -> Option<PathBuf> {
         let name = samples.file_name()?.to_str()?;
-        let stem = [".csv.gz", ".csv", ".parquet"].iter().find_map(|ending| {
+        let stem = [".csv.gz", ".csv", ".parquet", ".mcap", ".bag"].iter().find_map(|ending| {
             let at = name.len().checked_sub(ending.len())?;
             let (stem, end) = name.split_at_checked(at)?;
             end.eq_ignore_ascii_case(ending).then_some(stem)
@@ -346,6 +346,8 @@ mod tests {
             ("d/a.csv", Some("d/a.toml")),
             ("a.b.csv.gz", Some("a.b.toml")),
             ("a.parquet", Some("a.toml")),
+            ("a.mcap", Some("a.toml")),
+            ("a.bag", Some("a.toml")),
             ("a.txt", None),
         ] {
             assert_eq!(Manifest::path_beside(Path::new(samples)), manifest.map(PathBuf::from));

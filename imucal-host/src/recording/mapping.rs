@@ -1,6 +1,7 @@
-//! The columns of another program's file, by the names that a recording has for them.
+//! The columns of another program's file, by the names that a recording has for them; the topics of a log.
 
 use super::{
+    log_topics::LogTopics,
     manifest::{Counts, Manifest},
     read::{column_guess::unit_behind, columns::NAMES},
     sensor_kind::SensorKind,
@@ -55,13 +56,15 @@ pub enum MappingFault {
     Taken { name: &'static str },
 }
 
-/// Columns of a file by the names of a recording, and their units. Empty: the file is a recording.
+/// Columns of a file by the names of a recording, or topics of a log, and their units. Empty: the file is a recording, or a log of
+/// which there is nothing to choose.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mapping {
     /// Name in the file, and in a recording.
     columns: Vec<(String, &'static str)>,
     units: Vec<(SensorKind, Stated)>,
     time: Option<TimeUnit>,
+    pub(super) topics: LogTopics,
 }
 
 /// How a sensor's columns are stated.
@@ -92,6 +95,32 @@ impl Mapping {
             mapping.state(text)?;
         }
         Ok(mapping)
+    }
+
+    /// The same with topics of a log, such as `imu=/imu/data`; `mag=none` leaves one out.
+    ///
+    /// # Errors
+    ///
+    /// The first fault found.
+    pub fn with_topics(mut self, topics: &[String]) -> Result<Self, MappingFault> {
+        self.topics = LogTopics::parse(topics)?;
+        Ok(self)
+    }
+
+    /// Whether a log's magnetometer is in a unit of its own, which this or its manifest states.
+    #[cfg(feature = "logs")]
+    pub(super) fn states_field(&self, manifest: &Manifest) -> bool {
+        self.states(SensorKind::Mag) || manifest.units.mag != Manifest::default().units.mag
+    }
+
+    /// Columns are named.
+    pub(super) fn has_columns(&self) -> bool {
+        !self.columns.is_empty()
+    }
+
+    /// A sensor's unit is stated.
+    pub(super) fn states(&self, kind: SensorKind) -> bool {
+        self.units.iter().any(|(other, _)| *other == kind)
     }
 
     /// Nothing is mapped.
@@ -192,10 +221,9 @@ impl Mapping {
     /// The sensors and the time whose units are not stated here.
     pub(crate) fn unstated(&self) -> Vec<(&'static str, String)> {
         let units = Manifest::default().units;
-        let is_stated = |kind: SensorKind| self.units.iter().any(|(other, _)| *other == kind);
         let first = |kind: SensorKind| QUANTITIES[kind as usize].1[0];
         let is_mapped = |kind: SensorKind| self.columns.iter().any(|(_, known)| *known == first(kind));
-        let sensors = SensorKind::ALL.into_iter().filter(|kind| is_mapped(*kind) && !is_stated(*kind));
+        let sensors = SensorKind::ALL.into_iter().filter(|kind| is_mapped(*kind) && !self.states(*kind));
         let mut all: Vec<(&'static str, String)> =
             sensors.map(|kind| (QUANTITIES[kind as usize].0, units.of(kind).to_string())).collect();
         if self.time.is_none() {

@@ -11,6 +11,7 @@ mod epoch;
 mod fixture;
 mod format;
 pub mod layout_guess;
+pub mod log_topics;
 pub mod manifest;
 pub mod mapping;
 pub mod order_statistics;
@@ -43,6 +44,12 @@ pub use self::{
     write_error::WriteError,
 };
 use crate::file::{Limits, OutputSet};
+
+/// Whether a file is a robot's log by its ending: MCAP or a ROS 1 bag.
+#[must_use]
+pub fn is_log(path: &Path) -> bool {
+    Format::of(path) == Ok(Format::Log)
+}
 
 /// A recording of an inertial measurement unit. All columns that are there have as many rows as `time`.
 #[derive(Clone, Debug, PartialEq)]
@@ -116,8 +123,8 @@ impl Recording {
         }
     }
 
-    /// Reads `NAME.csv`, `NAME.csv.gz` or, when built with the feature `parquet`, `NAME.parquet`, and
-    /// the manifest `NAME.toml` next to it. What is odd but harmless is in [`Recording::warnings`].
+    /// Reads `NAME.csv`, `NAME.csv.gz` or, when built with the features `parquet` and `logs`, `NAME.parquet`, `NAME.mcap` and
+    /// `NAME.bag`, and the manifest `NAME.toml` next to it, which a log needs not have. What is odd but harmless is in [`Recording::warnings`].
     ///
     /// # Errors
     ///
@@ -136,8 +143,8 @@ impl Recording {
         Self::read_as(path, &Mapping::default(), limits)
     }
 
-    /// As [`Recording::read_within`], of a file whose columns have other names. Then it needs no manifest, and its fields may be
-    /// separated by semicolons or tabs.
+    /// As [`Recording::read_within`], of a file whose columns have other names, or of some topics of a log. Then it needs no
+    /// manifest, and its fields may be separated by semicolons or tabs.
     ///
     /// # Errors
     ///
@@ -167,6 +174,10 @@ impl Recording {
             Format::Parquet => {
                 return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() });
             }
+            #[cfg(feature = "logs")]
+            Format::Log => read::logs::read(path, &mapping.topics, mapping.states_field(&manifest), limits)?,
+            #[cfg(not(feature = "logs"))]
+            Format::Log => return Err(ReadError::LogsNotBuilt { path: path.to_path_buf() }),
         };
         let misled = parts::misled(&warnings);
         table.warnings.splice(0..0, warnings);

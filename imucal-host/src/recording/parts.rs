@@ -2,7 +2,10 @@
 
 use std::{mem, path::Path};
 
-use super::{Format, Manifest, Mapping, ReadError, Recording, Warning, read};
+use super::{
+    Format, Manifest, Mapping, ReadError, Recording, SensorKind, Warning, log_topics::TopicFault, read,
+    unit::TimeUnit,
+};
 use crate::file::Limits;
 
 /// Rows of a part of a text file: a second at 65 kHz, 10 MiB of ten columns.
@@ -12,7 +15,7 @@ impl Recording {
     /// Reads a recording by parts, each a recording of consecutive rows. What is odd but harmless is returned, each kind
     /// of warning once, and in [`Recording::warnings`] of no part.
     ///
-    /// A part of a text file has 65 536 rows; one of a Parquet file is a row group. `limits` hold for one part, so that
+    /// A part of a text file has 65 536 rows; one of a Parquet file is a row group, and a log is one part. `limits` hold for one part, so that
     /// the file may be of any length.
     ///
     /// # Errors
@@ -27,6 +30,8 @@ impl Recording {
         let (format, manifest, warnings) = opened(path, mapping, None, limits)?;
         let misled = misled(&warnings);
         let unit = manifest.units.t;
+        #[cfg(feature = "logs")]
+        let field_is_stated = mapping.states_field(&manifest);
         let mut parts =
             Parts { path, manifest, of_manifest: warnings, warnings: Vec::new(), last: None, take };
         let mut next = |table| parts.next(table);
@@ -38,6 +43,12 @@ impl Recording {
             Format::Parquet => read::parquet::read_parts(path, unit, mapping, limits, &mut next),
             #[cfg(not(feature = "parquet"))]
             Format::Parquet => return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() }),
+            #[cfg(feature = "logs")]
+            Format::Log => {
+                read::logs::read(path, &mapping.topics, field_is_stated, limits).and_then(&mut next)
+            }
+            #[cfg(not(feature = "logs"))]
+            Format::Log => return Err(ReadError::LogsNotBuilt { path: path.to_path_buf() }),
         };
         read.map_err(misled)?;
         Ok(parts.warnings)
@@ -51,17 +62,75 @@ pub(super) fn opened(
     manifest: Option<Manifest>,
     limits: &Limits,
 ) -> Result<(Format, Manifest, Vec<Warning>), ReadError> {
-    let format =
-        Format::of(path).map_err(|found| ReadError::UnknownFormat { path: path.to_path_buf(), found })?;
+    let format = Format::of(path).map_err(|found| unknown(path, found))?;
     if !path.exists() {
         let found = "there is no such file".to_owned();
         return Err(ReadError::Unreadable { path: path.to_path_buf(), found });
     }
-    let (manifest, warnings) = match manifest {
+    refuse_options(path, format, mapping)?;
+    let (manifest, mut warnings) = match manifest {
         Some(manifest) => (manifest, Vec::new()),
+        None if format == Format::Log => manifest_of_log(path, limits)?,
         None => manifest_of(path, mapping, limits)?,
     };
-    Ok((format, mapping.over(manifest), warnings))
+    let mut manifest = mapping.over(manifest);
+    if format == Format::Log {
+        stamped(path, &mut manifest, &mut warnings);
+        warnings.extend(of_driver(path, &manifest, mapping));
+    }
+    Ok((format, manifest, warnings))
+}
+
+/// A file whose ending is of no format.
+fn unknown(path: &Path, found: String) -> ReadError {
+    let path = path.to_path_buf();
+    if found == ".db3" { ReadError::Sqlite { path } } else { ReadError::UnknownFormat { path, found } }
+}
+
+/// Topics are of a log, and named columns of any other file.
+fn refuse_options(path: &Path, format: Format, mapping: &Mapping) -> Result<(), ReadError> {
+    let fault = match format {
+        Format::Log if mapping.has_columns() => TopicFault::Columns,
+        Format::Csv | Format::CsvGz | Format::Parquet if !mapping.topics.is_empty() => TopicFault::NotALog,
+        _ => return Ok(()),
+    };
+    Err(ReadError::Topics { path: path.to_path_buf(), fault: Box::new(fault) })
+}
+
+/// A log may go without; its messages say their units.
+fn manifest_of_log(path: &Path, limits: &Limits) -> Result<(Manifest, Vec<Warning>), ReadError> {
+    let beside = Manifest::path_beside(path).unwrap_or_else(|| path.with_extension("toml"));
+    match Manifest::read_within(&beside, limits) {
+        Err(ReadError::ManifestMissing { .. }) => Ok((Manifest::default(), Vec::new())),
+        read => {
+            let (manifest, mut warnings) = read?;
+            warnings.retain(|warning| !matches!(warning, Warning::UnitsAssumed { .. }));
+            Ok((manifest, warnings))
+        }
+    }
+}
+
+/// Stamps are in nanoseconds, whatever a manifest says.
+pub(super) fn stamped(path: &Path, manifest: &mut Manifest, warnings: &mut Vec<Warning>) {
+    let unit = mem::replace(&mut manifest.units.t, TimeUnit::Nanosecond);
+    if unit != TimeUnit::Nanosecond && unit != Manifest::default().units.t {
+        warnings.push(Warning::UnitOfStamps { path: path.to_path_buf(), unit });
+    }
+}
+
+/// Units that a driver uses in place of ROS's.
+fn of_driver(path: &Path, manifest: &Manifest, mapping: &Mapping) -> Vec<Warning> {
+    let usual = Manifest::default().units;
+    let stated = |kind: &SensorKind| {
+        manifest.units.of(*kind) != usual.of(*kind) || (*kind == SensorKind::Mag && mapping.states(*kind))
+    };
+    let warning = |kind: SensorKind| Warning::UnitOfDriver {
+        path: path.to_path_buf(),
+        sensor: kind,
+        unit: manifest.units.of(kind),
+        usual: ["m/s^2", "rad/s", "T"][kind as usize],
+    };
+    SensorKind::ALL.into_iter().filter(stated).map(warning).collect()
 }
 
 fn manifest_of(

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{
+    log_topics::TopicFault,
     manifest::fault::ManifestFault,
     mapping::MappingFault,
     place::Place,
@@ -24,7 +25,7 @@ pub enum ReadError {
     Unreadable { path: PathBuf, found: String },
     /// The name says no format there is a reader for.
     #[error(
-        "{path}: found the ending `{found}`, expected .csv, .csv.gz or .parquet; give the samples file, or bring other formats in with `imucal import`"
+        "{path}: found the ending `{found}`, expected .csv, .csv.gz, .parquet, .mcap or .bag; give the samples file, or bring other formats in with `imucal import`"
     )]
     UnknownFormat { path: PathBuf, found: String },
     /// Parquet is not built in.
@@ -32,6 +33,23 @@ pub enum ReadError {
         "{path}: found a Parquet file, expected .csv or .csv.gz since this build is without Parquet; build with `--features parquet` or convert the file to CSV"
     )]
     ParquetNotBuilt { path: PathBuf },
+    /// Logs are not built in.
+    #[error(
+        "{path}: found a robot's log, expected .csv, .csv.gz or .parquet since this build is without logs; build with `--features logs`"
+    )]
+    LogsNotBuilt { path: PathBuf },
+    /// A log in SQLite.
+    #[error(
+        "{path}: found a ROS 2 log in SQLite, expected MCAP; convert it with `ros2 bag convert --input {path} --output-options to.yaml`, where to.yaml has `output_bags: [{{uri: OUT, storage_id: mcap, all: true}}]`"
+    )]
+    Sqlite { path: PathBuf },
+    /// A log that cannot be read.
+    #[cfg(feature = "logs")]
+    #[error(transparent)]
+    Log(Box<imucal_logs::LogError>),
+    /// Topics that are not there, or not those that are asked for.
+    #[error("{path}: {fault}")]
+    Topics { path: PathBuf, fault: Box<TopicFault> },
     /// The compressed or columnar container is damaged.
     #[error("{path}: found a damaged file ({found}), expected {expected}; copy or record it again")]
     Damaged { path: PathBuf, found: String, expected: &'static str },

@@ -156,6 +156,64 @@ pub enum Warning {
         /// Samples file.
         path: PathBuf,
     },
+    /// Something odd in a log.
+    #[error("{path}: {found}")]
+    Log {
+        /// The log.
+        path: PathBuf,
+        /// What it is.
+        found: String,
+    },
+    /// Topics that nobody has asked for.
+    #[error("{path}: took {taken}, there being no other; choose with --topic{}", poses(.references))]
+    TopicsTaken {
+        /// The log.
+        path: PathBuf,
+        /// Each with its type, its number of messages and what it is taken for.
+        taken: String,
+        /// Topics that may be a reference, of which none is taken.
+        references: Vec<String>,
+    },
+    /// Units that are not those of the messages.
+    #[error(
+        "{path}, sensor {sensor}: {unit} is stated, where messages of ROS are in {usual}; the numbers were taken as stated; leave the unit out if the driver keeps to ROS"
+    )]
+    UnitOfDriver {
+        /// The log.
+        path: PathBuf,
+        /// The sensor.
+        sensor: SensorKind,
+        /// The stated unit.
+        unit: Unit,
+        /// That of the message.
+        usual: &'static str,
+    },
+    /// A unit of times that the file does not have.
+    #[error("{path}: t = \"{unit}\" is stated, where the stamps are in ns; it was ignored")]
+    UnitOfStamps {
+        /// The file.
+        path: PathBuf,
+        /// The stated unit.
+        unit: TimeUnit,
+    },
+    /// Samples that do not stand at the times of the rows.
+    #[error(
+        "{path}, `{series}`: {between} of {of} samples stand between the rows and were taken to the nearest one along a straight line (up to {farthest:.6} s; their noise looks smaller by that), and {left_out} without a row of their own were left out"
+    )]
+    Joined {
+        /// The file.
+        path: PathBuf,
+        /// Topic or file of the samples.
+        series: String,
+        /// How many were taken to a row.
+        between: usize,
+        /// How many have none.
+        left_out: usize,
+        /// How many there are.
+        of: usize,
+        /// The longest way to a row, s.
+        farthest: f64,
+    },
     /// The file holds no sensor.
     #[error(
         "{path}: no sensor columns found, expected acc_x, acc_y, acc_z or those of gyr or mag; nothing can be calibrated from it"
@@ -188,6 +246,15 @@ pub enum Warning {
 
 fn units(assumed: &[(&'static str, String)]) -> String {
     assumed.iter().map(|(key, unit)| format!("{key} = \"{unit}\"")).collect::<Vec<_>>().join(", ")
+}
+
+fn poses(there: &[String]) -> String {
+    match there {
+        [] => String::new(),
+        there => {
+            format!("; a reference is only taken by --topic ref=TOPIC (poses are in {})", there.join(", "))
+        }
+    }
 }
 
 fn suggest(nearest: &Option<String>) -> String {

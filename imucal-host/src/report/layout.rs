@@ -1,4 +1,4 @@
-//! The columns of an unknown file, and the command that reads it.
+//! The columns of an unknown file, and the command that reads it, or a log.
 
 use std::path::Path;
 
@@ -16,14 +16,23 @@ pub fn guess(guess: &LayoutGuess, command: &str, path: &Path) -> String {
         let meaning = column.meaning.unwrap_or("not known, and kept as it is");
         text += &format!("  {name:<width$}  {meaning}, first {}\n", shown(&column.first));
     }
-    let mut words = vec!["imucal".to_owned(), command.to_owned(), quoted(&path.display().to_string())];
-    words.extend(with_unknown_units(guess).iter().map(|option| quoted(option)));
     let how = if guess.unknown_units.is_empty() {
         "Then this reads it:"
     } else {
         "Then this reads it, with a unit such as g or deg/s in place of UNIT, or for counts how many make one, such as 16384/g:"
     };
-    text + &format!("{how}\n  {}", words.join(" "))
+    text + &format!("{how}\n  {}", line(command, path, &with_unknown_units(guess)))
+}
+
+/// The command with some options, such as those that choose a topic.
+pub fn command(command: &str, path: &Path, options: &[String]) -> String {
+    format!("For example:\n  {}", line(command, path, options))
+}
+
+fn line(command: &str, path: &Path, options: &[String]) -> String {
+    let mut words = vec!["imucal".to_owned(), command.to_owned(), quoted(&path.display().to_string())];
+    words.extend(options.iter().map(|option| quoted(option)));
+    words.join(" ")
 }
 
 /// The options, and a place for each unit that neither name nor numbers say.

@@ -47,7 +47,6 @@ impl Clock {
     }
 
     /// An integer of a file.
-    #[cfg(feature = "parquet")]
     pub(crate) fn take_integer(&mut self, value: i64) -> f64 {
         let unit = self.unit;
         self.take(value as f64, || Epoch::of_text(&value.to_string(), unit))

@@ -124,6 +124,23 @@ pub(crate) struct Table {
     pub(crate) warnings: Vec<Warning>,
 }
 
+impl Table {
+    /// An infinite number is a fault, but where it says that nothing was measured.
+    pub(crate) fn refuse_infinite(&self, path: &Path) -> Result<(), ReadError> {
+        for (slot, column) in self.columns.iter().enumerate() {
+            if let Some(row) = column.iter().position(|value| value.is_infinite()) {
+                return Err(ReadError::Infinite {
+                    path: path.to_path_buf(),
+                    place: self.places.of(row),
+                    column: NAMES[slot].to_owned(),
+                    found: column[row].to_string(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
 impl Layout {
     /// Understands a header; blanks around names do not count. All that is wrong with it is said at once.
     pub(crate) fn new(header: &[&str], path: &Path) -> Result<Self, ReadError> {

@@ -2,7 +2,7 @@
 //!
 //! | goes in | comes out |
 //! | --- | --- |
-//! | CSV (gzipped or not), Parquet, IMU-TK text; a manifest | a recording in SI, or an error with file, line and column |
+//! | CSV (gzipped or not), Parquet, logs, IMU-TK text, EuRoC folders; a manifest | a recording in SI, or an error with file, line and column |
 
 pub(crate) mod assembly;
 pub(crate) mod clock;
@@ -10,10 +10,15 @@ pub(crate) mod column_guess;
 pub(crate) mod columns;
 pub(crate) mod csv;
 pub(crate) mod csv_rows;
+pub mod euroc;
 pub mod header_fault;
 pub mod imu_tk;
 pub(crate) mod interval;
+pub(crate) mod joined;
+#[cfg(feature = "logs")]
+pub(crate) mod logs;
 pub(crate) mod number;
 #[cfg(feature = "parquet")]
 pub(crate) mod parquet;
 mod text;
+pub(crate) mod z_up;

@@ -63,6 +63,10 @@ fn write_samples(
         }
         #[cfg(not(feature = "parquet"))]
         Format::Parquet => Err(WriteError::ParquetNotBuilt { path: path.to_path_buf() }),
+        Format::Log => {
+            let found = path.extension().unwrap_or_default().to_string_lossy();
+            Err(WriteError::UnknownFormat { path: path.to_path_buf(), found: format!(".{found}") })
+        }
     }
 }
 
