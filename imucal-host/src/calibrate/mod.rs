@@ -20,6 +20,7 @@ pub(crate) mod inertial;
 pub mod known_attitudes;
 pub mod mag;
 pub mod outcome;
+pub mod request;
 pub mod residuals;
 pub mod segmentation;
 pub mod suspicion;

@@ -24,6 +24,7 @@ mod demo;
 mod device;
 mod diagnose;
 mod export;
+mod fitting;
 mod html;
 mod import;
 mod inspect;

@@ -18,6 +18,7 @@ mod parts;
 mod place;
 pub mod read;
 mod read_error;
+mod samples;
 mod sensor_kind;
 pub mod simulated;
 pub mod topic;
@@ -35,6 +36,7 @@ pub use self::{
     order_statistics::median,
     place::Place,
     read_error::ReadError,
+    samples::Samples,
     sensor_kind::SensorKind,
     simulated::{Simulated, Stream},
     triple::{Nominal, Triple},

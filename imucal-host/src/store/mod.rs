@@ -1,6 +1,9 @@
 //! The calibration as it is kept: TOML for people, the record for the device. One content, two forms.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
 
 use imucal_core::record::{self, DecodeError, Defect, EncodeError, HigherOrder, Order};
 use serde::{Deserialize, Serialize};
@@ -261,15 +264,7 @@ impl StoredCalibration {
     /// # Errors
     /// [`SaveError`] names the file and why it cannot be written.
     pub fn write_toml(&self, path: &Path, files: &mut OutputSet) -> Result<(), SaveError> {
-        // The TOML keeps a serial that is too long for a record; what is judged are the figures.
-        if let Ok(record) = self.to_record(path) {
-            let refused =
-                |defect| SaveError::Encode { path: path.into(), cause: EncodeError::Unusable(defect) };
-            record.check().map_err(refused)?;
-        }
-        // Serialising plain numbers and text into a string cannot fail.
-        let text = toml::to_string(self).unwrap_or_default();
-        Ok(files.add(path, text.as_bytes())?)
+        Ok(files.add(path, self.toml(path)?.as_bytes())?)
     }
 
     /// Adds the record to a set of files.
@@ -277,12 +272,44 @@ impl StoredCalibration {
     /// # Errors
     /// [`SaveError`] names the file and why it cannot be written.
     pub fn write_record(&self, path: &Path, files: &mut OutputSet) -> Result<(), SaveError> {
+        Ok(files.add(path, &self.record(path)?)?)
+    }
+
+    /// The TOML that is to be the file `path`.
+    ///
+    /// # Errors
+    /// [`SaveError`], where a figure cannot be used.
+    pub fn toml(&self, path: &Path) -> Result<String, SaveError> {
+        // The TOML keeps a serial that is too long for a record; what is judged are the figures.
+        if let Ok(record) = self.to_record(path) {
+            let refused =
+                |defect| SaveError::Encode { path: path.into(), cause: EncodeError::Unusable(defect) };
+            record.check().map_err(refused)?;
+        }
+        // Serialising plain numbers and text into a string cannot fail.
+        Ok(toml::to_string(self).unwrap_or_default())
+    }
+
+    /// The record's bytes that are to be the file `path`.
+    ///
+    /// # Errors
+    /// [`SaveError`], where a figure cannot be used or a text is too long.
+    pub fn record(&self, path: &Path) -> Result<Vec<u8>, SaveError> {
         let record = self.to_record(path)?;
         let mut buffer = [0; HigherOrder::MAX_LEN];
         let bytes = record::encode(&record, &mut buffer)
             .map_err(|cause| SaveError::Encode { path: path.into(), cause })?;
-        Ok(files.add(path, bytes)?)
+        Ok(bytes.to_vec())
     }
+}
+
+/// Today, UTC; `SOURCE_DATE_EPOCH` overrides it, for outputs that must not depend on the day.
+pub fn today() -> record::Date {
+    let seconds =
+        std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|text| text.parse().ok()).unwrap_or_else(|| {
+            SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs())
+        });
+    record::Date::from_unix(seconds)
 }
 
 /// Line and reason, without a drawing of the line.
