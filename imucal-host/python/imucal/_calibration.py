@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from . import _native
 from ._document import Document
+from ._native import Calibration as Native
 from ._recording import Path, Recording, options
 
 _SENSORS = ("acc", "gyr", "mag")
@@ -93,10 +94,10 @@ class Calibration(Document):
     warnings: list[str]
     #: Whether something was accepted, every sensor that was named in ``models`` too, and nothing is suspect that may not be.
     ok: bool
-    _native: _native.Calibration = field(repr=False)
+    _native: Native = field(repr=False)
 
     @classmethod
-    def _of(cls, native: _native.Calibration) -> Calibration:
+    def _of(cls, native: Native) -> Calibration:
         text = native.json()
         document: dict[str, Any] = json.loads(text)
         found = document["sensors"] if "sensors" in document else document

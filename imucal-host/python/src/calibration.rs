@@ -121,7 +121,5 @@ pub(crate) fn calibrate(
 /// Loads a calibration from TOML or from a record.
 #[pyfunction]
 pub(crate) fn load(path: PathBuf) -> PyResult<Calibration> {
-    StoredCalibration::load(&path)
-        .map(|stored| Calibration(Origin::Loaded(stored)))
-        .map_err(failure::unread)
+    StoredCalibration::load(&path).map(|stored| Calibration(Origin::Loaded(stored))).map_err(failure::unread)
 }

@@ -43,14 +43,15 @@ pub(crate) fn correct<'py>(
     temperature: Option<PyReadonlyArray1<'py, f32>>,
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let found = sensor(kind);
-    let kind = found.ok_or_else(|| {
-        failure::option(format!("found the sensor `{kind}`, expected acc, gyr or mag"))
-    })?;
+    let kind = found
+        .ok_or_else(|| failure::option(format!("found the sensor `{kind}`, expected acc, gyr or mag")))?;
     let stored = calibration.stored();
     let record = stored.to_record(Path::new(NAME)).map_err(failure::mismatch)?;
     let core = corrector(&record, kind).map_err(failure::mismatch)?;
     let mut core = core.ok_or_else(|| {
-        failure::mismatch(format!("{kind}: found samples, expected none, since the calibration has no such sensor"))
+        failure::mismatch(format!(
+            "{kind}: found samples, expected none, since the calibration has no such sensor"
+        ))
     })?;
     let shape = raw.as_array().dim();
     let (samples, rest) = raw.as_slice().map_err(failure::option)?.as_chunks::<3>();

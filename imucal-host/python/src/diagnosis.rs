@@ -29,7 +29,8 @@ pub(crate) fn diagnose(
     watch: Option<PathBuf>,
 ) -> PyResult<(String, String)> {
     let limits = Limits::default();
-    let own = effects.as_deref().map(|path| user::read(path, &limits)).transpose().map_err(failure::unread)?;
+    let own =
+        effects.as_deref().map(|path| user::read(path, &limits)).transpose().map_err(failure::unread)?;
     let own = own.unwrap_or_default();
     let without =
         user::known(&without, &own).map_err(|unknown| failure::option(format!("without: {unknown}")))?;

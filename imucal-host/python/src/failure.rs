@@ -6,7 +6,12 @@ use pyo3::{PyErr, create_exception, exceptions::PyException};
 
 create_exception!(imucal, ImucalError, PyException, "What imucal cannot do, and why.");
 create_exception!(imucal, ReadError, ImucalError, "A file or an array that is not what it should be.");
-create_exception!(imucal, OptionError, ImucalError, "An argument that means nothing, or not for this recording.");
+create_exception!(
+    imucal,
+    OptionError,
+    ImucalError,
+    "An argument that means nothing, or not for this recording."
+);
 create_exception!(imucal, MismatchError, ImucalError, "A calibration that is not for this recording.");
 create_exception!(imucal, WriteError, ImucalError, "A file that cannot be written.");
 

@@ -46,7 +46,9 @@ pub(crate) fn simulate(
     for (id, size) in effects {
         let effect = user::named("effect", &id, &own).map_err(failure::option)?;
         if !size.is_finite() {
-            return Err(failure::option(format!("the size {size} of {id} is no number; expected for instance 2")));
+            return Err(failure::option(format!(
+                "the size {size} of {id} is no number; expected for instance 2"
+            )));
         }
         simulation.add(effect, size).map_err(failure::option)?;
     }

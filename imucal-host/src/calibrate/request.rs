@@ -121,9 +121,10 @@ impl Request {
     ///
     /// [`RequestFault::Twice`].
     pub fn with_models(self, models: &[ModelOf]) -> Result<Self, RequestFault> {
-        let twice = models.iter().enumerate().find(|(index, model)| {
-            models[..*index].iter().any(|other| other.kind == model.kind)
-        });
+        let twice = models
+            .iter()
+            .enumerate()
+            .find(|(index, model)| models[..*index].iter().any(|other| other.kind == model.kind));
         match twice {
             Some((_, model)) => Err(RequestFault::Twice { kind: model.kind }),
             None => Ok(Self { models: models.to_vec(), ..self }),
@@ -174,9 +175,8 @@ impl Request {
     /// Something has passed, everything that was named has, and nothing is suspect that may not be.
     #[must_use]
     pub fn is_met(&self, calibration: &Calibration) -> bool {
-        let has = |kind: SensorKind| {
-            calibration.sensor(kind).is_some_and(|outcome| self.passes(outcome.status()))
-        };
+        let has =
+            |kind: SensorKind| calibration.sensor(kind).is_some_and(|outcome| self.passes(outcome.status()));
         let suspect = calibration.sensors.iter().any(|outcome| outcome.status() == Status::Suspect);
         let any = SensorKind::ALL.into_iter().any(has);
         any && self.named().all(has) && (self.accept_suspect || !suspect)

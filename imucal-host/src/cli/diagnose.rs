@@ -14,8 +14,7 @@ use super::{
     own_effects,
     progress::Progress,
     reading::Reading,
-    refuse,
-    warn,
+    refuse, warn,
 };
 use crate::{
     diagnosis::{Diagnosis, Options, Verdict, diagnose, proposal::confirmation},

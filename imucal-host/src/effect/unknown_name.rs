@@ -19,11 +19,7 @@ pub struct UnknownName {
 
 impl UnknownName {
     /// A name that is not among these.
-    pub fn of<'a>(
-        what: &'static str,
-        found: &str,
-        names: impl IntoIterator<Item = &'a str> + Clone,
-    ) -> Self {
+    pub fn of<'a>(what: &'static str, found: &str, names: impl IntoIterator<Item = &'a str> + Clone) -> Self {
         let advice = match nearest(found, names.clone(), NEAR) {
             Some(name) => format!("did you mean `{name}`?"),
             None => format!("expected one of {}", names.into_iter().collect::<Vec<_>>().join(", ")),

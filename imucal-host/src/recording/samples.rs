@@ -69,7 +69,8 @@ impl Recording {
         let gyr = triple(SensorKind::Gyr, samples.gyr)?;
         let mag = triple(SensorKind::Mag, samples.mag)?;
         let angle = 1.0 / manifest.units.gimbal.per_si();
-        let turned = |rows: Vec<[f64; 3]>| rows.into_iter().map(|row| row.map(|value| value * angle)).collect();
+        let turned =
+            |rows: Vec<[f64; 3]>| rows.into_iter().map(|row| row.map(|value| value * angle)).collect();
         // Trackers write so where they lost the body.
         let seen = |value: f64| if value.is_infinite() { f64::NAN } else { value };
         let placed = |rows: Vec<[f64; 3]>| rows.into_iter().map(|row| row.map(seen)).collect();
@@ -142,7 +143,8 @@ fn check_finite(path: &Path, samples: &Samples) -> Result<(), ReadError> {
             })
         })
     };
-    let sensors = [(SensorKind::Acc, &samples.acc), (SensorKind::Gyr, &samples.gyr), (SensorKind::Mag, &samples.mag)];
+    let sensors =
+        [(SensorKind::Acc, &samples.acc), (SensorKind::Gyr, &samples.gyr), (SensorKind::Mag, &samples.mag)];
     let mut found = sensors.into_iter().find_map(|(kind, values)| {
         infinite(&mut values.iter().flatten().map(Vector3::as_slice), &kind.columns())
     });

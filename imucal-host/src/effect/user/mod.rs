@@ -113,11 +113,7 @@ pub fn find_among(id: &str, own: &[&'static Effect]) -> Option<&'static Effect> 
 /// # Errors
 ///
 /// [`UnknownName`], with the nearest id.
-pub fn named(
-    what: &'static str,
-    id: &str,
-    own: &[&'static Effect],
-) -> Result<&'static Effect, UnknownName> {
+pub fn named(what: &'static str, id: &str, own: &[&'static Effect]) -> Result<&'static Effect, UnknownName> {
     let ids = CATALOGUE.iter().chain(own.iter().copied()).map(|effect| effect.id.as_str());
     find_among(id, own).ok_or_else(|| UnknownName::of(what, id, ids))
 }
