@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pathlib
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,25 +27,29 @@ def test_an_array_is_copied_once_and_cannot_be_written_to(rig: imucal.Recording)
         first = getattr(rig, name)
         assert getattr(rig, name) is first, name
         assert first.flags.c_contiguous and not first.flags.writeable, name
-        # A view of it is no copy either.
-        assert np.shares_memory(first, first[1:]), name
         with pytest.raises(ValueError, match="read-only"):
             first[0] = 0.0
-    # The numbers of a sensor were taken over by numpy: their owner is the library's vector.
-    assert rig.acc is not None and not rig.acc.flags.owndata
-    base = rig.acc
-    while isinstance(base.base, np.ndarray):
+    assert rig.acc is not None
+    assert owner(rig.acc) == LIBRARY
+
+
+#: What owns numbers that numpy has taken over from the library without a copy.
+LIBRARY = "PySliceContainer"
+
+
+def owner(array: "np.ndarray[Any, Any]") -> str:
+    """Type of what owns an array's numbers."""
+    base: Any = array
+    while getattr(base, "base", None) is not None:
         base = base.base
-    assert type(base.base).__name__ == "PySliceContainer"
+    return type(base).__name__
 
 
 def test_corrected_arrays_are_not_copied(calibration: imucal.Calibration) -> None:
+    kind = next(kind for kind, sensor in calibration.sensors.items() if sensor.status == "accepted")
     raw = np.full((5, 3), 32768, dtype=np.float32)
-    found = imucal.apply({"acc": raw}, calibration)["acc"]
-    base = found
-    while isinstance(base.base, np.ndarray):
-        base = base.base
-    assert type(base.base).__name__ == "PySliceContainer" and found.flags.c_contiguous
+    found = imucal.apply({kind: raw}, calibration)[kind]
+    assert owner(found) == LIBRARY and found.flags.c_contiguous and owner(raw) == "ndarray"
 
 
 def test_arrays_make_the_recording_that_a_file_of_them_is(tmp_path: pathlib.Path) -> None:
