@@ -111,10 +111,22 @@ pub fn apply(
     record: &CalibrationRecord<HigherOrder>,
 ) -> Result<Recording, TooSteep> {
     apply_by(recording, stored, |kind, raw, warmth| {
-        let Some(triad) = record.triad(kind.into()) else { return Ok(raw.to_vec()) };
-        let mut core = Compensator::new(FullCorrector::<f32>::try_from(triad)?);
+        let Some(mut core) = corrector(record, kind)? else { return Ok(raw.to_vec()) };
         Ok(raw.iter().zip(warmth).map(|(raw, warmth)| core.apply_at(raw, *warmth)).collect())
     })
+}
+
+/// What corrects samples of a sensor in `f32`, one after another, as a device does: raw values in the calibration's
+/// `unit_in`, °C or NaN next to each, calibrated values in its `unit_out`. `None` for a sensor that has no calibration.
+///
+/// # Errors
+/// As [`apply`].
+pub fn corrector(
+    record: &CalibrationRecord<HigherOrder>,
+    kind: SensorKind,
+) -> Result<Option<Compensator<f32, FullCorrector<f32>>>, TooSteep> {
+    let Some(triad) = record.triad(kind.into()) else { return Ok(None) };
+    Ok(Some(Compensator::new(FullCorrector::<f32>::try_from(triad)?)))
 }
 
 /// The same, corrected by whoever is called: with a sensor, its raw samples, and the temperature of each, °C or NaN.

@@ -51,6 +51,15 @@ pub struct Noise {
     pub warnings: Vec<Warning>,
 }
 
+impl Noise {
+    /// Everything that is odd, in words: what the reader noticed, and what the samples showed.
+    #[must_use]
+    pub fn messages(&self) -> Vec<String> {
+        let remarks = self.remarks.iter().map(ToString::to_string);
+        self.warnings.iter().map(ToString::to_string).chain(remarks).collect()
+    }
+}
+
 /// Reads a recording of any length, and estimates the noise of its sensors.
 ///
 /// # Errors

@@ -1,9 +1,8 @@
 //! `imucal calibrate`
 
-use std::{path::PathBuf, time::SystemTime};
+use std::path::PathBuf;
 
 use clap::Args;
-use imucal_core::record::Date;
 
 use super::{
     Ending,
@@ -24,6 +23,8 @@ use crate::{
     report,
     store::{StoredCalibration, form::Form},
 };
+
+pub(super) use crate::store::today;
 
 #[derive(Args, Debug)]
 #[command(
@@ -65,7 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let progress = Progress::start();
     let calibration = calibrate(&recording, &request.options(), &|stage| progress.stage(stage));
     drop(progress);
-    let json = serde_json::to_string_pretty(&report::json::calibration(&calibration))? + "\n";
+    let json = report::json::text(&calibration);
     print(arguments, &calibration, &json)?;
     write(arguments, &request, (&recording, &calibration), &json, files)?;
     Ok(if request.is_met(&calibration) { Ending::Done } else { Ending::Refused })
@@ -118,13 +119,4 @@ fn write(
         stored.write_record(path, &mut files)?;
     }
     Ok(files.commit()?)
-}
-
-/// Today, UTC; `SOURCE_DATE_EPOCH` overrides it, for outputs that must not depend on the day.
-pub(super) fn today() -> Date {
-    let seconds =
-        std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|text| text.parse().ok()).unwrap_or_else(|| {
-            SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs())
-        });
-    Date::from_unix(seconds)
 }

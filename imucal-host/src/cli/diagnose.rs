@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
-use imucal_core::watch::WatchSummary;
 
 use super::{
     Ending,
@@ -15,13 +14,11 @@ use super::{
     own_effects,
     progress::Progress,
     reading::Reading,
-    refuse,
-    simulate::unknown,
-    warn,
+    refuse, warn,
 };
 use crate::{
     diagnosis::{Diagnosis, Options, Verdict, diagnose, proposal::confirmation},
-    effect::{CATALOGUE, Effect, user},
+    effect::{Effect, user},
     file::OutputSet,
     page,
     recording::{self, Mapping, Recording, Stream, Warning},
@@ -79,18 +76,9 @@ pub(super) struct Arguments {
     reading: Reading,
 }
 
-/// An id of the catalogue or of the user's own effects.
-fn known(id: &str, own: &[&'static Effect]) -> Result<String, String> {
-    let ids = CATALOGUE.iter().chain(own.iter().copied()).map(|effect| effect.id.as_str());
-    user::find_among(id, own)
-        .map(|effect| effect.id.clone())
-        .ok_or_else(|| unknown("effect or term", id, ids))
-}
-
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let own = own_effects(arguments.effects.as_deref(), &arguments.reading.limits())?;
-    let without: Result<Vec<String>, String> = arguments.without.iter().map(|id| known(id, &own)).collect();
-    let without = without.map_err(|unknown| anyhow::anyhow!("--without: {unknown}"))?;
+    let without = user::known(&arguments.without, &own).context("--without")?;
     let Some(path) = arguments.recording.as_deref().filter(|_| !arguments.list) else {
         output::text(&report::catalogue::catalogue(&own))?;
         return Ok(Ending::Done);
@@ -113,8 +101,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let topic = arguments.sim_topic.as_deref();
     let stream = arguments.sim.as_deref().map(|path| stream(path, topic, &recording, arguments.reading));
     let stream = stream.transpose()?;
+    let limits = arguments.reading.limits();
     let watch =
-        arguments.watch.as_deref().map(|path| watch_of(path, &recording, arguments.reading)).transpose()?;
+        arguments.watch.as_deref().map(|path| watch_file::read_of(path, &recording, &limits)).transpose()?;
     let options = Options { without, model, stream, effects: own, frozen, watch, settings: None };
     let progress = Progress::start();
     let diagnosis = diagnose(&recording, &options, &|stage| progress.stage(stage));
@@ -124,35 +113,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     Ok(if diagnosis.verdict == Verdict::NotTestable { Ending::Refused } else { Ending::Done })
 }
 
-/// The summary of a drift watch, which must be of the recording's unit where both are known.
-fn watch_of(path: &Path, recording: &Recording, reading: Reading) -> anyhow::Result<WatchSummary> {
-    let summary = watch_file::read_within(path, &reading.limits())?;
-    let (found, expected) =
-        (summary.sensor.serial.as_str(), recording.manifest.sensor.serial.as_deref().unwrap_or_default());
-    if !found.is_empty() && !expected.is_empty() && found != expected {
-        anyhow::bail!(
-            "{}: found the drift watch of the unit `{found}`, expected that of the recording, `{expected}`; give the summary of \
-             that unit",
-            path.display()
-        );
-    }
-    Ok(summary)
-}
-
 /// The text of the user's file, where its effects are to be confirmed.
 fn frozen(arguments: &Arguments, own: &[&'static Effect]) -> anyhow::Result<Option<String>> {
-    let Some(path) = arguments.effects.as_deref().filter(|_| arguments.frozen) else { return Ok(None) };
-    if let Some(effect) = confirmation::without_values(own).first() {
-        anyhow::bail!(
-            "{}: found no fitted values of {}, expected `fitted` with a value and a std_error for each amplitude; leave \
-             --frozen out to fit them",
-            path.display(),
-            effect.id
-        );
-    }
-    let bytes = arguments.reading.limits().read_small(path);
-    let bytes = bytes.map_err(|fault| anyhow::anyhow!("{}: {fault}", path.display()))?;
-    Ok(Some(String::from_utf8_lossy(&bytes).into_owned()))
+    let path = arguments.effects.as_deref().filter(|_| arguments.frozen);
+    Ok(path.map(|path| confirmation::frozen(path, own, &arguments.reading.limits())).transpose()?)
 }
 
 /// A simulator's stream for a recording, of a topic where its file has several.
@@ -167,20 +131,8 @@ fn stream(
     let simulated = Recording::read_as(path, &mapping, &reading.limits())
         .map_err(|error| columns::explained(path, error, reading))?;
     simulated.warnings.iter().filter(|warning| !is_expected(warning)).for_each(|warning| warn(warning));
-    if let Some(topic) = topic.filter(|_| !is_log) {
-        return Stream::of_topic(&simulated, recording, topic).with_context(|| path.display().to_string());
-    }
-    Stream::beside(&simulated, recording).with_context(|| {
-        let topics = recording::topic::names(&simulated);
-        let remedy = match topics.as_slice() {
-            [] => "export what an ideal sensor would read".to_owned(),
-            topics => format!("choose a topic with --sim-topic: {}", topics.join(", ")),
-        };
-        format!(
-            "{}: found no stream of a simulator, expected columns sim_acc_*, sim_gyr_* or sim_mag_*; {remedy}",
-            path.display()
-        )
-    })
+    let topic = topic.filter(|_| !is_log);
+    Stream::chosen(&simulated, recording, topic).with_context(|| path.display().to_string())
 }
 
 /// A simulator's topic of a log, and nothing that others have recorded.
@@ -207,8 +159,7 @@ fn print(arguments: &Arguments, diagnosis: &Diagnosis, mut files: OutputSet) -> 
     }
     let mut printed = None;
     if let Some(path) = &arguments.json {
-        let text =
-            serde_json::to_string_pretty(diagnosis).context("the diagnosis cannot be spelt as JSON")? + "\n";
+        let text = diagnosis.text();
         match path.as_os_str() == "-" {
             true => printed = Some(text),
             false => files.add(path, text.as_bytes())?,
@@ -218,16 +169,5 @@ fn print(arguments: &Arguments, diagnosis: &Diagnosis, mut files: OutputSet) -> 
     match printed {
         Some(json) => output::document(&json),
         None => output::text(&report::diagnosis::page(diagnosis)),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_what_the_catalogue_holds_can_be_left_out() {
-        assert_eq!(known("acc.misalignment", &[]).unwrap(), "acc.misalignment");
-        assert!(known("acc.misalinment", &[]).unwrap_err().contains("did you mean `acc.misalignment`"));
     }
 }

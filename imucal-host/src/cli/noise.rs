@@ -61,8 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mapping = arguments.columns.mapping()?;
     let noise = allan::noise(&arguments.recording, &mapping, &arguments.reading.limits())
         .map_err(|error| columns::explained(&arguments.recording, error, arguments.reading))?;
-    let mut warnings: Vec<String> = noise.warnings.iter().map(ToString::to_string).collect();
-    warnings.extend(noise.remarks.iter().map(ToString::to_string));
+    let warnings = noise.messages();
     warnings.iter().for_each(|warning| warn(warning));
     let file = NoiseFile::new(&noise, warnings);
     if let Some(path) = arguments.json.as_ref().filter(|_| !on_screen) {

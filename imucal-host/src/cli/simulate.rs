@@ -17,12 +17,9 @@ use crate::{
         case::{Omission, omission},
         seal::{Nonce, digest},
     },
-    effect::{CATALOGUE, Effect, user},
+    effect::{CATALOGUE, Effect, UnknownName, user},
     file::{Limits, OutputSet},
-    recording::{
-        Manifest,
-        manifest::{Axis, spelling::nearest},
-    },
+    recording::{Manifest, manifest::Axis},
     report,
     simulator::{
         Conditions, Dose, Programme, Simulation, UnitKind,
@@ -30,9 +27,6 @@ use crate::{
         robot::{MismatchKind, RobotKind, RobotScene},
     },
 };
-
-/// Edits within which a misspelt name is taken for a known one.
-const NEAR: usize = 8;
 
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  imucal simulate --programme full --effect acc.scale_cubic --out rig.csv")]
@@ -119,25 +113,13 @@ fn size(text: &str) -> Result<(String, f64), String> {
     Ok((id.to_owned(), size))
 }
 
-/// The effect of an id of the catalogue or of the user's own.
-fn known(id: &str, own: &[&'static Effect]) -> Result<&'static Effect, String> {
-    let ids = CATALOGUE.iter().chain(own.iter().copied()).map(|effect| &*effect.id);
-    user::find_among(id, own).ok_or_else(|| unknown("effect", id, ids))
-}
-
 /// What was found, and the nearest name or all there are.
 pub(super) fn unknown<'a>(
-    what: &str,
+    what: &'static str,
     found: &str,
     names: impl IntoIterator<Item = &'a str> + Clone,
 ) -> String {
-    match nearest(found, names.clone(), NEAR) {
-        Some(name) => format!("there is no {what} `{found}`; did you mean `{name}`?"),
-        None => {
-            let list: Vec<&str> = names.into_iter().collect();
-            format!("there is no {what} `{found}`; expected one of {}", list.join(", "))
-        }
-    }
+    UnknownName::of(what, found, names).to_string()
 }
 
 fn axes(text: &str) -> Result<[Axis; 3], String> {
@@ -161,7 +143,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         return Ok(Ending::Done);
     };
     let sized = |(id, size): &(String, f64)| -> anyhow::Result<(&'static Effect, f64)> {
-        let effect = known(id, &own).map_err(|unknown| anyhow::anyhow!("--effect: {unknown}"))?;
+        let effect = user::named("effect", id, &own).context("--effect")?;
         Ok((effect, *size))
     };
     let effects: Vec<_> = arguments.doses.iter().map(sized).collect::<Result<_, _>>()?;
@@ -306,12 +288,11 @@ mod tests {
 
     #[test]
     fn an_unknown_name_is_answered_with_the_nearest() {
-        assert!(known("acc.leverarm", &[]).unwrap_err().contains("did you mean `acc.lever_arm`"));
+        let known = |id: &str| user::named("effect", id, &[]).map_err(|unknown| unknown.to_string());
+        assert!(known("acc.leverarm").unwrap_err().contains("did you mean `acc.lever_arm`"));
         assert!(programme("rate").unwrap_err().contains("`rates`"));
         assert!(unit("mti").unwrap_err().contains("`mtx`"));
-        assert!(
-            known("something else entirely", &[]).unwrap_err().contains("expected one of rig.level_tilt")
-        );
+        assert!(known("something else entirely").unwrap_err().contains("expected one of rig.level_tilt"));
     }
 
     #[test]

@@ -79,6 +79,13 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// The text of its file.
+    #[must_use]
+    pub fn text(&self) -> String {
+        // Plain numbers and text: nothing that cannot be written.
+        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+
     /// With the words of those effects of a user that it names.
     #[must_use]
     pub fn with_words_of(mut self, own: &[&'static Effect]) -> Self {

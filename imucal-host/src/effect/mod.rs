@@ -73,6 +73,7 @@ mod tremble;
 mod triad_entries;
 mod truth;
 mod unit_error;
+mod unknown_name;
 pub mod user;
 mod vibration_rectification;
 mod warmup;
@@ -90,6 +91,7 @@ pub use self::{
     sensor_run::{DataRun, SensorRun, SignalRun},
     triad_entries::TriadEntries,
     truth::{Input, Truth},
+    unknown_name::UnknownName,
     words::{Confusable, Words},
 };
 

@@ -19,6 +19,7 @@ mod parts;
 mod place;
 pub mod read;
 mod read_error;
+mod samples;
 mod sensor_kind;
 pub mod simulated;
 pub mod topic;
@@ -36,6 +37,7 @@ pub use self::{
     order_statistics::median,
     place::Place,
     read_error::ReadError,
+    samples::Samples,
     sensor_kind::SensorKind,
     simulated::{Simulated, Stream},
     triple::{Nominal, Triple},

@@ -140,6 +140,12 @@ pub enum ReadError {
     )]
     RowsDiffer { path: PathBuf, found: usize, other: PathBuf, expected: usize },
 
+    /// Samples in memory that differ in length.
+    #[error(
+        "{path}, column `{column}`: found {found} rows, expected {expected} as there are times; give all columns of one length"
+    )]
+    Lengths { path: PathBuf, column: String, found: usize, expected: usize },
+
     /// No manifest.
     #[error(
         "{path}: not found, expected the manifest of the recording {recording} there; write it, for example:\n{}",

@@ -140,6 +140,23 @@ impl Stream {
         Ok(stream.on_times_of(simulated, recording))
     }
 
+    /// The stream that a topic names or, without one, as [`Stream::beside`].
+    ///
+    /// # Errors
+    ///
+    /// [`TopicError`].
+    pub fn chosen(
+        simulated: &Recording,
+        recording: &Recording,
+        topic: Option<&str>,
+    ) -> Result<Self, TopicError> {
+        match topic {
+            Some(topic) => Self::of_topic(simulated, recording, topic),
+            None => Self::beside(simulated, recording)
+                .ok_or_else(|| TopicError::NoStream { there: topic::names(simulated) }),
+        }
+    }
+
     /// On the times of a recording, where both files have absolute times.
     fn on_times_of(mut self, simulated: &Recording, recording: &Recording) -> Self {
         if let (Some(own), Some(others)) = (simulated.epoch, recording.epoch) {

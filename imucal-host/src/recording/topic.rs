@@ -17,6 +17,15 @@ pub enum TopicError {
         /// Topics of the file.
         there: Vec<String>,
     },
+    /// Neither columns of a simulator nor the name of a topic.
+    #[error(
+        "found no stream of a simulator, expected columns sim_acc_*, sim_gyr_* or sim_mag_*; {}",
+        remedy(.there)
+    )]
+    NoStream {
+        /// Topics of the file.
+        there: Vec<String>,
+    },
     /// A sensor lacks an axis.
     #[error("topic `{name}`: column `{column}` is missing; add it, or leave the sensor's other axes out")]
     Incomplete {
@@ -35,6 +44,13 @@ pub enum TopicError {
         /// The field.
         found: String,
     },
+}
+
+fn remedy(there: &[String]) -> String {
+    match there {
+        [] => "export what an ideal sensor would read".to_owned(),
+        topics => format!("choose a topic with --sim-topic: {}", topics.join(", ")),
+    }
 }
 
 fn listed(there: &[String]) -> String {

@@ -32,6 +32,12 @@ pub fn calibration(calibration: &Calibration) -> Value {
     })
 }
 
+/// The document's text, as `imucal calibrate --json` writes it.
+pub fn text(found: &Calibration) -> String {
+    // `Value` shows itself as JSON, indented by `#`; nothing of it cannot be written.
+    format!("{:#}\n", calibration(found))
+}
+
 fn rows(m: &Matrix3<f64>) -> Value {
     json!((0..3).map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]]).collect::<Vec<_>>())
 }

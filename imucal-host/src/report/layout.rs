@@ -9,19 +9,14 @@ const WIDEST: usize = 24;
 
 /// What each column probably is, and the command with the options that say so.
 pub fn guess(guess: &LayoutGuess, command: &str, path: &Path) -> String {
-    let width = guess.columns.iter().map(|column| shown(&column.name).chars().count()).max().unwrap_or(0);
-    let mut text = "Its columns are probably these:\n".to_owned();
-    for column in &guess.columns {
-        let name = shown(&column.name);
-        let meaning = column.meaning.unwrap_or("not known, and kept as it is");
-        text += &format!("  {name:<width$}  {meaning}, first {}\n", shown(&column.first));
-    }
+    let mut text = columns(guess);
     let how = if guess.unknown_units.is_empty() {
         "Then this reads it:"
     } else {
         "Then this reads it, with a unit such as g or deg/s in place of UNIT, or for counts how many make one, such as 16384/g:"
     };
-    text + &format!("{how}\n  {}", line(command, path, &with_unknown_units(guess)))
+    text += &format!("{how}\n  {}", line(command, path, &with_unknown_units(guess)));
+    text
 }
 
 /// The command with some options, such as those that choose a topic.
@@ -35,8 +30,20 @@ fn line(command: &str, path: &Path, options: &[String]) -> String {
     words.join(" ")
 }
 
+/// What each column probably is, a line each.
+pub fn columns(guess: &LayoutGuess) -> String {
+    let width = guess.columns.iter().map(|column| shown(&column.name).chars().count()).max().unwrap_or(0);
+    let mut text = "Its columns are probably these:\n".to_owned();
+    for column in &guess.columns {
+        let name = shown(&column.name);
+        let meaning = column.meaning.unwrap_or("not known, and kept as it is");
+        text += &format!("  {name:<width$}  {meaning}, first {}\n", shown(&column.first));
+    }
+    text
+}
+
 /// The options, and a place for each unit that neither name nor numbers say.
-fn with_unknown_units(guess: &LayoutGuess) -> Vec<String> {
+pub fn with_unknown_units(guess: &LayoutGuess) -> Vec<String> {
     let mut options = guess.options.clone();
     let unknown: Vec<String> = guess.unknown_units.iter().map(|kind| format!("{kind}=UNIT")).collect();
     if unknown.is_empty() {

@@ -1,6 +1,9 @@
 //! The calibration as it is kept: TOML for people, the record for the device. One content, two forms.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
 
 use imucal_core::record::{self, DecodeError, Defect, EncodeError, HigherOrder, Order};
 use serde::{Deserialize, Serialize};
@@ -298,6 +301,15 @@ impl StoredCalibration {
             .map_err(|cause| SaveError::Encode { path: path.into(), cause })?;
         Ok(bytes.to_vec())
     }
+}
+
+/// Today, UTC; `SOURCE_DATE_EPOCH` overrides it, for outputs that must not depend on the day.
+pub fn today() -> record::Date {
+    let seconds =
+        std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|text| text.parse().ok()).unwrap_or_else(|| {
+            SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs())
+        });
+    record::Date::from_unix(seconds)
 }
 
 /// Line and reason, without a drawing of the line.

@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 
 use imucal_core::watch::{self, SummaryError, WatchSummary};
 
-use crate::file::{Limits, ReadFault, limits::Size};
+use crate::{
+    file::{Limits, ReadFault, limits::Size},
+    recording::Recording,
+};
 
 /// What a summary begins with.
 const MAGIC: &[u8] = b"IMUW";
@@ -29,6 +32,19 @@ pub enum WatchFileError {
         path: PathBuf,
         /// What a small file may come to.
         limit: Size,
+    },
+    /// It is of another unit than a recording.
+    #[error(
+        "{path}: found the drift watch of the unit `{found}`, expected that of the recording, `{expected}`; give the summary of \
+         that unit"
+    )]
+    OtherUnit {
+        /// The file.
+        path: PathBuf,
+        /// Serial number of the summary.
+        found: String,
+        /// Serial number of the recording.
+        expected: String,
     },
     /// The bytes are no summary.
     #[error("{path}: {cause}; read the summary from the device again")]
@@ -55,4 +71,19 @@ pub fn read_within(path: &Path, limits: &Limits) -> Result<WatchSummary, WatchFi
         ReadFault::TooLarge { limit } => WatchFileError::TooLarge { path: path.into(), limit: Size(limit) },
     })?;
     watch::decode(&bytes).map_err(|cause| WatchFileError::Summary { path: path.into(), cause })
+}
+
+/// As [`read_within`]; the summary must be of the recording's unit where both are known.
+///
+/// # Errors
+/// As [`read_within`], and [`WatchFileError::OtherUnit`].
+pub fn read_of(path: &Path, recording: &Recording, limits: &Limits) -> Result<WatchSummary, WatchFileError> {
+    let summary = read_within(path, limits)?;
+    let (found, expected) =
+        (summary.sensor.serial.as_str(), recording.manifest.sensor.serial.as_deref().unwrap_or_default());
+    if !found.is_empty() && !expected.is_empty() && found != expected {
+        let (found, expected) = (found.to_owned(), expected.to_owned());
+        return Err(WatchFileError::OtherUnit { path: path.into(), found, expected });
+    }
+    Ok(summary)
 }

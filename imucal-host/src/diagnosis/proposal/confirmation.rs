@@ -10,6 +10,8 @@
 //! It is confirmed where the prediction, nothing of it fitted, closes at least half of what is left of its sensor's gap, with an
 //! interval above zero, and the factor s that would suit this recording best is near one.
 
+use std::path::{Path, PathBuf};
+
 use super::{
     problem::{Problem, Run},
     proposer::asserted,
@@ -30,6 +32,7 @@ use crate::{
         verdict::shares,
     },
     effect::{Act, Effect, user::Fitted},
+    file::{Limits, ReadFault},
     recording::SensorKind,
 };
 
@@ -50,6 +53,44 @@ struct Predicted {
     /// ln of the probability of the data with the prediction and the set.
     value: f64,
     proposal: Proposal,
+}
+
+/// Why the effects of a file cannot be confirmed.
+#[derive(Debug, thiserror::Error)]
+pub enum FrozenFault {
+    /// One of them has no values.
+    #[error(
+        "{path}: found no fitted values of {effect}, expected `fitted` with a value and a std_error for each amplitude; leave \
+         --frozen out to fit them"
+    )]
+    Unfitted {
+        /// The file.
+        path: PathBuf,
+        /// The effect.
+        effect: String,
+    },
+    /// The file cannot be read again.
+    #[error("{path}: {cause}")]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: ReadFault,
+    },
+}
+
+/// The text of a file whose effects are to be confirmed; all of them have fitted values.
+///
+/// # Errors
+///
+/// [`FrozenFault`].
+pub fn frozen(path: &Path, effects: &[&'static Effect], limits: &Limits) -> Result<String, FrozenFault> {
+    if let Some(effect) = without_values(effects).first() {
+        return Err(FrozenFault::Unfitted { path: path.to_owned(), effect: effect.id.clone() });
+    }
+    let bytes = limits.read_small(path);
+    let bytes = bytes.map_err(|cause| FrozenFault::Unreadable { path: path.to_owned(), cause })?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
 /// Effects of a file without the values that a confirmation needs.

@@ -27,7 +27,7 @@ pub use self::{
     fault::{EntryFault, FormulaFault, UserEffectError},
     formula::{Formula, NotFinite},
 };
-use super::{CATALOGUE, Effect, NUISANCES};
+use super::{CATALOGUE, Effect, NUISANCES, UnknownName};
 use crate::file::Limits;
 
 mod entry;
@@ -106,6 +106,25 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<&'static Effect>, UserEffect
 /// The effect of an id among the catalogue's and these.
 pub fn find_among(id: &str, own: &[&'static Effect]) -> Option<&'static Effect> {
     super::find(id).or_else(|| own.iter().copied().find(|effect| effect.id == id))
+}
+
+/// The effect of an id of the catalogue or of the user's own; `what` names it in a message.
+///
+/// # Errors
+///
+/// [`UnknownName`], with the nearest id.
+pub fn named(what: &'static str, id: &str, own: &[&'static Effect]) -> Result<&'static Effect, UnknownName> {
+    let ids = CATALOGUE.iter().chain(own.iter().copied()).map(|effect| effect.id.as_str());
+    find_among(id, own).ok_or_else(|| UnknownName::of(what, id, ids))
+}
+
+/// Ids of effects, or of terms of a baseline, that are all known.
+///
+/// # Errors
+///
+/// [`UnknownName`] of the first that is not.
+pub fn known(ids: &[String], own: &[&'static Effect]) -> Result<Vec<String>, UnknownName> {
+    ids.iter().map(|id| named("effect or term", id, own).map(|effect| effect.id.clone())).collect()
 }
 
 /// The effect of an entry; equal entries have one effect, which lives as long as the process.

@@ -264,3 +264,11 @@ proptest! {
         let _ = read_text(&text);
     }
 }
+
+#[test]
+fn only_what_the_catalogue_or_the_file_holds_is_known() {
+    let ids = |id: &str| known(&[id.to_owned()], &[]);
+    assert_eq!(ids("acc.misalignment"), Ok(vec!["acc.misalignment".to_owned()]));
+    let unknown = ids("acc.misalinment").unwrap_err().to_string();
+    assert!(unknown.contains("no effect or term") && unknown.contains("did you mean `acc.misalignment`"));
+}

@@ -5,6 +5,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::{
+    clock::Clock,
     columns::{
         GIMBAL, POSITION, REFERENCE, SEGMENT, SIM_TEMPERATURE, SIMULATED, TEMPERATURE, TIME, Table,
         simulated_slot_of, slot_of,
@@ -27,10 +28,15 @@ use crate::recording::{
 
 /// Makes a recording of a table, or says what is wrong with it.
 pub(crate) fn assemble(path: &Path, manifest: Manifest, table: Table) -> Result<Recording, ReadError> {
-    let (mut recording, places) = converted(path, manifest, table)?;
+    let (recording, places) = converted(path, manifest, table)?;
+    checked(recording, &places)
+}
+
+/// A recording whose intervals and sizes can be in the units of its manifest; numbers that nothing measures are masked.
+pub(crate) fn checked(mut recording: Recording, places: &Places) -> Result<Recording, ReadError> {
     interval::check(&mut recording)?;
     unit_check::check(&mut recording)?;
-    absurd::mask(&mut recording, &places);
+    absurd::mask(&mut recording, places);
     Ok(recording)
 }
 
@@ -47,7 +53,7 @@ fn converted(path: &Path, manifest: Manifest, mut table: Table) -> Result<(Recor
     if time.is_empty() {
         return Err(ReadError::NoRows { path: path.to_path_buf() });
     }
-    check_time(path, &time, &table, manifest.units.t)?;
+    check_time(path, &time, (&table.places, &table.clock), manifest.units.t)?;
     let segment = segments(path, &table)?;
     let mut sensors = Vec::with_capacity(3);
     for kind in SensorKind::ALL {
@@ -80,8 +86,13 @@ fn converted(path: &Path, manifest: Manifest, mut table: Table) -> Result<(Recor
     Ok((recording, table.places))
 }
 
-fn check_time(path: &Path, time: &[f64], table: &Table, unit: TimeUnit) -> Result<(), ReadError> {
-    let (places, clock) = (&table.places, &table.clock);
+/// Refuses times that are missing or do not increase.
+pub(crate) fn check_time(
+    path: &Path,
+    time: &[f64],
+    (places, clock): (&Places, &Clock),
+    unit: TimeUnit,
+) -> Result<(), ReadError> {
     if let Some(row) = time.iter().position(|t| t.is_nan()) {
         return Err(ReadError::TimeMissing { path: path.to_path_buf(), place: places.of(row) });
     }
@@ -176,7 +187,7 @@ fn segments(path: &Path, table: &Table) -> Result<Option<Vec<Option<i64>>>, Read
 }
 
 /// A unit that is left out is assumed only where there is a column in it.
-fn keep_assumed(recording: &mut Recording) {
+pub(crate) fn keep_assumed(recording: &mut Recording) {
     let measured: Vec<&str> = [
         ("t", true),
         ("acc", recording.acc.is_some()),
@@ -196,7 +207,7 @@ fn keep_assumed(recording: &mut Recording) {
     });
 }
 
-fn note_columns(recording: &mut Recording) {
+pub(crate) fn note_columns(recording: &mut Recording) {
     for column in &recording.extra {
         recording
             .warnings

@@ -1,0 +1,105 @@
+"""Types of the compiled part."""
+
+from typing import Optional, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+class ImucalError(Exception): ...
+class ReadError(ImucalError): ...
+class OptionError(ImucalError): ...
+class MismatchError(ImucalError): ...
+class WriteError(ImucalError): ...
+
+@final
+class Recording:
+    @property
+    def name(self) -> str: ...
+    @property
+    def rows(self) -> int: ...
+    @property
+    def epoch_ns(self) -> Optional[int]: ...
+    @property
+    def warnings(self) -> list[str]: ...
+    def manifest(self) -> str: ...
+    def times(self) -> NDArray[np.float64]: ...
+    def temperatures(self) -> Optional[NDArray[np.float64]]: ...
+    def columns(self, name: str) -> Optional[NDArray[np.float64]]: ...
+    def write(self, path: str) -> None: ...
+
+@final
+class Calibration:
+    def json(self) -> str: ...
+    @property
+    def ok(self) -> bool: ...
+    def write_toml(self, path: str) -> None: ...
+    def write_record(self, path: str) -> None: ...
+
+def read(
+    path: str,
+    map: list[str],
+    unit: list[str],
+    time: Optional[str],
+    max_size: Optional[str],
+    max_columns: Optional[int],
+) -> Recording: ...
+def from_arrays(
+    name: str,
+    manifest: str,
+    t: NDArray[np.float64],
+    acc: Optional[NDArray[np.float64]],
+    gyr: Optional[NDArray[np.float64]],
+    mag: Optional[NDArray[np.float64]],
+    temperature: Optional[NDArray[np.float64]],
+    gimbal: Optional[NDArray[np.float64]],
+    reference: Optional[NDArray[np.float64]],
+    position: Optional[NDArray[np.float64]],
+) -> Recording: ...
+def calibrate(
+    recording: Recording,
+    models: list[str],
+    compare: bool,
+    temperature: bool,
+    threshold: Optional[float],
+    accept_suspect: bool,
+) -> Calibration: ...
+def load(path: str) -> Calibration: ...
+def apply(
+    recording: Recording, calibration: Calibration, other_serial: bool
+) -> tuple[Recording, Optional[str]]: ...
+def correct(
+    calibration: Calibration,
+    kind: str,
+    raw: NDArray[np.float32],
+    temperature: Optional[NDArray[np.float32]],
+) -> NDArray[np.float32]: ...
+def diagnose(
+    recording: Recording,
+    sim: Optional[Recording],
+    sim_topic: Optional[str],
+    model: Optional[Calibration],
+    without: list[str],
+    effects: Optional[str],
+    frozen: bool,
+    watch: Optional[str],
+) -> tuple[str, str]: ...
+def simulate(
+    name: str,
+    unit: str,
+    programme: str,
+    effects: list[tuple[str, float]],
+    own_effects: Optional[str],
+    seed: int,
+    rate: float,
+    duration: Optional[float],
+    si: bool,
+    noise: bool,
+) -> Recording: ...
+def noise(
+    path: str,
+    map: list[str],
+    unit: list[str],
+    time: Optional[str],
+    max_size: Optional[str],
+    max_columns: Optional[int],
+) -> str: ...
