@@ -67,7 +67,7 @@ impl Scale {
         if self.exponent == 0 { String::new() } else { format!("{} ", power(self.exponent)) }
     }
 
-    /// At most [`TICKS`] ticks, or one a decade or a few decades.
+    /// At most a handful of ticks, or one a decade or a few decades.
     #[must_use]
     pub fn ticks(&self) -> Vec<Tick> {
         if self.logarithmic { self.decades() } else { self.steps() }
