@@ -143,7 +143,7 @@ class Recording:
         return self._columns("position")
 
     def write(self, path: Path) -> None:
-        """Writes the samples (``.csv``, ``.csv.gz``, ``.parquet``) and the manifest, over former files of these names."""
+        """Writes the samples (``.csv``, ``.csv.gz``, ``.parquet``) and the manifest, over a former recording of this name."""
         self._native.write(os.fspath(path))
 
     def __len__(self) -> int:

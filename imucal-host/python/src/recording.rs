@@ -4,7 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use imucal_host::{
     file::{Limits, limits::Size},
-    recording::{self, Mapping, ReadError, Samples, SensorKind, layout_guess},
+    recording::{self, Manifest, Mapping, ReadError, Samples, SensorKind, layout_guess},
     report::layout,
 };
 use nalgebra::Vector3;
@@ -78,8 +78,16 @@ impl Recording {
         rows.map(|rows| shaped(py, rows, self.0.rows())).transpose()
     }
 
-    /// Writes samples and manifest, over former files of these names.
+    /// Writes samples and manifest, over a former recording of this name.
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let beside = Manifest::path_beside(&path).filter(|beside| beside.exists());
+        if let Some(beside) = beside.filter(|beside| !Manifest::is_manifest(beside)) {
+            return Err(failure::unwritten(format!(
+                "{}: found a file that is no manifest, expected one or none, since it would be lost; choose another name; \
+                 nothing was written",
+                beside.display()
+            )));
+        }
         let recording = Arc::clone(&self.0);
         py.detach(move || recording.write(&path)).map_err(failure::unwritten)
     }

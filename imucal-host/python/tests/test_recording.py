@@ -71,7 +71,7 @@ def test_arrays_make_the_recording_that_a_file_of_them_is(tmp_path: pathlib.Path
     made.write(tmp_path / "made.csv")
     read = imucal.read(tmp_path / "made.csv")
     assert made.acc is not None and made.t[1] == 0.01
-    np.testing.assert_array_equal(made.acc, acc * 9.80665)
+    np.testing.assert_allclose(made.acc, acc * 9.80665, rtol=1e-15)
     for name in ("t", "acc", "gyr", "temperature"):
         np.testing.assert_allclose(getattr(read, name), getattr(made, name), rtol=1e-13)
     assert read.manifest == made.manifest and made.manifest["site"] == {"latitude_deg": 52.5}

@@ -31,6 +31,15 @@ def test_a_sensor_that_cannot_be_calibrated_is_refused_with_reason_and_advice(tm
         imucal.apply(few(), found)
 
 
+def test_a_recording_replaces_another_but_no_calibration(tmp_path: pathlib.Path) -> None:
+    few().write(tmp_path / "a.csv")
+    few().write(tmp_path / "a.csv")
+    (tmp_path / "cal.toml").write_text('format = "imucal-calibration/1"\n')
+    with pytest.raises(imucal.WriteError, match="cal.toml: found a file that is no manifest"):
+        few().write(tmp_path / "cal.csv")
+    assert not (tmp_path / "cal.csv").exists() and "calibration" in (tmp_path / "cal.toml").read_text()
+
+
 def test_a_recording_that_cannot_be_diagnosed_says_why() -> None:
     found = imucal.diagnose(few())
     assert found.verdict == "not-testable" and found.remarks[0] and found.causes == []

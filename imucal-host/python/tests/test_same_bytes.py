@@ -30,10 +30,10 @@ def same_calibration(program: Program, path: pathlib.Path, out: pathlib.Path, ac
     found.write_record(out / "b.bin")
     assert_same(out / "a.toml", out / "b.toml")
     assert_same(out / "a.bin", out / "b.bin")
-    program(out, "apply", path, "--calibration", out / "a.bin", "--out", out / "a.csv")
-    for name, calibration in [("b", found), ("c", imucal.Calibration.load(out / "a.toml"))]:
+    program(out, "apply", path, "--calibration", out / "a.bin", "--out", out / "by-program.csv")
+    for name, calibration in [("made", found), ("loaded", imucal.Calibration.load(out / "a.toml"))]:
         imucal.apply(recording, calibration).write(out / f"{name}.csv")
-        assert_same(out / "a.csv", out / f"{name}.csv")
+        assert_same(out / "by-program.csv", out / f"{name}.csv")
 
 
 def test_a_simulated_recording_is_the_program_s(program: Program, folder: pathlib.Path, tmp_path: pathlib.Path) -> None:
@@ -94,7 +94,7 @@ def test_a_diagnosis_is_the_program_s(program: Program, folder: pathlib.Path, ri
 
 
 def test_a_diagnosis_along_a_simulator_is_the_program_s(program: Program, tmp_path: pathlib.Path) -> None:
-    robot = ["--robot", "wheeled", "--duration", "20", "--si", "--effect", "clk.time_offset=2"]
+    robot = ["--robot", "wheeled", "--duration", "40", "--si", "--effect", "clk.time_offset=2"]
     program(tmp_path, "simulate", "--out", "walk.csv", *robot)
     text = program(tmp_path, "diagnose", "walk-real.csv", "--sim", "walk-sim.csv", "--json", "-")
     found = imucal.diagnose(imucal.read(tmp_path / "walk-real.csv"), sim=tmp_path / "walk-sim.csv")

@@ -190,7 +190,7 @@ mod tests {
         Recording::read_parts(&path, &mapping, &Limits::default(), &mut |part| lengths.push(part.rows()))
             .unwrap();
         assert_eq!(lengths, [40]);
-        let limits = Limits { size: 6_000, ..Limits::default() };
+        let limits = Limits { size: 3_000, ..Limits::default() };
         let error = Recording::read_as(&path, &mapping, &limits).unwrap_err().to_string();
         assert_says(&error, &["ros2-lz4.mcap", "--max-size"]);
     }
