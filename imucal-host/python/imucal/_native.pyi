@@ -5,6 +5,25 @@ from typing import Optional, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "Calibration",
+    "ImucalError",
+    "MismatchError",
+    "OptionError",
+    "ReadError",
+    "Recording",
+    "WriteError",
+    "apply",
+    "calibrate",
+    "correct",
+    "diagnose",
+    "from_arrays",
+    "load",
+    "noise",
+    "read",
+    "simulate",
+]
+
 class ImucalError(Exception): ...
 class ReadError(ImucalError): ...
 class OptionError(ImucalError): ...
