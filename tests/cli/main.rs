@@ -16,6 +16,8 @@ mod end_to_end;
 mod estimating_noise;
 mod exit_status;
 mod exporting;
+#[cfg(unix)]
+mod guides;
 mod importing;
 #[cfg(unix)]
 mod interrupting;

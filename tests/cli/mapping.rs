@@ -9,7 +9,7 @@ use super::Folder;
 const MAPPED: &str = "--time timestamp_ms --map acc=ax,ay,az --map gyr=gx,gy,gz --map mag=mx,my,mz --unit acc=g,gyr=deg/s,mag=uT";
 
 /// The small recording as somebody's own log: milliseconds, g and °/s, and other names.
-fn log(separator: char) -> String {
+pub(super) fn log(separator: char) -> String {
     let small = simulated::small();
     let names = ["timestamp_ms", "ax", "ay", "az", "gx", "gy", "gz", "mx", "my", "mz"];
     let mut text = names.join(&separator.to_string()) + "\n";
