@@ -1,6 +1,9 @@
 //! Calibrations: made of a recording, loaded, and written.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use imucal_host::{
     calibrate::{
@@ -25,14 +28,14 @@ enum Origin {
     /// From a recording, as it was asked for.
     Made(Arc<Made>, Request),
     /// From a file.
-    Loaded(StoredCalibration),
+    Loaded(Box<StoredCalibration>),
 }
 
 impl Calibration {
     /// What is stored of it: the sensors that have passed.
     pub(crate) fn stored(&self) -> StoredCalibration {
         match &self.0 {
-            Origin::Loaded(stored) => stored.clone(),
+            Origin::Loaded(stored) => StoredCalibration::clone(stored),
             Origin::Made(made, request) if request.accept_suspect => {
                 StoredCalibration::with_suspects(made, today())
             }
@@ -42,7 +45,7 @@ impl Calibration {
 
     fn write(
         &self,
-        path: &PathBuf,
+        path: &Path,
         add: impl Fn(&StoredCalibration, &mut OutputSet) -> Result<(), SaveError>,
     ) -> PyResult<()> {
         let stored = self.stored();
@@ -121,5 +124,6 @@ pub(crate) fn calibrate(
 /// Loads a calibration from TOML or from a record.
 #[pyfunction]
 pub(crate) fn load(path: PathBuf) -> PyResult<Calibration> {
-    StoredCalibration::load(&path).map(|stored| Calibration(Origin::Loaded(stored))).map_err(failure::unread)
+    let stored = StoredCalibration::load(&path).map_err(failure::unread)?;
+    Ok(Calibration(Origin::Loaded(Box::new(stored))))
 }

@@ -202,7 +202,7 @@ pub(crate) fn from_arrays(
 ) -> PyResult<Recording> {
     let manifest = manifest::parse(manifest, &name)?;
     let vectors = |what, array: Option<PyReadonlyArray2<'_, f64>>| -> PyResult<Option<Vec<Vector3<f64>>>> {
-        Ok(rows::<3, _>(what, array, Vector3::from)?)
+        rows::<3, _>(what, array, Vector3::from)
     };
     let samples = Samples {
         time: t.as_array().iter().copied().collect(),

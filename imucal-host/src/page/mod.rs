@@ -7,7 +7,7 @@
 //! | file | what |
 //! | --- | --- |
 //! | [`provenance`] | what was read, by which version, when, and its hash |
-//! | [`scale`], [`plot`] | values along an axis with ticks; a frame with marks in it |
+//! | [`scale`], [`plot`], [`dot_rows`] | values along an axis with ticks; a frame with marks in it; named rows of dots |
 //! | [`sphere`], [`residuals`], [`segmentation`] | drawings of a calibration |
 //! | [`waterfall`], [`channels`], [`profile`] | drawings of a diagnosis |
 //! | [`deviations`], [`drift`] | Allan deviations; parameters that have moved |
@@ -22,6 +22,7 @@ pub mod channels;
 pub mod comparison;
 pub mod deviations;
 pub mod diagnosis;
+pub mod dot_rows;
 pub mod drift;
 pub mod noise;
 pub mod plot;
