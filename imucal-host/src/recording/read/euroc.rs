@@ -1,7 +1,7 @@
 //! Import of EuRoC's folders: `mav0/imu0/data.csv` and, as the reference, `mav0/state_groundtruth_estimate0` or `mav0/vicon0`.
 //!
 //! Times are in ns since 1970, rates in rad/s, specific forces in m/s²; poses are those of the body in a frame whose z points up,
-//! and taken to n by [`z_up`]. Source: Burri et al. 2016, "The EuRoC micro aerial vehicle datasets" (IJRR 35). Not read:
+//! and taken to n by `z_up`. Source: Burri et al. 2016, "The EuRoC micro aerial vehicle datasets" (IJRR 35). Not read:
 //! `sensor.yaml`, so that the mounting of Vicon's markers is left to whoever compares with them; velocities and biases.
 
 use std::path::{Path, PathBuf};

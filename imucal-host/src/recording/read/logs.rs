@@ -5,7 +5,7 @@
 //! | `imu` | `sensor_msgs/Imu` | `acc_*`, `gyr_*` |
 //! | `mag` | `sensor_msgs/MagneticField`, T | `mag_*`, µT |
 //! | `temp` | `sensor_msgs/Temperature` | `temp` |
-//! | `ref` | poses and odometry; the attitude of a `sensor_msgs/Imu` | `ref_q*`, `ref_p*`, by [`z_up`] |
+//! | `ref` | poses and odometry; the attitude of a `sensor_msgs/Imu` | `ref_q*`, `ref_p*`, by `z_up` |
 
 use std::path::Path;
 
