@@ -11,7 +11,7 @@ from typing import Any, Optional, Union
 from . import _native
 from ._calibration import Calibration
 from ._document import Document
-from ._recording import Path, Recording, read
+from ._recording import Path, Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +72,13 @@ def diagnose(
     candidates, ``effects`` is a file of your own ones, which ``frozen`` confirms as the file has found them, and
     ``watch`` the summary of a device's drift watch.
     """
-    stream = sim if sim is None or isinstance(sim, Recording) else read(sim)
+    if sim is None or isinstance(sim, Recording):
+        stream = None if sim is None else sim._native
+    else:
+        stream, sim_topic = _native.read_stream(os.fspath(sim), sim_topic)
     text, proposals = _native.diagnose(
         recording._native,
-        None if stream is None else stream._native,
+        stream,
         sim_topic,
         None if model is None else model._native,
         list(without),

@@ -5,6 +5,8 @@ from typing import Optional, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ._recording import Columns
+
 __all__ = [
     "Calibration",
     "ImucalError",
@@ -21,6 +23,7 @@ __all__ = [
     "load",
     "noise",
     "read",
+    "read_stream",
     "simulate",
 ]
 
@@ -54,14 +57,8 @@ class Calibration:
     def write_toml(self, path: str) -> None: ...
     def write_record(self, path: str) -> None: ...
 
-def read(
-    path: str,
-    map: list[str],
-    unit: list[str],
-    time: Optional[str],
-    max_size: Optional[str],
-    max_columns: Optional[int],
-) -> Recording: ...
+def read(path: str, columns: Columns) -> Recording: ...
+def read_stream(path: str, topic: Optional[str]) -> tuple[Recording, Optional[str]]: ...
 def from_arrays(
     name: str,
     manifest: str,
@@ -114,11 +111,4 @@ def simulate(
     si: bool,
     noise: bool,
 ) -> Recording: ...
-def noise(
-    path: str,
-    map: list[str],
-    unit: list[str],
-    time: Optional[str],
-    max_size: Optional[str],
-    max_columns: Optional[int],
-) -> str: ...
+def noise(path: str, columns: Columns) -> str: ...

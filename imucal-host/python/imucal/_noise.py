@@ -55,11 +55,12 @@ def noise(
     map: Map = (),
     unit: Unit = (),
     time: Optional[str] = None,
+    topic: Unit = (),
     max_size: Union[int, str, None] = None,
     max_columns: Optional[int] = None,
 ) -> Noise:
     """Estimates the noise of a unit from a recording at rest; the file is read by parts and may be of any length."""
-    text = _native.noise(os.fspath(path), *reading(map, unit, time, max_size, max_columns))
+    text = _native.noise(os.fspath(path), reading(map, unit, time, topic, max_size, max_columns))
     found: dict[str, Any] = json.loads(text)
     acc, gyr, mag = (_sensor(found.get(kind)) for kind in ("acc", "gyr", "mag"))
     return Noise(

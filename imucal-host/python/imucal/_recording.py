@@ -6,7 +6,7 @@ import functools
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Optional, Union
+from typing import Any, Optional, TypedDict, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,18 @@ Path = Union[str, "os.PathLike[str]"]
 Map = Union[Mapping[str, Union[str, Sequence[str]]], Iterable[str], str]
 #: ``{"acc": "g", "t": "ms"}``, or as the program's option: ``"acc=g,t=ms"``.
 Unit = Union[Mapping[str, str], Iterable[str], str]
+
+
+class Columns(TypedDict):
+    """The program's options of reading."""
+
+    map: list[str]
+    unit: list[str]
+    time: Optional[str]
+    topic: list[str]
+    max_size: Optional[str]
+    max_columns: Optional[int]
+
 
 #: Beyond it, neighbouring integers are one float64.
 _WHOLE = 2**53
@@ -163,20 +175,34 @@ def read(
     map: Map = (),
     unit: Unit = (),
     time: Optional[str] = None,
+    topic: Unit = (),
     max_size: Union[int, str, None] = None,
     max_columns: Optional[int] = None,
 ) -> Recording:
-    """Reads a recording, with its manifest next to it, or another program's file by ``map``, ``unit`` and ``time``."""
-    return Recording(_native.read(os.fspath(path), *reading(map, unit, time, max_size, max_columns)))
+    """Reads a recording, with its manifest next to it, or another program's file by ``map``, ``unit`` and ``time``.
+
+    Of a robot's log (``.mcap``, ``.bag``) ``topic`` chooses topics, such as ``{"imu": "/imu/data", "mag": "none"}``.
+    """
+    return Recording(_native.read(os.fspath(path), reading(map, unit, time, topic, max_size, max_columns)))
 
 
 def reading(
-    map: Map, unit: Unit, time: Optional[str], max_size: Union[int, str, None], max_columns: Optional[int]
-) -> tuple[list[str], list[str], Optional[str], Optional[str], Optional[int]]:
+    map: Map,
+    unit: Unit,
+    time: Optional[str],
+    topic: Unit,
+    max_size: Union[int, str, None],
+    max_columns: Optional[int],
+) -> Columns:
     """The arguments of reading as the program's options."""
-    size = None if max_size is None else str(max_size)
-    units = [part for text in options(unit) for part in text.split(",")]
-    return options(map), units, time, size, max_columns
+    return {
+        "map": options(map),
+        "unit": [part for text in options(unit) for part in text.split(",")],
+        "time": time,
+        "topic": options(topic),
+        "max_size": None if max_size is None else str(max_size),
+        "max_columns": max_columns,
+    }
 
 
 def options(given: Union[Map, Unit]) -> list[str]:

@@ -31,7 +31,7 @@ mod _native {
         diagnosis::diagnose,
         failure::{ImucalError, MismatchError, OptionError, ReadError, WriteError},
         noise::noise,
-        recording::{Recording, from_arrays, read},
+        recording::{Recording, from_arrays, read, read_stream},
         simulation::simulate,
     };
 }

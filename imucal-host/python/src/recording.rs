@@ -1,6 +1,9 @@
 //! Recordings: read, made of arrays, and given as arrays.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use imucal_host::{
     file::{Limits, limits::Size},
@@ -113,71 +116,97 @@ pub(crate) fn sensor(name: &str) -> Option<SensorKind> {
     SensorKind::ALL.into_iter().find(|kind| kind.prefix() == name)
 }
 
-/// Limits of reading.
-pub(crate) fn limits(max_size: Option<&str>, max_columns: Option<usize>) -> PyResult<Limits> {
-    let mut limits = Limits::default();
-    if let Some(size) = max_size {
-        limits.size = size.parse::<Size>().map_err(|wrong| failure::option(format!("max_size: {wrong}")))?.0;
+/// Columns by the names of a recording and topics of a log, as the program's options.
+#[derive(FromPyObject)]
+pub(crate) struct Columns {
+    #[pyo3(item)]
+    map: Vec<String>,
+    #[pyo3(item)]
+    unit: Vec<String>,
+    #[pyo3(item)]
+    time: Option<String>,
+    #[pyo3(item)]
+    topic: Vec<String>,
+    #[pyo3(item)]
+    max_size: Option<String>,
+    #[pyo3(item)]
+    max_columns: Option<usize>,
+}
+
+impl Columns {
+    /// What they mean.
+    pub(crate) fn parse(&self) -> PyResult<(Mapping, Limits)> {
+        let mut limits = Limits::default();
+        if let Some(size) = &self.max_size {
+            let size = size.parse::<Size>();
+            limits.size = size.map_err(|wrong| failure::option(format!("max_size: {wrong}")))?.0;
+        }
+        limits.columns = self.max_columns.unwrap_or(limits.columns);
+        let mapping = Mapping::parse(&self.map, &self.unit, self.time.as_deref())
+            .and_then(|mapping| mapping.with_topics(&self.topic));
+        Ok((mapping.map_err(failure::option)?, limits))
     }
-    limits.columns = max_columns.unwrap_or(limits.columns);
-    Ok(limits)
 }
 
-/// Columns by the names of a recording, as the program's options.
-pub(crate) fn mapping(map: &[String], unit: &[String], time: Option<&str>) -> PyResult<Mapping> {
-    Mapping::parse(map, unit, time).map_err(failure::option)
-}
-
-/// An error of reading, with what the file's columns probably are where these are not known.
-pub(crate) fn explained(path: &std::path::Path, error: &ReadError, limits: &Limits) -> PyErr {
+/// An error of reading, with what the file's columns probably are where these are not known, or a topic that would do.
+pub(crate) fn explained(path: &Path, error: &ReadError, limits: &Limits) -> PyErr {
+    if let ReadError::Topics { fault, .. } = error
+        && let Some(options) = fault.remedy()
+    {
+        return failure::unread(format!("{error}\n\nFor example:\n  {}", in_python(&options)));
+    }
     let unknown = matches!(
         error,
         ReadError::Header { .. } | ReadError::ManifestMissing { .. } | ReadError::Mapping { .. }
     );
-    match layout_guess::guess(path, limits).filter(|_| unknown) {
-        Some(guess) => {
-            failure::unread(format!("{error}\n\n{}{}", layout::columns(&guess), in_python(&guess)))
-        }
-        None => failure::unread(error),
-    }
-}
-
-/// The arguments that read a file.
-fn in_python(guess: &layout_guess::LayoutGuess) -> String {
-    let options = layout::with_unknown_units(guess);
-    let values = |option: &str| -> Vec<String> {
-        let pairs = options.windows(2).filter(|pair| pair[0] == option);
-        pairs.map(|pair| format!("{:?}", pair[1])).collect()
+    let Some(guess) = layout_guess::guess(path, limits).filter(|_| unknown) else {
+        return failure::unread(error);
     };
-    let mut arguments = Vec::new();
-    arguments.extend(values("--time").first().map(|time| format!("time={time}")));
-    let map = values("--map");
-    if !map.is_empty() {
-        arguments.push(format!("map=[{}]", map.join(", ")));
-    }
-    arguments.extend(values("--unit").first().map(|unit| format!("unit={unit}")));
-    let unknown = if guess.unknown_units.is_empty() {
+    let with = if guess.unknown_units.is_empty() {
         ""
     } else {
         ", with a unit such as g or deg/s in place of UNIT, or for counts how many make one, such as 16384/g"
     };
-    format!("Then these arguments read it{unknown}:\n  {}", arguments.join(", "))
+    let arguments = in_python(&layout::with_unknown_units(&guess));
+    let columns = layout::columns(&guess);
+    failure::unread(format!("{error}\n\n{columns}Then these arguments read it{with}:\n  {arguments}"))
 }
 
-/// Reads a recording, or another program's file as one.
+/// Options of the program as arguments of `read`.
+fn in_python(options: &[String]) -> String {
+    let values = |option: &str| -> Vec<String> {
+        let pairs = options.windows(2).filter(|pair| pair[0] == option);
+        pairs.map(|pair| format!("{:?}", pair[1])).collect()
+    };
+    let one = |name: &str| values(&format!("--{name}")).first().map(|value| format!("{name}={value}"));
+    let list = |name: &str| {
+        let values = values(&format!("--{name}"));
+        (!values.is_empty()).then(|| format!("{name}=[{}]", values.join(", ")))
+    };
+    let arguments = [one("time"), list("map"), one("unit"), list("topic")];
+    arguments.into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
+
+/// Reads a recording, another program's file as one, or a log.
 #[pyfunction]
-#[pyo3(signature = (path, map, unit, time, max_size, max_columns))]
-pub(crate) fn read(
+pub(crate) fn read(py: Python<'_>, path: PathBuf, columns: Columns) -> PyResult<Recording> {
+    let (mapping, limits) = columns.parse()?;
+    read_as(py, path, mapping, limits)
+}
+
+/// Reads a simulator's file, and the topic that is still to be chosen of it.
+#[pyfunction]
+pub(crate) fn read_stream(
     py: Python<'_>,
     path: PathBuf,
-    map: Vec<String>,
-    unit: Vec<String>,
-    time: Option<String>,
-    max_size: Option<&str>,
-    max_columns: Option<usize>,
-) -> PyResult<Recording> {
-    let limits = limits(max_size, max_columns)?;
-    let mapping = mapping(&map, &unit, time.as_deref())?;
+    topic: Option<String>,
+) -> PyResult<(Recording, Option<String>)> {
+    let (mapping, topic) = Mapping::of_stream(&path, topic.as_deref()).map_err(failure::option)?;
+    let topic = topic.map(str::to_owned);
+    Ok((read_as(py, path, mapping, Limits::default())?, topic))
+}
+
+fn read_as(py: Python<'_>, path: PathBuf, mapping: Mapping, limits: Limits) -> PyResult<Recording> {
     let at = path.clone();
     let read = work::run(py, move || recording::Recording::read_as(&path, &mapping, &limits))?;
     read.map(Recording::new).map_err(|error| explained(&at, &error, &limits))

@@ -10,7 +10,7 @@ import pytest
 
 import imucal
 
-from conftest import Program
+from conftest import HERE, Program
 
 
 def assert_same(path: pathlib.Path, other: pathlib.Path) -> None:
@@ -40,6 +40,16 @@ def test_a_simulated_recording_is_the_program_s(program: Program, folder: pathli
     program(tmp_path, "simulate", "--out", "rig.csv.gz", "--effect", "acc.lever_arm=3", "--seed", "4")
     assert_same(tmp_path / "rig.csv.gz", folder / "rig.csv.gz")
     assert_same(tmp_path / "rig.toml", folder / "rig.toml")
+
+
+@pytest.mark.parametrize("log", ["rosbag2.mcap", "none.bag"])
+def test_a_log_is_the_recording_that_the_program_imports(program: Program, log: str, tmp_path: pathlib.Path) -> None:
+    path = HERE.parents[1] / "logs" / "tests" / "fixtures" / log
+    program(tmp_path, "import", path, "--topic", "mag=none", "--out", "a.csv")
+    imucal.read(path, topic={"mag": "none"}).write(tmp_path / "b.csv")
+    assert_same(tmp_path / "a.csv", tmp_path / "b.csv")
+    with pytest.raises(imucal.ReadError, match="/nowhere"):
+        imucal.read(path, topic={"imu": "/nowhere"})
 
 
 def test_a_calibration_of_a_rig_is_the_program_s(

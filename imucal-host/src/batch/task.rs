@@ -111,9 +111,7 @@ impl Task<'_> {
     /// The files that `imucal calibrate` would write.
     fn outputs(&self, source: &Source, calibration: &Calibration) -> Result<Vec<(Form, Vec<u8>)>, String> {
         let method = &source.method;
-        let json = serde_json::to_string_pretty(&report::json::calibration(calibration));
-        let json = json.map_err(|fault| fault.to_string())? + "\n";
-        let mut outputs = vec![(Form::Json, json.into_bytes())];
+        let mut outputs = vec![(Form::Json, report::json::text(calibration).into_bytes())];
         let of = if method.request.accept_suspect {
             StoredCalibration::with_suspects
         } else {

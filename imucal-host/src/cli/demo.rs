@@ -87,7 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let stored = StoredCalibration::of(&calibration, today());
     stored.write_toml(&out.join("calibration.toml"), &mut files)?;
     stored.write_record(&out.join("calibration.bin"), &mut files)?;
-    let json = serde_json::to_string_pretty(&report::json::calibration(&calibration))? + "\n";
+    let json = report::json::text(&calibration);
     files.add(&out.join("calibration.json"), json.as_bytes())?;
 
     say!("\n3. Compare the calibration with the simulated truth.\n");

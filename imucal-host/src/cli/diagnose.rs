@@ -126,21 +126,11 @@ fn stream(
     recording: &Recording,
     reading: Reading,
 ) -> anyhow::Result<Stream> {
-    let is_log = recording::is_log(path);
-    let mapping = if is_log { topics_of(topic)? } else { Mapping::default() };
+    let (mapping, topic) = Mapping::of_stream(path, topic)?;
     let simulated = Recording::read_as(path, &mapping, &reading.limits())
         .map_err(|error| columns::explained(path, error, reading))?;
     simulated.warnings.iter().filter(|warning| !is_expected(warning)).for_each(|warning| warn(warning));
-    let topic = topic.filter(|_| !is_log);
     Stream::chosen(&simulated, recording, topic).with_context(|| path.display().to_string())
-}
-
-/// A simulator's topic of a log, and nothing that others have recorded.
-fn topics_of(topic: Option<&str>) -> anyhow::Result<Mapping> {
-    let imu = topic.map(|topic| format!("imu={topic}"));
-    let options: Vec<String> =
-        imu.into_iter().chain(["mag=none".to_owned(), "temp=none".to_owned()]).collect();
-    Ok(Mapping::default().with_topics(&options)?)
 }
 
 /// That a simulator's file has no sensor, or topics beside the one that is meant, is what is asked for.

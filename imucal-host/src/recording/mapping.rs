@@ -1,6 +1,9 @@
 //! The columns of another program's file, by the names that a recording has for them; the topics of a log.
 
+use std::path::Path;
+
 use super::{
+    format::Format,
     log_topics::LogTopics,
     manifest::{Counts, Manifest},
     read::{column_guess::unit_behind, columns::NAMES},
@@ -105,6 +108,25 @@ impl Mapping {
     pub fn with_topics(mut self, topics: &[String]) -> Result<Self, MappingFault> {
         self.topics = LogTopics::parse(topics)?;
         Ok(self)
+    }
+
+    /// How a simulator's file is read as its stream: of a log the topic alone and nothing that others have recorded; of other
+    /// files everything, and the topic is left to [`Stream::chosen`](super::Stream::chosen).
+    ///
+    /// # Errors
+    ///
+    /// As [`Mapping::with_topics`].
+    pub fn of_stream<'a>(
+        path: &Path,
+        topic: Option<&'a str>,
+    ) -> Result<(Self, Option<&'a str>), MappingFault> {
+        if Format::of(path) != Ok(Format::Log) {
+            return Ok((Self::default(), topic));
+        }
+        let imu = topic.map(|topic| format!("imu={topic}"));
+        let options: Vec<String> =
+            imu.into_iter().chain(["mag=none".to_owned(), "temp=none".to_owned()]).collect();
+        Ok((Self::default().with_topics(&options)?, None))
     }
 
     /// Whether a log's magnetometer is in a unit of its own, which this or its manifest states.
