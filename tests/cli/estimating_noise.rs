@@ -37,7 +37,7 @@ fn json(folder: &Folder, name: &str) -> Value {
 fn coefficients_have_intervals_and_what_is_not_seen_has_a_reason() {
     let folder = Folder::new();
     still(&folder, 100_000, |_, _, _| true);
-    let parts = ["gyroscope: 100000 samples at 50.00 Hz", "N white, rad/s/sqrt(Hz)", "no Q quantisation"];
+    let parts = ["gyroscope: 100000 samples at 50.00 Hz", "N rad/s/sqrt(Hz)", "no Q quantisation"];
     folder.run("noise still.csv --json noise.json").with(0).printing(&parts);
     let json = json(&folder, "noise.json");
     assert_eq!(json["format"], "imucal-noise/1");

@@ -98,7 +98,7 @@ fn the_laboratory_guide_prints_a_certificate_a_drift_and_a_tray() {
 fn the_robotics_guide_names_what_its_simulator_lacks() {
     let folder = Folder::new();
     let ran = follow(&folder, "robotics.md");
-    assert!(ran.last().expect("a diagnosis").1.contains("gyr.g_sensitivity"), "{ran:#?}");
+    assert!(ran.last().expect("a diagnosis").1.contains("clk.time_offset"), "{ran:#?}");
     assert!(folder.text("gap.html").contains("What to change in the simulator"));
 }
 

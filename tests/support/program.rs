@@ -69,9 +69,12 @@ impl Ended {
     ///
     /// Where one is missing.
     pub fn printing(self, parts: &[&str]) -> Self {
-        let flat = flat(&self.out);
+        let flat = self::flat(&self.out);
         for part in parts {
-            assert!(self.out.contains(part) || flat.contains(part), "`{part}` is missing in {self:#?}");
+            assert!(
+                self.out.contains(part) || flat.contains(&self::flat(part)),
+                "`{part}` is missing in {self:#?}"
+            );
         }
         self
     }
