@@ -35,7 +35,7 @@ pub fn run<A: AsRef<OsStr>>(program: &str, variables: &[(&str, &str)], arguments
 }
 
 /// Text on one line, with one blank where there were more.
-fn flat(text: &str) -> String {
+fn on_one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
@@ -69,10 +69,10 @@ impl Ended {
     ///
     /// Where one is missing.
     pub fn printing(self, parts: &[&str]) -> Self {
-        let flat = self::flat(&self.out);
+        let flat = on_one_line(&self.out);
         for part in parts {
             assert!(
-                self.out.contains(part) || flat.contains(&self::flat(part)),
+                self.out.contains(part) || flat.contains(&on_one_line(part)),
                 "`{part}` is missing in {self:#?}"
             );
         }
