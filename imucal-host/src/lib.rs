@@ -29,7 +29,7 @@
 //! | [`allan`] | a recording that is still, of any length | coefficients of each axis' noise, with intervals |
 //! | [`calibrate`] | observations | triads with standard errors; accepted, suspect or refused |
 //! | [`capture`] | samples as they arrive | what to do next, until a session has calibrated its sensors |
-//! | [`store`], [`apply`], [`corrupt`], [`device`] | triads | records, corrected and corrupted recordings, answers of a device |
+//! | [`store`], [`apply`], [`compose`], [`corrupt`], [`device`] | triads | records, corrected and corrupted recordings, answers of a device |
 //! | [`equivalence`] | a calibration | how far the core in `f32` is from a reference in `f64` |
 //! | [`diagnosis`] | a recording, effects | where the gap lies, its causes, what to record next |
 //! | [`blind`], [`study`] | simulated recordings | how often answers and standard errors are right |
@@ -76,6 +76,8 @@ pub mod store;
 pub mod compare;
 
 pub mod apply;
+
+pub mod compose;
 
 pub mod corrupt;
 

@@ -20,6 +20,7 @@ mod capture;
 mod check;
 mod columns;
 mod compare;
+mod compose;
 mod corrupt;
 mod demo;
 mod device;
@@ -79,6 +80,8 @@ enum Command {
     Check(check::Arguments),
     /// Compare two calibrations of a unit: how far each parameter has moved, and what that means
     Compare(compare::Arguments),
+    /// Make one calibration of the one in use and of a new one, made of what the device has corrected by it
+    Compose(compose::Arguments),
     /// Print a calibration, its quality, and whether it is intact.
     Inspect(inspect::Arguments),
     /// Compare the core in f32 with a reference in f64, sample by sample and fit by fit.
@@ -130,6 +133,7 @@ pub fn run() -> ExitCode {
         Command::Apply(arguments) => apply::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Compose(arguments) => compose::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Device(arguments) => device::run(&arguments),

@@ -4,7 +4,7 @@ use imucal_core::{record, triad::Triad};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::{StoredCurvature, StoredNonlinearity, StoredTemperatureQuality, record_form};
+use super::{StoredCalibration, StoredCurvature, StoredNonlinearity, StoredTemperatureQuality, record_form};
 use crate::recording::Unit;
 
 /// One sensor's calibration: `calibrated = gain · (raw − bias)` and how good it was.
@@ -58,6 +58,13 @@ impl StoredTriad {
     pub fn triad(&self) -> Triad<f64> {
         let gain = Matrix3::from_fn(|row, column| self.gain[row][column]);
         Triad { gain, bias: Vector3::from(self.bias) }
+    }
+
+    /// Itself, with the serial and the day of the calibration that it is taken from.
+    #[must_use]
+    pub fn from_day(&self, of: &StoredCalibration) -> Self {
+        let own = || StoredProvenance { serial: of.sensor.serial.clone(), date: of.date };
+        Self { provenance: Some(self.provenance.clone().unwrap_or_else(own)), ..self.clone() }
     }
 }
 
