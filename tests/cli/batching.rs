@@ -47,7 +47,7 @@ fn changed(sensor: &mut Triple, gain: &Matrix3<f64>, bias: &Vector3<f64>) {
 }
 
 /// A folder with so many units in `in.d`.
-fn units(count: usize) -> Folder {
+pub(super) fn units(count: usize) -> Folder {
     let folder = Folder::new();
     fs::create_dir(folder.path("in.d")).expect("the folder takes folders");
     for seed in 0..count {

@@ -72,3 +72,26 @@ fn a_recording_that_calibrates_nothing_checks_nothing() {
         .printing(&["accelerometer: not checked; this recording does not calibrate it"])
         .telling(&["nothing is checked"]);
 }
+
+#[test]
+fn a_calibration_of_corrected_values_is_composed_upon_the_one_that_corrected_them() {
+    let folder = Folder::with_calibration();
+    let other = simulated::tumbled(simulated::RESTS, 77);
+    other.write(&folder.path("other.csv")).expect("room");
+    // The device corrects by a calibration that is off; what it puts out is calibrated again.
+    folder.write("off.toml", moved(&folder, "acc", 100.0));
+    folder.run("apply other.csv --calibration off.toml --out corrected.csv").with(0);
+    folder.run("calibrate corrected.csv --out second.toml --no-temperature").with(0);
+    folder
+        .run("compose off.toml second.toml --out both.toml --record both.bin")
+        .with(0)
+        .printing(&["both.toml: both as one calibration of raw values"]);
+    folder.run("check other.csv --calibration off.toml").with(1);
+    folder.run("check other.csv --calibration both.toml").with(0);
+    folder.run("compare both.toml both.bin").with(0).printing(&["accelerometer: no parameter has moved"]);
+
+    // Raw values are not what the first calibration puts out.
+    folder.run("compose off.toml cal.toml --out wrong.toml").with(1).telling(&["counts", "expected m/s^2"]);
+    assert!(!folder.path("wrong.toml").exists());
+    folder.run("compose off.toml second.toml").with(2).telling(&["--out"]);
+}

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use imucal_host::recording::SensorKind;
+use imucal_host::recording::{Recording, SensorKind};
 use imucal_tests::robot_log::{Content, Logged, write_bag, write_mcap};
 use imucal_tests::simulated;
 
@@ -235,6 +235,56 @@ fn apply_noise_and_diagnose_take_logs_and_a_simulator_s_topic_of_the_same_one() 
             .fold(folder.text(name), |text, other| text.replace(other, "NAME"))
     };
     assert_eq!(nameless("log.json"), nameless("rows.json"));
+}
+
+/// Rows of six numbers in SI as messages of a topic.
+fn imu_messages<'a>(
+    topic: &'static str,
+    rows: impl Iterator<Item = (f64, [f64; 3], [f64; 3])> + 'a,
+) -> impl Iterator<Item = Logged> + 'a {
+    rows.map(move |(time, force, rate)| Logged {
+        topic,
+        stamp_ns: BEGIN + (time * 1e9).round() as i64,
+        content: Content::Imu(force, rate),
+    })
+}
+
+#[test]
+fn a_bag_with_a_simulated_topic_becomes_the_page_of_a_diagnosis() {
+    let folder = Folder::new();
+    let out = folder.path("run.csv").display().to_string();
+    let effect = ["--effect", "clk.time_offset=2"];
+    super::imucal(
+        &[&["simulate", "--robot", "wheeled", "--duration", "60", "--out", &out][..], &effect].concat(),
+    )
+    .with(0);
+    let real = Recording::read(&folder.path("run-real.csv")).expect("just written");
+    let measured = real.time.iter().enumerate().map(|(row, time)| {
+        let value = |kind| -> [f64; 3] { real.sensor(kind).expect("it has it").values[row].into() };
+        (*time, value(SensorKind::Acc), value(SensorKind::Gyr))
+    });
+    let simulated = folder.text("run-sim.csv");
+    let ideal = simulated.lines().skip(1).map(|line| {
+        let n: Vec<f64> = line.split(',').map(|field| field.parse().expect("a number")).collect();
+        (n[0], [n[1], n[2], n[3]], [n[4], n[5], n[6]])
+    });
+    let mut messages: Vec<Logged> =
+        imu_messages("/imu/data", measured).chain(imu_messages("/imu/ideal", ideal)).collect();
+    messages.sort_by_key(|message| message.stamp_ns);
+    write_bag(&folder.path("run.bag"), &messages);
+    folder.write("run.toml", format!("{MANIFEST}{SECTIONS}"));
+
+    let streams = "--topic imu=/imu/data --sim run.bag --sim-topic /imu/ideal";
+    let ended = folder.run(&format!("diagnose run.bag {streams} --html page.html --json gap.json"));
+    let gap: serde_json::Value = serde_json::from_str(&folder.text("gap.json")).expect("JSON");
+    let causes: Vec<&str> = gap["causes"]
+        .as_array()
+        .expect("causes")
+        .iter()
+        .filter_map(|cause| cause["effect"].as_str())
+        .collect();
+    assert_eq!(causes, ["clk.time_offset"], "{}\n{}", ended.out, ended.err);
+    super::pages::is_laid_out(&folder, "page.html", 5, &["clk.time_offset", "From the gap to the noise"]);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use imucal_tests::browser;
 
-use super::{Folder, estimating_noise};
+use super::{Folder, batching, estimating_noise};
 
 /// Widths of a telephone and of a wide screen, px.
 const WIDTHS: [u32; 2] = [390, 1400];
@@ -10,7 +10,7 @@ const WIDTHS: [u32; 2] = [390, 1400];
 const LARGEST: usize = 300_000;
 
 /// The page says these things, is short, and nothing in it overlaps or reaches beyond its place.
-fn is_laid_out(folder: &Folder, name: &str, drawings: usize, says: &[&str]) {
+pub(super) fn is_laid_out(folder: &Folder, name: &str, drawings: usize, says: &[&str]) {
     let page = folder.text(name);
     assert!(page.len() <= LARGEST, "{name}: {} bytes", page.len());
     for words in says {
@@ -81,6 +81,25 @@ fn the_page_of_a_comparison_shows_what_has_moved() {
     let folder = Folder::with_calibration();
     folder.run("compare cal.toml cal.bin --html page.html").with(0);
     is_laid_out(&folder, "page.html", 3, &["No parameter has moved", "Drift of the gyroscope", "gain_zz"]);
+}
+
+#[test]
+fn the_page_of_a_batch_shows_how_its_units_spread() {
+    let folder = batching::units(9);
+    folder.write("in.d/broken.csv", "no header");
+    folder.run("batch in.d --out out.d --html page.html").with(2);
+    let says = [
+        "10 recordings: 9 calibrated",
+        "Not calibrated",
+        "accelerometer by T9 from counts: 9 units",
+        "offset_z",
+    ];
+    is_laid_out(&folder, "page.html", 3, &says);
+    // A page of an earlier batch is the batch's own; any other file is not.
+    folder.run("batch in.d --out out.d --html page.html").with(2).telling(&["already done"]);
+    folder.write("mine.html", "<title>mine</title>");
+    folder.run("batch in.d --out out.d --html mine.html").with(2).telling(&["mine.html", "--force"]);
+    assert_eq!(folder.text("mine.html"), "<title>mine</title>");
 }
 
 #[test]

@@ -52,7 +52,7 @@ frame.onload = () => {
       for (const [other, its] of texts.slice(at + 1)) if (!apart(box, its)) found.overlaps.push(`${name} | ${other}`);
     });
   }
-  for (const node of page.querySelectorAll('h1,h2,h3,p,li,figcaption,table.facts td')) {
+  for (const node of page.querySelectorAll('h1,h2,h3,p,li,figcaption,table.facts td,table.list td')) {
     const box = node.getBoundingClientRect();
     if (box.right > WIDTH + 1 || box.left < -1 || node.scrollWidth > node.clientWidth + 1) found.outside.push(words(node));
   }

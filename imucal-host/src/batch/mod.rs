@@ -3,8 +3,8 @@
 //! ```text
 //!  folder, pattern, ──► source ──► shard ──► workers ──► task ──► entry ──┬──► outlier ──┬──► summary
 //!  list                 paths,     every     N at a      read,    what    │    units     │    CSV, Parquet
-//!                       names      n-th      time        fit,     is done │    that are  └──► report
-//!                                                        write            │    unlike         text, JSON
+//!                       names      n-th      time        fit,     is done │    that are  └──► report, page
+//!                                                        write            │    unlike         text, JSON, HTML
 //!                                                                         └──► physical
 //! ```
 //!
@@ -19,6 +19,7 @@ use crate::{calibrate::request::Request, file::Limits, recording::Mapping};
 pub mod entry;
 mod list;
 pub mod outlier;
+pub mod page;
 pub mod parameter;
 pub mod report;
 pub mod shard;

@@ -61,6 +61,20 @@ pub struct Population {
     pub units: usize,
     /// |z| beyond which a parameter is unlike the others; `None` where they are too few.
     pub limit: Option<f64>,
+    /// Each parameter of theirs; none where they are too few.
+    #[serde(skip)]
+    pub spreads: Vec<Spread>,
+}
+
+/// One parameter over the units of a kind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spread {
+    /// Its name.
+    pub parameter: &'static str,
+    /// z of each unit, ascending.
+    pub z: Vec<f64>,
+    /// |z| beyond which a unit is unlike the others.
+    pub limit: f64,
 }
 
 /// A parameter of a unit that is unlike the others.
@@ -108,15 +122,24 @@ pub fn outliers(entries: &[Entry]) -> Outliers {
             }
         }
     }
-    let values: Vec<Values<'_>> = kinds.values().flat_map(values).collect();
-    let tested: usize = values.iter().map(|values| values.measured.len()).sum();
-    let mut outliers: Vec<Outlier> = values.iter().flat_map(|values| values.beyond(tested)).collect();
+    let values: Vec<(&Kind<'_>, Vec<Values<'_>>)> = kinds.values().map(|kind| (kind, values(kind))).collect();
+    let tested: usize =
+        values.iter().flat_map(|(_, values)| values).map(|values| values.measured.len()).sum();
+    let (mut populations, mut outliers) = (Vec::new(), Vec::new());
+    for (kind, values) in &values {
+        let judged: Vec<Vec<Outlier>> = values.iter().map(|values| values.judged(tested)).collect();
+        populations.extend(population(
+            kind,
+            tested,
+            judged.iter().filter_map(|judged| spread_of(judged)).collect(),
+        ));
+        outliers.extend(judged.into_iter().flatten().filter(|judged| judged.z.abs() > judged.limit));
+    }
     outliers.sort_by(|a, b| (&a.name, a.sensor).cmp(&(&b.name, b.sensor)));
-    let populations = kinds.values().filter_map(|kind| population(kind, tested)).collect();
     Outliers { populations, outliers }
 }
 
-fn population(kind: &Kind<'_>, tested: usize) -> Option<Population> {
+fn population(kind: &Kind<'_>, tested: usize, spreads: Vec<Spread>) -> Option<Population> {
     let (_, sensor) = kind.first()?;
     Some(Population {
         sensor: sensor.sensor,
@@ -124,7 +147,15 @@ fn population(kind: &Kind<'_>, tested: usize) -> Option<Population> {
         unit_in: sensor.unit_in.clone().unwrap_or_default(),
         units: kind.len(),
         limit: (kind.len() >= LEAST_UNITS).then(|| limit(kind.len(), tested)),
+        spreads,
     })
+}
+
+fn spread_of(judged: &[Outlier]) -> Option<Spread> {
+    let first = judged.first()?;
+    let mut z: Vec<f64> = judged.iter().map(|judged| judged.z).collect();
+    z.sort_by(f64::total_cmp);
+    Some(Spread { parameter: first.parameter, z, limit: first.limit })
 }
 
 /// Each parameter of a kind with units enough.
@@ -144,7 +175,8 @@ fn values<'a>(kind: &Kind<'a>) -> Vec<Values<'a>> {
 }
 
 impl Values<'_> {
-    fn beyond(&self, tested: usize) -> Vec<Outlier> {
+    /// Each unit's value as if it were unlike the others.
+    fn judged(&self, tested: usize) -> Vec<Outlier> {
         let limit = limit(self.measured.len(), tested);
         let (median, spread) = spread(self.measured.iter().map(|(value, _)| *value).collect());
         let judged = self.of.iter().zip(&self.measured).map(|((entry, sensor), (value, std_error))| {
@@ -162,7 +194,7 @@ impl Values<'_> {
                 limit,
             }
         });
-        judged.filter(|outlier| outlier.z.abs() > limit).collect()
+        judged.collect()
     }
 }
 
@@ -181,4 +213,4 @@ fn limit(units: usize, tested: usize) -> f64 {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

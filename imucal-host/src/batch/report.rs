@@ -94,7 +94,7 @@ pub fn text(outliers: &Outliers) -> String {
 }
 
 fn population(population: &Population) -> String {
-    let Population { sensor, model, unit_in, units, limit } = population;
+    let Population { sensor, model, unit_in, units, limit, spreads: _ } = population;
     let judged = match limit {
         Some(limit) => format!("compared, limit {limit:.1}"),
         None => format!("not compared, fewer than {LEAST_UNITS}"),

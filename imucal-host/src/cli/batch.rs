@@ -14,6 +14,7 @@ use super::{
     calibrate::today,
     columns::Columns,
     fitting::Fitting,
+    html::Html,
     output,
     overwrite::{Overwrite, Planned},
     progress::Progress,
@@ -23,6 +24,7 @@ use crate::{
     batch::{
         Batch, Done, Entry, Method, Shard, Standing, find,
         outlier::{Outliers, outliers},
+        page,
         report::{self, Counts},
         summary::{self, SummaryFormat},
     },
@@ -31,6 +33,8 @@ use crate::{
 
 /// Names of recordings that a line gives at most.
 const NAMED: usize = 3;
+/// Bytes of a page within which its title is.
+const HEAD: u64 = 4096;
 
 #[derive(Args, Debug)]
 #[command(
@@ -59,6 +63,8 @@ pub(super) struct Arguments {
     /// Write everything as JSON; `-` prints it instead of the text
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    html: Html,
     #[command(flatten)]
     fitting: Fitting,
     #[command(flatten)]
@@ -99,27 +105,32 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         arguments.jobs.or_else(|| std::thread::available_parallelism().ok().map(Into::into)).unwrap_or(1);
     let batch = Batch { sources, out: arguments.out.clone(), jobs };
     batch.prepare()?;
-    let (table_file, json_file) = planned(arguments, &inputs)?;
+    let files = planned(arguments, &inputs)?;
     let done = worked(arguments, &batch)?;
     said(&done);
     let entries: Vec<Entry> = done.into_iter().map(|done| done.entry).collect();
-    finished(arguments, &entries, table_file, json_file)
+    finished(arguments, &entries, files)
 }
 
-/// Files of an earlier batch are its own; others are spared without --force.
-fn planned(arguments: &Arguments, inputs: &[PathBuf]) -> anyhow::Result<(OutputSet, OutputSet)> {
-    let plan = |path: Option<&PathBuf>, own: bool| {
+/// The summary, the JSON and the page. Files of an earlier batch are its own; others are spared without --force.
+fn planned(arguments: &Arguments, inputs: &[PathBuf]) -> anyhow::Result<[OutputSet; 3]> {
+    let plan = |path: Option<&Path>, own: bool| {
         let outputs: Vec<Planned> = path.map(Planned::new).into_iter().collect();
         arguments.overwrite.or(own).plan(inputs, &outputs)
     };
-    let summary = arguments.summary.as_ref();
+    let summary = arguments.summary.as_deref();
     let own = summary.is_some_and(|path| SummaryFormat::of(path).is_ok_and(|format| format.is_summary(path)));
     let json = json_file(arguments);
-    Ok((plan(summary, own)?, plan(json, json.is_some_and(|path| is_report(path)))?))
+    let html = arguments.html.path();
+    Ok([
+        plan(summary, own)?,
+        plan(json, json.is_some_and(is_report))?,
+        plan(html, html.is_some_and(is_page))?,
+    ])
 }
 
-fn json_file(arguments: &Arguments) -> Option<&PathBuf> {
-    arguments.json.as_ref().filter(|path| path.as_os_str() != "-")
+fn json_file(arguments: &Arguments) -> Option<&Path> {
+    arguments.json.as_deref().filter(|path| path.as_os_str() != "-")
 }
 
 /// A file that an earlier batch has written as JSON.
@@ -129,15 +140,21 @@ fn is_report(path: &Path) -> bool {
     head.is_some_and(|head| head["format"] == report::FORMAT)
 }
 
+/// A page that an earlier batch has written.
+fn is_page(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    read.is_ok() && page::is_page(&String::from_utf8_lossy(&head))
+}
+
 fn worked(arguments: &Arguments, batch: &Batch) -> anyhow::Result<Vec<Done>> {
     let may_replace = |inputs: &[PathBuf], outputs: &[(PathBuf, crate::store::form::Form)]| {
         let outputs: Vec<Planned> =
             outputs.iter().map(|(path, form)| Planned::calibration(path, *form)).collect();
         arguments.overwrite.plan(inputs, &outputs).map_err(|fault| format!("{fault:#}"))
     };
-    let progress = Progress::start();
-    let all = batch.sources.len();
-    Ok(batch.run(&may_replace, &|done| progress.stage(&format!("{done} of {all} recordings")))?)
+    let progress = Progress::of(batch.sources.len(), "recordings");
+    Ok(batch.run(&may_replace, &|done| progress.done(done))?)
 }
 
 /// What is no calibration, and what was done again.
@@ -181,8 +198,7 @@ fn said(done: &[Done]) {
 fn finished(
     arguments: &Arguments,
     entries: &[Entry],
-    mut table_file: OutputSet,
-    mut json_file_set: OutputSet,
+    [mut table_file, mut json_files, mut pages]: [OutputSet; 3],
 ) -> anyhow::Result<Ending> {
     let found = outliers(entries);
     let json = serde_json::to_string_pretty(&report::json(entries, &found))
@@ -192,10 +208,13 @@ fn finished(
         table_file.add(path, &summary_bytes(path, entries, &found)?)?;
     }
     if let Some(path) = json_file(arguments) {
-        json_file_set.add(path, json.as_bytes())?;
+        json_files.add(path, json.as_bytes())?;
     }
-    table_file.commit()?;
-    json_file_set.commit()?;
+    let parts = || vec![page::batch(entries, &found)];
+    arguments.html.add_of(&mut pages, &page::title(entries), &[], &Ok, &parts)?;
+    for files in [table_file, json_files, pages] {
+        files.commit()?;
+    }
     let counts = Counts::of(entries);
     match (&arguments.json, json_file(arguments)) {
         (Some(_), None) => output::text(&json)?,

@@ -150,8 +150,8 @@ fn trials(arguments: &Arguments) -> anyhow::Result<Folder> {
     let cases = mingled(arguments.healthy, arguments.cases);
     let cores = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let jobs = arguments.jobs.unwrap_or(cores).get();
-    let progress = Progress::start();
-    let heard = |over: usize| progress.stage(&format!("{over} of {} cases", cases.len()));
+    let progress = Progress::of(cases.len(), "cases");
+    let heard = |over: usize| progress.done(over);
     let diagnose_recording = |recording: &Recording| diagnose(recording, &options, &|_| ());
     let rig = RigWorld { diagnose: &diagnose_recording, own: folder.own() };
     let robots = robot::trial::RobotWorld { diagnose: &diagnose_pair, own: folder.own() };

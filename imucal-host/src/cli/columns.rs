@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 
-use super::{reading::Reading, warn};
+use super::{progress::Progress, reading::Reading, warn};
 use crate::{
     recording::{Manifest, Mapping, ReadError, Recording, layout_guess::guess},
     report::layout,
@@ -53,8 +53,10 @@ pub(super) fn read_with(
     reading: Reading,
 ) -> anyhow::Result<Recording> {
     let mapping = columns.mapping()?;
+    let progress = Progress::reading(path);
     let recording = Recording::read_with(path, &mapping, manifest, &reading.limits())
         .map_err(|error| explained(path, error, reading))?;
+    drop(progress);
     for warning in &recording.warnings {
         warn(warning);
     }

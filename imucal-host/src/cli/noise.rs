@@ -10,6 +10,7 @@ use super::{
     html::Html,
     output::{self, say},
     overwrite::{Overwrite, Planned, files_of},
+    progress::Progress,
     reading::Reading,
     refuse, warn,
 };
@@ -59,8 +60,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let outputs: Vec<Planned> = json.chain(arguments.html.planned()).collect();
     let mut files = arguments.overwrite.plan(&files_of(&arguments.recording), &outputs)?;
     let mapping = arguments.columns.mapping()?;
+    let progress = Progress::reading(&arguments.recording);
     let noise = allan::noise(&arguments.recording, &mapping, &arguments.reading.limits())
         .map_err(|error| columns::explained(&arguments.recording, error, arguments.reading))?;
+    drop(progress);
     let warnings = noise.messages();
     warnings.iter().for_each(|warning| warn(warning));
     let file = NoiseFile::new(&noise, warnings);

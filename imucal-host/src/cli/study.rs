@@ -2,7 +2,7 @@
 
 use clap::{Args, Subcommand};
 
-use super::{Ending, output};
+use super::{Ending, output, progress::Progress};
 use crate::study::{coverage, recovery, trust, units};
 
 #[derive(Args, Debug)]
@@ -55,15 +55,15 @@ enum Study {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    match arguments.study {
-        Study::Coverage { runs, seed } => output::document(&coverage::report(runs, seed))?,
-        Study::Recovery { runs, seed } => output::document(&recovery::report(seed, runs)?)?,
-        Study::Trust { each, faulty, seed } => {
-            let (text, kept) = trust::report(each, faulty, seed);
-            output::document(&text)?;
-            return Ok(if kept { Ending::Done } else { Ending::Refused });
-        }
-        Study::Units { seed } => output::document(&units::report(seed)?)?,
-    }
-    Ok(Ending::Done)
+    let progress = Progress::start();
+    progress.stage("simulating and calibrating");
+    let (text, kept) = match arguments.study {
+        Study::Coverage { runs, seed } => (coverage::report(runs, seed), true),
+        Study::Recovery { runs, seed } => (recovery::report(seed, runs)?, true),
+        Study::Trust { each, faulty, seed } => trust::report(each, faulty, seed),
+        Study::Units { seed } => (units::report(seed)?, true),
+    };
+    drop(progress);
+    output::document(&text)?;
+    Ok(if kept { Ending::Done } else { Ending::Refused })
 }

@@ -6,6 +6,7 @@
 
 pub mod digest;
 pub mod limits;
+pub mod metered;
 pub mod output_error;
 pub mod output_set;
 mod part;

@@ -2,7 +2,7 @@
 //!
 //! | goes in | comes out |
 //! | --- | --- |
-//! | a calibration, a diagnosis, a unit's noise, a comparison | a page: the answer in a sentence, figures, drawings |
+//! | a calibration, a diagnosis, a unit's noise, a comparison; what [`batch`](crate::batch::page) makes of many | a page: the answer in a sentence, figures, drawings |
 //!
 //! | file | what |
 //! | --- | --- |
@@ -100,7 +100,7 @@ fn answer(answer: &Answer) -> Markup {
 }
 
 /// A drawing with its title and what it shows.
-fn figure(title: &str, drawing: &Markup, caption: &Markup) -> Markup {
+pub(crate) fn figure(title: &str, drawing: &Markup, caption: &Markup) -> Markup {
     html! { figure { (drawing) figcaption { b { (title) } (caption) } } }
 }
 

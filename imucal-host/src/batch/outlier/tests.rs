@@ -6,7 +6,7 @@ use super::*;
 use crate::batch::{entry::Standing, parameter::Parameter};
 
 /// A unit whose sensor has these parameters with this standard error.
-fn unit(name: usize, kind: &str, values: &[f64], std_error: f64) -> Entry {
+pub(in crate::batch) fn unit(name: usize, kind: &str, values: &[f64], std_error: f64) -> Entry {
     let parameter = |(name, value): (&&str, &f64)| Parameter {
         name: (*name).to_owned(),
         value: Some(*value),

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, MatrixXx3, SMatrix, SVector, Vector3};
 
 use super::{
     directions::Directions,
+    held_out::{by_steps, root_mean},
     rows::{Residuals, Rows, influence},
 };
 use crate::noise::interval::{Parts, Scale};
@@ -199,16 +200,12 @@ fn relabellings() -> impl Iterator<Item = Matrix3<f64>> {
 }
 
 fn held_out(model: &DipModel<'_, f64>, theta: &SVector<f64, 4>) -> Option<f64> {
-    let rows = Rows::of(model, theta);
-    let mut sum = 0.0;
-    for k in 0..model.pairs.len() {
-        let there = theta + rows.step_without(k..k + 1)?;
-        sum += Residuals::of(&DipModel { pairs: &model.pairs[k..=k] }, &there)
-            .iter()
-            .map(|r| r * r)
-            .sum::<f64>();
-    }
-    Some((sum / model.pairs.len() as f64).sqrt())
+    let count = model.pairs.len();
+    let sum = by_steps(&Rows::of(model, theta), theta, (count, 1), |k, theta| {
+        let alone = DipModel { pairs: &model.pairs[k..=k] };
+        Residuals::of(&alone, theta).iter().map(|r| r * r).sum()
+    });
+    Some(root_mean(sum?, count))
 }
 
 impl Alignment {

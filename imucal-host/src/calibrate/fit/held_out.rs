@@ -10,7 +10,7 @@ use std::ops::Range;
 use nalgebra::SVector;
 use rayon::prelude::*;
 
-use super::rows::Rows;
+use super::{leverage::Leverage, rows::Rows};
 
 /// Sum of squared errors of `count` observations of `each` rows, left out in turn; `squared` gives that of one at the
 /// parameters of the others. `None` where these do not determine the parameters.
@@ -20,9 +20,10 @@ pub fn by_steps<const P: usize>(
     (count, each): (usize, usize),
     squared: impl Fn(usize, &SVector<f64, P>) -> f64,
 ) -> Option<f64> {
+    let leverage = Leverage::of(rows)?;
     let mut sum = 0.0;
     for k in 0..count {
-        let without = theta + rows.step_without(each * k..each * (k + 1))?;
+        let without = theta + leverage.step_without(each * k..each * (k + 1))?;
         sum += squared(k, &without);
     }
     Some(sum)

@@ -10,7 +10,7 @@
 //! | [`norm_fit`], [`rig_fit`], [`reference_fit`], [`gyr_rig_fit`] | least squares for each kind of observation |
 //! | [`least_squares`] | one fit by the core's solver |
 //! | [`outlier`] | observations that are left out, and the fit without them |
-//! | [`held_out`] | residuals of observations that the fit has not seen |
+//! | [`held_out`], [`leverage`] | residuals of observations that the fit has not seen, from one factor of all |
 //! | [`report`] | the figures of any of these fits |
 //! | [`autocorrelation`] | by how much serial correlation of residuals inflates standard errors |
 //! | [`rest_noise`], [`rest_covariance`], [`rest_bias`], [`shell_errors`] | errors of the observations |
@@ -28,6 +28,7 @@ pub mod gyr_rig_fit;
 pub mod held_out;
 pub mod lag;
 pub mod least_squares;
+pub mod leverage;
 pub mod norm_fit;
 pub mod outlier;
 pub mod reference_fit;

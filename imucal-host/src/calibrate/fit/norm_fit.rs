@@ -117,7 +117,7 @@ impl<const P: usize> NormProblem<'_, P> {
 
     /// Rms residual of single observations left out of the fit in turn. Each time the fit takes one Gauss–Newton
     /// step from the optimum of all; `None` where the others do not determine it.
-    /// Beyond [`SINGLES`] observations, contiguous parts are left out instead: that takes time with their square.
+    /// Beyond [`SINGLES`] observations, contiguous parts are left out instead: of so many, neighbours are alike.
     pub fn leave_one_out_rms(&self, fit: &NormFit<P>) -> Option<f64> {
         if fit.points.len() > SINGLES {
             return self.held_out_rms(fit, PARTS);

@@ -25,16 +25,20 @@ impl<const P: usize> Rows<P> {
         rows
     }
 
-    /// The Gauss–Newton step from the optimum of all rows to that without some of them: exact for a linear model,
-    /// and to second order in the step for another. `None` where the others do not determine it.
-    pub fn step_without(&self, left_out: Range<usize>) -> Option<SVector<f64, P>> {
+    /// The Gauss–Newton step; `None` where the rows do not determine it.
+    pub fn step(&self) -> Option<SVector<f64, P>> {
+        self.factor(0..0).damped_step(0.0, &SVector::repeat(0.0))
+    }
+
+    /// The factor of all rows but some.
+    pub(super) fn factor(&self, left_out: Range<usize>) -> Triangular<f64, P> {
         let mut factor = Triangular::default();
         for (k, (residual, jacobian)) in self.residuals.iter().zip(&self.jacobian).enumerate() {
             if !left_out.contains(&k) {
                 factor.push(*residual, jacobian);
             }
         }
-        factor.damped_step(0.0, &SVector::repeat(0.0))
+        factor
     }
 
     /// The derivatives of the first `count` rows by the parameters in `free`.

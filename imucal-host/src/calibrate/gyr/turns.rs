@@ -207,7 +207,7 @@ pub fn trial(input: &GyrInput<'_>, near: &Matrix3<f64>) -> Option<Vector3<f64>> 
     }
     let near = FULL_GAIN.theta(&Triad { gain: *near, bias: Vector3::zeros() });
     let known = input.with_directions(&turns.data);
-    let step = Rows::of(&TurnModel { turns: &known, form: FULL_GAIN }, &near).step_without(0..0)?;
+    let step = Rows::of(&TurnModel { turns: &known, form: FULL_GAIN }, &near).step()?;
     Some(FULL_GAIN.triad(&(near + step)).gain.diagonal())
 }
 

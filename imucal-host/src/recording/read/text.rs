@@ -9,7 +9,7 @@ use std::{
 use flate2::read::MultiGzDecoder;
 
 use crate::{
-    file::{Limits, limits::Size},
+    file::{Limits, limits::Size, metered::Metered},
     recording::read_error::ReadError,
 };
 
@@ -47,7 +47,7 @@ impl<'a> Text<'a> {
         let mut head = Vec::new();
         file.by_ref().take(2).read_to_end(&mut head).map_err(unreadable)?;
         let compressed = head == [0x1f, 0x8b];
-        let whole = Cursor::new(head).chain(file);
+        let whole = Cursor::new(head).chain(Metered(file));
         let source: Box<dyn Read> =
             if compressed { Box::new(MultiGzDecoder::new(whole)) } else { Box::new(whole) };
         let mut text = Self {
