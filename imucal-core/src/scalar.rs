@@ -22,6 +22,9 @@ pub trait Scalar: sealed::Sealed + RealField + Copy {
     const EPSILON: Self;
     /// The largest finite number.
     const LARGEST: Self;
+    /// Whether rows are triangularised in panels of 32: in `f64`, with which only a host fits. In `f32` host and device
+    /// rotate them in one by one, and their bits are the same.
+    const PANELS: bool;
 
     /// The nearest number to `value`.
     fn of(value: f64) -> Self;
@@ -40,6 +43,7 @@ pub trait Scalar: sealed::Sealed + RealField + Copy {
 impl Scalar for f32 {
     const EPSILON: Self = f32::EPSILON;
     const LARGEST: Self = f32::MAX;
+    const PANELS: bool = false;
 
     #[inline]
     fn of(value: f64) -> Self {
@@ -70,6 +74,7 @@ impl Scalar for f32 {
 impl Scalar for f64 {
     const EPSILON: Self = f64::EPSILON;
     const LARGEST: Self = f64::MAX;
+    const PANELS: bool = true;
 
     #[inline]
     fn of(value: f64) -> Self {

@@ -284,7 +284,7 @@ fn a_bag_with_a_simulated_topic_becomes_the_page_of_a_diagnosis() {
         .filter_map(|cause| cause["effect"].as_str())
         .collect();
     assert_eq!(causes, ["clk.time_offset"], "{}\n{}", ended.out, ended.err);
-    super::pages::is_laid_out(&folder, "page.html", 5, &["clk.time_offset", "From the gap to the noise"]);
+    super::pages::is_laid_out(&folder, "page.html", 4, &["clk.time_offset", "From the gap to the noise"]);
 }
 
 #[test]

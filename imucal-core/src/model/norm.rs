@@ -72,12 +72,16 @@ impl<T: Scalar> Shell<T> {
         // How the slope changes as u turns: the part of A·normal across u, by |y|.
         let swing = (stretched - self.u * self.u.dot(&stretched)) / self.length;
         let by_y = self.u * per_slope - swing * ratio;
-        let by_gain = by_y * self.x.transpose() - self.u * self.normal.transpose() * ratio;
         let by_bias = -gain.tr_mul(&by_y);
         let mut all = SVector::<T, ENTRIES>::zeros();
-        let by_rows = by_gain.transpose();
-        for (slot, value) in all.iter_mut().zip(by_rows.iter().chain(by_bias.iter())) {
-            *slot = *value;
+        let mut slots = all.iter_mut();
+        for (by_y, u) in by_y.iter().zip(self.u.iter()) {
+            for ((x, n), slot) in self.x.iter().zip(self.normal.iter()).zip(&mut slots) {
+                *slot = *by_y * *x - *u * *n * ratio;
+            }
+        }
+        for (by_bias, slot) in by_bias.iter().zip(slots) {
+            *slot = *by_bias;
         }
         all
     }

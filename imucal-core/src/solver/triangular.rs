@@ -31,6 +31,11 @@ impl<T: Scalar, const P: usize> Triangular<T, P> {
         rotate_in(self.r.as_mut_slice(), self.q.as_mut_slice(), row.as_mut_slice(), residual);
     }
 
+    /// R by columns, q, and Σ r², for whoever takes in many rows at a time.
+    pub(super) fn parts(&mut self) -> (&mut [T], &mut [T], &mut T) {
+        (self.r.as_mut_slice(), self.q.as_mut_slice(), &mut self.squared_sum)
+    }
+
     /// Σ r² of the rows.
     pub fn squared_sum(&self) -> T {
         self.squared_sum

@@ -1,7 +1,5 @@
 //! The step of a converter, from the samples.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Vector3;
 
 /// Smallest difference between two values that an axis shows; zero for an axis that shows but one.
@@ -72,14 +70,17 @@ struct Codes {
 impl Codes {
     /// `None` where steps leave no error: none are known, or noise goes over many of them.
     fn of(step: f64, samples: impl Iterator<Item = f64>) -> Option<Self> {
-        let mut counts: BTreeMap<i64, f64> = BTreeMap::new();
-        if step > 0.0 {
-            samples.for_each(|x| *counts.entry((x / step).round() as i64).or_default() += 1.0);
+        if step <= 0.0 {
+            return None;
         }
-        let most = *counts.iter().max_by(|a, b| a.1.total_cmp(b.1))?.0;
-        let total: f64 = counts.values().sum();
-        counts.retain(|code, count| (*code - most).abs() < 2 || *count > MOVING * total);
-        let extent = counts.last_key_value()?.0 - counts.first_key_value()?.0;
+        let mut codes: Vec<i64> = samples.map(|x| (x / step).round() as i64).collect();
+        codes.sort_unstable();
+        let mut counts: Vec<(i64, f64)> =
+            codes.chunk_by(|a, b| a == b).map(|alike| (alike[0], alike.len() as f64)).collect();
+        let most = counts.iter().max_by(|a, b| a.1.total_cmp(&b.1))?.0;
+        let total = codes.len() as f64;
+        counts.retain(|(code, count)| (*code - most).abs() < 2 || *count > MOVING * total);
+        let extent = counts.last()?.0 - counts.first()?.0;
         if extent > DITHER {
             return None;
         }

@@ -151,11 +151,15 @@ impl<'a> AxisSamples<'a> {
 /// Probability that as many values are equal to an extreme as are, by how near as many others come to it and the smallest
 /// step between any two.
 pub(crate) fn pile_chance(values: &[f64], extreme: f64) -> f64 {
+    // Counted before anything is sorted: most extremes are those of noise.
+    if values.iter().filter(|value| **value == extreme).count() < PILE {
+        return 1.0;
+    }
     let mut off: Vec<f64> =
         values.iter().map(|value| (value - extreme).abs()).filter(|o| o.is_finite()).collect();
     off.sort_unstable_by(f64::total_cmp);
     let piled = off.partition_point(|off| *off == 0.0);
-    if piled < PILE || off.len() < 2 * piled {
+    if off.len() < 2 * piled {
         return 1.0;
     }
     let steps = off.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0);
