@@ -6,10 +6,11 @@ use std::{
     env,
     ffi::{OsStr, OsString},
     path::Path,
-    process::{Child, Command, ExitCode, Stdio},
+    process::{Command, ExitCode, Stdio},
     thread,
-    time::{Duration, Instant},
 };
+
+mod process;
 
 /// Effects, each with those before it, in usual sizes.
 const EFFECTS: [&str; 3] = ["acc.scale_quadratic=3", "mag.gimbal_hard_iron_outer=3", "gyr.temp_bias=3"];
@@ -117,23 +118,6 @@ fn simulate(recording: &Path, length: u32, effects: &[&str]) {
 
 /// Seconds and mebibytes.
 fn diagnose(program: &OsStr, arguments: &[&Path]) -> (f64, f64) {
-    let start = Instant::now();
-    let mut child = imucal(program).arg("diagnose").args(arguments).spawn().expect("it runs");
-    let mut most = 0.0;
-    loop {
-        most = held(&child).unwrap_or(most);
-        if let Some(status) = child.try_wait().expect("it was started") {
-            assert!(status.success(), "{status}");
-            return (start.elapsed().as_secs_f64(), most);
-        }
-        thread::sleep(Duration::from_millis(10));
-    }
-}
-
-/// The most memory that a program has held so far, MiB, where the system says it.
-fn held(child: &Child) -> Option<f64> {
-    let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-    let kibibytes: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kibibytes / 1024.0)
+    let run = process::run(imucal(program).arg("diagnose").args(arguments));
+    (run.seconds, run.mebibytes)
 }

@@ -1,5 +1,10 @@
 //! The step of a converter, from the samples.
 
+use std::{
+    collections::HashSet,
+    hash::{BuildHasherDefault, Hasher},
+};
+
 use nalgebra::Vector3;
 
 /// Smallest difference between two values that an axis shows; zero for an axis that shows but one.
@@ -8,8 +13,7 @@ use nalgebra::Vector3;
 pub fn quantum(values: &[Vector3<f64>], usable: &[bool]) -> Vector3<f64> {
     Vector3::from_fn(|axis, _| {
         let finite = values.iter().zip(usable).filter(|(v, usable)| **usable && v[axis].is_finite());
-        let mut sorted: Vec<f64> = finite.map(|(v, _)| v[axis]).collect();
-        sorted.sort_unstable_by(f64::total_cmp);
+        let sorted = distinct(finite.map(|(v, _)| v[axis]));
         let extent = sorted.first().zip(sorted.last()).map_or(0.0, |(low, high)| high - low);
         // Values of one code that went through another unit may differ by rounding.
         let least = 1e-9 * extent;
@@ -17,6 +21,34 @@ pub fn quantum(values: &[Vector3<f64>], usable: &[bool]) -> Vector3<f64> {
         let step = steps.fold(f64::INFINITY, f64::min);
         if step.is_finite() { step } else { 0.0 }
     })
+}
+
+/// Each value once, ascending: a converter puts out few of them, so that they are found before they are sorted.
+fn distinct(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let all: HashSet<u64, BuildHasherDefault<BitHash>> = values.map(f64::to_bits).collect();
+    let mut sorted: Vec<f64> = all.into_iter().map(f64::from_bits).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    sorted
+}
+
+/// A hash of a number's bits, by multiplication (Knuth, *The Art of Computer Programming* 3, 6.4).
+#[derive(Default)]
+struct BitHash(u64);
+
+impl Hasher for BitHash {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|byte| self.write_u64(u64::from(*byte)));
+    }
+
+    fn write_u64(&mut self, bits: u64) {
+        let mixed = (self.0 ^ bits).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        // Both ends are looked at, and a product's lower bits know nothing of the upper ones.
+        self.0 = mixed ^ (mixed >> 32);
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
+    }
 }
 
 /// Mean squared errors that a converter's steps leave in the means of samples, whatever their number; each rest is of one

@@ -21,6 +21,7 @@ use imucal_core::{
     triad::Triad,
 };
 use nalgebra::{DMatrix, Matrix3, Vector3};
+use rayon::prelude::*;
 
 use super::{
     gyr_residual,
@@ -170,7 +171,7 @@ impl Scene<'_> {
             shell.points.iter().map(|p| shell.triad.correct(&p.value).normalize()).collect();
         let mut tests: Vec<Tested> =
             norm_residual::columns(&directions, &self.courses(&at), kind == SensorKind::Acc)
-                .iter()
+                .par_iter()
                 .filter_map(|columns| {
                     let score = match kind {
                         SensorKind::Mag => test.test_in_blocks(&columns.values, &BLOCKS),

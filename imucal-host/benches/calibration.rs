@@ -1,0 +1,139 @@
+//! How long a calibration takes: `imucal calibrate` by rests and by samples of a magnetometer, and the fit of an accelerometer alone by
+//! the core, next to SciPy where Python has it. Prints the tables of docs/performance.md; figures are ratios within one run.
+//!
+//! `IMUCAL_PYTHON=PROGRAM` names the Python that has SciPy; without one its column is empty, and that is said.
+
+use std::{env, ffi::OsString, fmt::Write, fs, hint::black_box, path::Path, process::Command, time::Instant};
+
+use imucal_core::{
+    model::{norm::NormModel, parameterisation::UPPER_TRIANGULAR},
+    observation::ShellPoint,
+    solver::{LevenbergMarquardt, lm::Settings},
+    triad::Triad,
+};
+use imucal_host::simulator::{
+    SimulatedUnit, Tumble,
+    random::{Purpose, Random},
+    record,
+};
+use nalgebra::{Matrix3, Vector3};
+
+mod process;
+
+/// Rests of a hand's recordings, and samples of clouds.
+const RESTS: [usize; 4] = [30, 100, 300, 1000];
+const SAMPLES: [usize; 3] = [10_000, 100_000, 1_000_000];
+/// Points of a fit alone, and how often it is done; the quickest counts.
+const POINTS: [(usize, usize); 3] = [(38, 300), (1000, 50), (100_000, 5)];
+/// Length of what is measured, in its unit.
+const LENGTH: f64 = 9.8;
+
+fn main() {
+    let folder = tempfile::tempdir().expect("a folder");
+    println!("Rests of a recording at 50 Hz, `imucal calibrate`:\n");
+    println!(
+        "| rests | rows | s | s a rest over that of {} | MiB |\n| --- | --- | --- | --- | --- |",
+        RESTS[0]
+    );
+    let mut first = None;
+    for rests in RESTS {
+        let unit = SimulatedUnit { interval: 0.02, ..SimulatedUnit::mtx() };
+        let recording = record("rests.csv", &Tumble::new(rests, 1), &unit, 1);
+        let path = folder.path().join("rests.csv");
+        recording.write(&path).expect("room");
+        row(rests, recording.rows(), calibrate(&path), &mut first);
+    }
+    println!("\nSamples of a magnetometer, `imucal calibrate`:\n");
+    println!(
+        "| samples | rows | s | s a sample over that of {} | MiB |\n| --- | --- | --- | --- | --- |",
+        SAMPLES[0]
+    );
+    let mut first = None;
+    for samples in SAMPLES {
+        let path = folder.path().join("cloud.csv");
+        cloud(&path, samples);
+        row(samples, samples, calibrate(&path), &mut first);
+    }
+    println!(
+        "\nAn accelerometer's nine parameters by the core in f64, and SciPy's least_squares (MINPACK, numerical derivatives):\n"
+    );
+    println!("| points | s | SciPy's time over it |\n| --- | --- | --- |");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/peers/norm_fit.py");
+    for (count, repeats) in POINTS {
+        let points = points(count, 0.003, LENGTH);
+        let ours = fit(&points, repeats);
+        let peer = peer(&script, folder.path(), &points, repeats.min(50));
+        let ratio = peer.map_or_else(|| "–".to_owned(), |peer| format!("{:.1}", peer / ours));
+        println!("| {count} | {ours:.2e} | {ratio} |");
+    }
+}
+
+fn calibrate(path: &Path) -> process::Run {
+    process::run(Command::new(env!("CARGO_BIN_EXE_imucal")).arg("calibrate").arg(path))
+}
+
+fn row(count: usize, rows: usize, run: process::Run, first: &mut Option<f64>) {
+    let each = run.seconds / count as f64;
+    let growth = each / *first.get_or_insert(each);
+    println!("| {count} | {rows} | {:.2} | {growth:.2} | {:.0} |", run.seconds, run.mebibytes);
+}
+
+/// Points near a sphere of a length, as a sensor with errors and noise gives them.
+fn points(count: usize, noise: f64, length: f64) -> Vec<ShellPoint<f64>> {
+    let mut random = Random::new(1, Purpose::Noise);
+    let gain = Matrix3::new(1.01, 0.003, -0.002, 0.004, 0.99, 0.005, 0.001, -0.003, 1.02);
+    let bias = Vector3::new(0.1, -0.2, 0.3) * (0.1 * length);
+    (0..count)
+        .map(|_| {
+            let direction = random.normals().normalize() * length;
+            ShellPoint { value: gain * direction + bias + random.normals() * noise, excess: 0.0 }
+        })
+        .collect()
+}
+
+/// A recording of a magnetometer alone.
+fn cloud(path: &Path, samples: usize) {
+    let mut text = "t,mag_x,mag_y,mag_z\n".to_owned();
+    for (k, point) in points(samples, 0.2, 48.0).iter().enumerate() {
+        let value = point.value;
+        writeln!(text, "{:.2},{:.3},{:.3},{:.3}", k as f64 / 100.0, value.x, value.y, value.z).expect("text");
+    }
+    fs::write(path, text).expect("room");
+    let manifest = "format = \"imucal-recording/1\"\n[units]\nt = \"s\"\nmag = \"uT\"\n[site]\nlatitude_deg = 39.87\nheight_m = 938.0\n";
+    fs::write(path.with_extension("toml"), manifest).expect("room");
+}
+
+/// Seconds of a fit from the nominal triad, the quickest of so many.
+fn fit(points: &[ShellPoint<f64>], repeats: usize) -> f64 {
+    let model = NormModel { points, norm: LENGTH, form: UPPER_TRIANGULAR };
+    let start = UPPER_TRIANGULAR.theta(&Triad::identity());
+    let timed = |_| {
+        let begun = Instant::now();
+        let mut solver = LevenbergMarquardt::new(start, Settings::default());
+        let report = black_box(solver.run(black_box(&model)));
+        assert!(report.termination.was_successful(), "{report:?}");
+        begun.elapsed().as_secs_f64()
+    };
+    (0..repeats).map(timed).fold(f64::INFINITY, f64::min)
+}
+
+/// Seconds that SciPy takes of the same points, if Python has it.
+fn peer(script: &Path, folder: &Path, points: &[ShellPoint<f64>], repeats: usize) -> Option<f64> {
+    let path = folder.join("points.csv");
+    let lines = points.iter().map(|point| format!("{},{},{}\n", point.value.x, point.value.y, point.value.z));
+    fs::write(&path, lines.collect::<String>()).expect("room");
+    let python = env::var_os("IMUCAL_PYTHON").unwrap_or_else(|| OsString::from("python3"));
+    let mut command = Command::new(&python);
+    command.arg(script).arg(&path).arg(LENGTH.to_string()).arg(repeats.to_string());
+    match command.output() {
+        Ok(ended) if ended.status.success() => String::from_utf8_lossy(&ended.stdout).trim().parse().ok(),
+        Ok(ended) => {
+            eprintln!("*** SKIPPED: SciPy: {} ***", String::from_utf8_lossy(&ended.stderr).trim());
+            None
+        }
+        Err(fault) => {
+            eprintln!("*** SKIPPED: SciPy: {}: {fault} ***", python.to_string_lossy());
+            None
+        }
+    }
+}
