@@ -41,13 +41,12 @@ pub fn of_times(times: &[f64], variance: f64) -> Vec<Process> {
 
 /// Covariance of the means of a sum of processes over spans that do not overlap.
 pub fn covariance_of(spans: &[Span], processes: &[Process]) -> DMatrix<f64> {
-    DMatrix::from_fn(spans.len(), spans.len(), |i, j| {
-        let both = |process: &Process| match i == j {
-            true => process.variance_of_mean(spans[i].end - spans[i].start),
-            false => process.covariance_of_means(&spans[i], &spans[j]),
-        };
-        processes.iter().map(both).sum()
-    })
+    let mut covariance = DMatrix::zeros(spans.len(), spans.len());
+    for process in processes {
+        process.add_covariance(spans, &mut covariance);
+    }
+    covariance.fill_upper_triangle_with_lower_triangle();
+    covariance
 }
 
 #[cfg(test)]

@@ -87,6 +87,15 @@ impl Noise {
         self.density * self.drift
     }
 
+    /// V/S of observations that do not overlap.
+    pub fn covariance(&self, spans: &[Span]) -> DMatrix<f64> {
+        let mut covariance = flicker::covariance_of(spans, &flicker::processes(spans, self.drift));
+        for (k, span) in spans.iter().enumerate() {
+            covariance[(k, k)] += self.white / (span.end - span.start);
+        }
+        covariance
+    }
+
     /// Aᵀ (V/S) A of observations in time order that do not overlap; A has a row for each.
     pub fn carried(&self, spans: &[Span], influence: &DMatrix<f64>) -> DMatrix<f64> {
         let mut sum = DMatrix::zeros(influence.ncols(), influence.ncols());

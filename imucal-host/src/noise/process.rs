@@ -69,8 +69,19 @@ impl Process {
     /// Covariance of the means over two spans that do not overlap.
     pub fn covariance_of_means(&self, one: &Span, other: &Span) -> f64 {
         let [a, b] = [one, other].map(|span| span.end - span.start);
-        let gap = (other.start - one.end).max(one.start - other.end).max(0.0);
-        self.sigma * self.sigma * self.kept(gap) * self.share_of_end(a) * self.share_of_end(b)
+        self.sigma * self.sigma * self.kept(gap(one, other)) * self.share_of_end(a) * self.share_of_end(b)
+    }
+
+    /// Adds the covariance of the means over spans that do not overlap, below the diagonal and on it.
+    pub fn add_covariance(&self, spans: &[Span], to: &mut DMatrix<f64>) {
+        let variance = self.sigma * self.sigma;
+        let shares: Vec<f64> = spans.iter().map(|span| self.share_of_end(span.end - span.start)).collect();
+        for (j, other) in spans.iter().enumerate() {
+            to[(j, j)] += self.variance_of_mean(other.end - other.start);
+            for (i, one) in spans.iter().enumerate().skip(j + 1) {
+                to[(i, j)] += variance * self.kept(gap(one, other)) * shares[i] * shares[j];
+            }
+        }
     }
 
     /// Aᵀ F A, F the covariance of the means over spans in time order that do not overlap; A has a row for each.
@@ -92,6 +103,11 @@ impl Process {
         }
         sum * (self.sigma * self.sigma)
     }
+}
+
+/// Time between two spans, s.
+fn gap(one: &Span, other: &Span) -> f64 {
+    (other.start - one.end).max(one.start - other.end).max(0.0)
 }
 
 #[cfg(test)]

@@ -169,20 +169,19 @@ impl Scene<'_> {
         };
         let directions: Vec<_> =
             shell.points.iter().map(|p| shell.triad.correct(&p.value).normalize()).collect();
-        let mut tests: Vec<Tested> =
-            norm_residual::columns(&directions, &self.courses(&at), kind == SensorKind::Acc)
-                .par_iter()
-                .filter_map(|columns| {
-                    let score = match kind {
-                        SensorKind::Mag => test.test_in_blocks(&columns.values, &BLOCKS),
-                        _ => test.test(&columns.values, columns.values.ncols()),
-                    };
-                    Some(Tested::of(columns, score?))
-                })
-                .filter(|test| {
-                    kind != SensorKind::Mag || test.score.explained > least_explained(test.follows)
-                })
-                .collect();
+        let courses = self.courses(&at);
+        let mut tests: Vec<Tested> = norm_residual::columns(&directions, &courses, kind == SensorKind::Acc)
+            .par_iter()
+            .filter_map(|make| {
+                let columns = make();
+                let score = match kind {
+                    SensorKind::Mag => test.test_in_blocks(&columns.values, &BLOCKS),
+                    _ => test.test(&columns.values, columns.values.ncols()),
+                };
+                Some(Tested::of(&columns, score?))
+            })
+            .filter(|test| kind != SensorKind::Mag || test.score.explained > least_explained(test.follows))
+            .collect();
         let (mut excess, mut turning) = (None, None);
         if kind == SensorKind::Acc {
             tests.extend(

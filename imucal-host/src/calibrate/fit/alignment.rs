@@ -6,10 +6,10 @@ use imucal_core::{
     solver::{LevenbergMarquardt, lm::Settings},
     triad::Triad,
 };
-use nalgebra::{DMatrix, DVector, Matrix3, MatrixXx3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::{
-    directions::Directions,
+    directions::{Directions, Move},
     held_out::{by_steps, root_mean},
     rows::{Residuals, Rows, influence},
 };
@@ -72,12 +72,8 @@ pub fn align_at_rests(
     }
     let errors = |model: &DipModel<'_, f64>, theta: &SVector<f64, 4>| {
         let rotation = imucal_core::rotation::exp(&theta.xyz());
-        let by_direction: Vec<(usize, MatrixXx3<f64>)> = (at_rest.iter().zip(model.pairs).enumerate())
-            .map(|(k, (seen, pair))| {
-                let mut by = MatrixXx3::zeros(at_rest.len());
-                by.set_row(k, &(rotation * pair.u_b).transpose());
-                (seen.rest, by)
-            })
+        let moves: Vec<Move> = (at_rest.iter().zip(model.pairs).enumerate())
+            .map(|(row, (seen, pair))| Move { row, rest: seen.rest, by: rotation * pair.u_b })
             .collect();
         let of_field = DVector::from_iterator(
             at_rest.len(),
@@ -88,7 +84,7 @@ pub fn align_at_rests(
             }),
         );
         let parts = Parts {
-            parts: [&directions.propagated(&by_direction), &DMatrix::from_diagonal(&of_field)],
+            parts: [&directions.propagated(at_rest.len(), &moves), &DMatrix::from_diagonal(&of_field)],
             ratios: &RATIOS,
             scale: Scale::AtLeastOne,
             five: false,

@@ -13,7 +13,7 @@
 //! A norm fit uses the part of e along u and a direction the part across it, so both errors are taken as independent.
 
 use imucal_core::triad::Triad;
-use nalgebra::{DMatrix, Matrix3, Matrix3xX, MatrixXx3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 
 use crate::noise::{Noise, Span};
 
@@ -66,21 +66,44 @@ impl Directions {
         Matrix3xX::from_columns(&columns)
     }
 
-    /// Covariance of rows that follow from directions: `by` says for each rest (ascending) how they move with its
-    /// direction, a column an axis.
-    pub fn propagated(&self, by: &[(usize, MatrixXx3<f64>)]) -> DMatrix<f64> {
-        let rows = by.first().map_or(0, |(_, by)| by.nrows());
-        let spans: Vec<Span> = by.iter().map(|(rest, _)| self.spans[*rest].clone()).collect();
-        let moved: Vec<MatrixXx3<f64>> = by.iter().map(|(rest, by)| by * self.by_mean(*rest)).collect();
-        let mut covariance = DMatrix::zeros(rows, rows);
-        for axis in 0..3 {
-            let own = DMatrix::from_fn(by.len(), rows, |k, row| moved[k][(row, axis)]);
-            covariance += self.noise.carried(&spans, &own) * self.noise.density[axis];
+    /// Covariance of so many rows that follow from directions.
+    pub fn propagated(&self, rows: usize, moves: &[Move]) -> DMatrix<f64> {
+        let mut rests: Vec<usize> = moves.iter().map(|one| one.rest).collect();
+        rests.sort_unstable();
+        rests.dedup();
+        let spans: Vec<Span> = rests.iter().map(|rest| self.spans[*rest].clone()).collect();
+        let between = self.noise.covariance(&spans);
+        let root = self.noise.density.map(f64::sqrt);
+        let by_entries: Vec<Matrix3xX<f64>> = rests.iter().map(|rest| self.by_entries(*rest)).collect();
+        let by_mean: Vec<Matrix3<f64>> = rests.iter().map(|rest| self.by_mean(*rest)).collect();
+        let mut common = DMatrix::zeros(rows, self.covariance_of.len());
+        // Row, rest, and how it moves with that rest's white noise at density one.
+        let mut moved: Vec<(usize, usize, Vector3<f64>)> = Vec::with_capacity(moves.len());
+        for one in moves {
+            let at = rests.partition_point(|rest| *rest < one.rest);
+            let mut row = common.row_mut(one.row);
+            row += one.by.transpose() * &by_entries[at];
+            moved.push((one.row, at, by_mean[at].tr_mul(&one.by).component_mul(&root)));
         }
-        let zero = DMatrix::zeros(rows, self.covariance_of.len());
-        let common = by.iter().fold(zero, |sum, (rest, by)| sum + by * self.by_entries(*rest));
-        covariance + &common * &self.covariance * common.transpose()
+        let mut covariance = &common * &self.covariance * common.transpose();
+        for (row, at, by) in &moved {
+            for (other_row, other_at, other) in &moved {
+                covariance[(*other_row, *row)] += by.dot(other) * between[(*other_at, *at)];
+            }
+        }
+        covariance
     }
+}
+
+/// How a row moves with the direction at a rest.
+#[derive(Clone, Copy, Debug)]
+pub struct Move {
+    /// The row.
+    pub row: usize,
+    /// The rest.
+    pub rest: usize,
+    /// Its derivative by the direction.
+    pub by: Vector3<f64>,
 }
 
 #[cfg(test)]
@@ -130,9 +153,12 @@ mod tests {
         let means = vec![Vector3::new(0.0, 0.0, 10.0), Vector3::new(10.0, 0.0, 0.0)];
         let found = directions(Triad::identity(), means);
         // Two rows see the x of the first rest's direction, the second with its sign reversed; one the other rest's.
-        let first = MatrixXx3::from_row_slice(&[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]);
-        let second = MatrixXx3::from_row_slice(&[0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
-        let covariance = found.propagated(&[(0, first), (1, second)]);
+        let moves = [
+            Move { row: 0, rest: 0, by: Vector3::x() },
+            Move { row: 1, rest: 0, by: -Vector3::x() },
+            Move { row: 0, rest: 1, by: Vector3::y() },
+        ];
+        let covariance = found.propagated(2, &moves);
         // 4e-4 over 4 s, over ten squared.
         let each = 4e-4 / 4.0 / 100.0;
         let expected = DMatrix::from_row_slice(2, 2, &[2.0 * each, -each, -each, each]);

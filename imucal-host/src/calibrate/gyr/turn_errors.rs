@@ -16,6 +16,8 @@
 //! s and ρ come from the turns' own residuals ([`crate::noise::interval`]). Each turn is two rows, across the direction
 //! after it. Not modelled: noise of rates that differs by axis, drift within a turn beyond the bias path.
 
+use std::collections::BTreeMap;
+
 use imucal_core::{
     model::{
         parameterisation::FULL,
@@ -28,7 +30,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, MatrixXx3, SMatrix, Vector3};
 
 use crate::{
     calibrate::fit::{
-        directions::Directions,
+        directions::{Directions, Move},
         rows::{Rows, influence},
     },
     noise::interval::{Errors, Parts, Scale},
@@ -132,21 +134,15 @@ impl TurnCovariance {
     ) -> Self {
         let turns: Vec<Linear> = turns.iter().map(|turn| linear(turn, gain)).collect();
         let rows = 2 * turns.len();
-        let mut rests: Vec<usize> = turns.iter().flat_map(|turn| [turn.rests.0, turn.rests.1]).collect();
-        rests.sort_unstable();
-        rests.dedup();
-        let mut by_direction: Vec<(usize, MatrixXx3<f64>)> =
-            rests.iter().map(|rest| (*rest, MatrixXx3::zeros(rows))).collect();
-        for (k, turn) in turns.iter().enumerate() {
-            for (rest, by) in [(turn.rests.0, &turn.by_before), (turn.rests.1, &turn.by_after)] {
-                if let Ok(at) = rests.binary_search(&rest) {
-                    let mut there = by_direction[at].1.rows_mut(2 * k, 2);
-                    there += by;
-                }
-            }
-        }
-        let of_directions = directions.propagated(&by_direction);
-        let of_rates = of_rates(&turns, &rests, directions, rates);
+        let of_ends = |(k, turn): (usize, &Linear)| {
+            let ends = [(turn.rests.0, &turn.by_before), (turn.rests.1, &turn.by_after)];
+            ends.map(|(rest, by)| {
+                [0, 1].map(|row| Move { row: 2 * k + row, rest, by: by.row(row).transpose() })
+            })
+        };
+        let moves: Vec<Move> = turns.iter().enumerate().flat_map(of_ends).flatten().collect();
+        let of_directions = directions.propagated(rows, &moves);
+        let of_rates = of_rates(&turns, directions, rates);
         Self { of_directions, of_rates }
     }
 
@@ -168,7 +164,7 @@ impl TurnCovariance {
 }
 
 /// V_g.
-fn of_rates(turns: &[Linear], rests: &[usize], directions: &Directions, rates: &RateNoise) -> DMatrix<f64> {
+fn of_rates(turns: &[Linear], directions: &Directions, rates: &RateNoise) -> DMatrix<f64> {
     let rows = 2 * turns.len();
     let mut covariance = DMatrix::zeros(rows, rows);
     let mut by_bias = MatrixXx3::zeros(rows);
@@ -182,15 +178,21 @@ fn of_rates(turns: &[Linear], rests: &[usize], directions: &Directions, rates: &
     if !rates.interpolated {
         return covariance;
     }
-    for rest in rests {
-        let span = &directions.spans[*rest];
-        let mut by = MatrixXx3::zeros(rows);
-        for (k, turn) in turns.iter().enumerate() {
-            if turn.rests.0 == *rest || turn.rests.1 == *rest {
-                by.rows_mut(2 * k, 2).copy_from(&(&turn.by_bias * 0.5));
-            }
+    // Turns that end at a rest share half of its bias' error.
+    let mut at: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (k, turn) in turns.iter().enumerate() {
+        at.entry(turn.rests.0).or_default().push(k);
+        if turn.rests.1 != turn.rests.0 {
+            at.entry(turn.rests.1).or_default().push(k);
         }
-        covariance += &by * by.transpose() * (rates.density / (span.end - span.start));
+    }
+    for (rest, sharing) in at {
+        let span = &directions.spans[rest];
+        let variance = 0.25 * rates.density / (span.end - span.start);
+        for (k, l) in sharing.iter().flat_map(|k| sharing.iter().map(move |l| (*k, *l))) {
+            let mut there = covariance.view_mut((2 * k, 2 * l), (2, 2));
+            there += &turns[k].by_bias * turns[l].by_bias.transpose() * variance;
+        }
     }
     covariance
 }
