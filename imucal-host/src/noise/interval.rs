@@ -18,6 +18,7 @@
 //! independent of s².
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use super::restricted::Restricted;
@@ -133,7 +134,8 @@ impl Parts<'_> {
         unit.column_iter_mut().for_each(|mut column| {
             column.normalize_mut();
         });
-        let weighed = self.ratios.iter().filter_map(|(ratio, prior)| {
+        // A factor each, as large as the observations are many.
+        let weighed = self.ratios.par_iter().filter_map(|(ratio, prior)| {
             let columns = self.weigh(*ratio, residuals, &unit)?;
             let unscaled = &carried[0] + &carried[1] * *ratio;
             Some(Weighed { ratio: *ratio, log_prior: prior.ln(), unscaled, columns })

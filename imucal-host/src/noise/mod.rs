@@ -119,3 +119,16 @@ impl Noise {
         sum
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_covariance_of_observations_is_what_they_carry_one_by_one() {
+        let spans = [0.0..4.0, 4.0..9.0, 12.0..52.0, 52.5..53.0];
+        let noise = Noise { density: Vector3::repeat(1.0), white: 0.3, drift: 0.02 };
+        let carried = noise.carried(&spans, &DMatrix::identity(4, 4));
+        assert!((noise.covariance(&spans) - carried).amax() < 1e-12);
+    }
+}
