@@ -125,7 +125,8 @@ fn spread(population: &Population) -> Markup {
         dot_rows(&scale, &rows, &[("limit", -limit), ("limit", limit)], "z against the others", &name);
     let keys = html! {
         span class="key after" { "alike" } span class="key before" { "unlike" }
-        " Limit of chance: " (rounded(limit, 1)) "."
+        br;
+        "Limit of chance: " (rounded(limit, 1)) "."
     };
     figure(&name, &drawing, &keys)
 }
@@ -152,7 +153,11 @@ fn units(entries: &[Entry]) -> Markup {
         let sensors = entry.sensors.iter().map(residual).collect::<Vec<_>>().join("; ");
         html! { td { (entry.name) } td { (hash) } td { (sensors) } }
     };
-    let heads = ["recording", "SHA-256 begins", "sensors, rms residual of observations left out"];
+    let heads = [
+        "recording",
+        "SHA-256 begins",
+        "sensors, with the rms residual of observations left out (calibrated unit; rad a turn)",
+    ];
     html! { @if !calibrated.is_empty() {
         h2 { "Calibrated" }
         (table(&heads, "list", calibrated.iter().map(row), calibrated.len()))
