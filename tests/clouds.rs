@@ -145,6 +145,7 @@ fn whole(seed: u64) -> Triple {
         unit: imucal_host::recording::Unit::MicroTesla,
         nominal: imucal_host::recording::Nominal::IDENTITY,
         full_scale: None,
+        single: false,
     }
 }
 

@@ -1,5 +1,11 @@
 //! Apply: a recording corrected by the core, in `f32`, as the device would.
 
+use std::convert::Infallible;
+
+mod stream;
+
+pub use self::stream::{Applied, Source, StreamError, stream};
+
 use imucal_core::{
     corrector::{Compensator, FullCorrector},
     nonlinearity::TooSteep,
@@ -110,10 +116,40 @@ pub fn apply(
     stored: &StoredCalibration,
     record: &CalibrationRecord<HigherOrder>,
 ) -> Result<Recording, TooSteep> {
-    apply_by(recording, stored, |kind, raw, warmth| {
-        let Some(mut core) = corrector(record, kind)? else { return Ok(raw.to_vec()) };
-        Ok(raw.iter().zip(warmth).map(|(raw, warmth)| core.apply_at(raw, *warmth)).collect())
-    })
+    Ok(Correction::new(stored, record)?.correct(recording.clone()))
+}
+
+/// A calibration that corrects a recording part after part; what a sensor's correction keeps from row to row goes on
+/// from one part to the next.
+pub struct Correction<'a> {
+    stored: &'a StoredCalibration,
+    /// Of each sensor that is calibrated.
+    cores: [Option<Compensator<f32, FullCorrector<f32>>>; 3],
+}
+
+impl<'a> Correction<'a> {
+    /// A correction that begins with the first row.
+    ///
+    /// # Errors
+    /// As [`apply`].
+    pub fn new(
+        stored: &'a StoredCalibration,
+        record: &CalibrationRecord<HigherOrder>,
+    ) -> Result<Self, TooSteep> {
+        let [acc, gyr, mag] = SensorKind::ALL.map(|kind| corrector(record, kind));
+        Ok(Self { stored, cores: [acc?, gyr?, mag?] })
+    }
+
+    /// The next rows as [`apply`] gives them.
+    #[must_use]
+    pub fn correct(&mut self, part: Recording) -> Recording {
+        let cores = &mut self.cores;
+        let corrected = corrected_by(part, self.stored, |kind, raw, warmth| {
+            let Some(core) = &mut cores[kind as usize] else { return Ok(raw.to_vec()) };
+            Ok(raw.iter().zip(warmth).map(|(raw, warmth)| core.apply_at(raw, *warmth)).collect())
+        });
+        corrected.unwrap_or_else(|never: Infallible| match never {})
+    }
 }
 
 /// What corrects samples of a sensor in `f32`, one after another, as a device does: raw values in the calibration's
@@ -136,12 +172,19 @@ pub fn corrector(
 pub fn apply_by<E>(
     recording: &Recording,
     stored: &StoredCalibration,
+    correct: impl FnMut(SensorKind, &[Vector3<f32>], &[f32]) -> Result<Vec<Vector3<f32>>, E>,
+) -> Result<Recording, E> {
+    corrected_by(recording.clone(), stored, correct)
+}
+
+fn corrected_by<E>(
+    mut corrected: Recording,
+    stored: &StoredCalibration,
     mut correct: impl FnMut(SensorKind, &[Vector3<f32>], &[f32]) -> Result<Vec<Vector3<f32>>, E>,
 ) -> Result<Recording, E> {
-    let mut corrected = recording.clone();
-    let warmth: Vec<f32> = match &recording.temperature {
+    let warmth: Vec<f32> = match &corrected.temperature {
         Some(temperature) => temperature.iter().map(|t| *t as f32).collect(),
-        None => vec![f32::NAN; recording.rows()],
+        None => vec![f32::NAN; corrected.rows()],
     };
     for kind in SensorKind::ALL {
         let Some(stored) = stored.triad(kind) else { continue };
@@ -159,6 +202,7 @@ pub fn apply_by<E>(
         triple.unit = stored.unit_out;
         triple.full_scale = triple.full_scale_si().map(|scale| scale * nominal.per_unit.abs());
         triple.nominal = nominal;
+        triple.single = true;
         set_unit(&mut corrected, kind, stored.unit_out);
     }
     Ok(corrected)

@@ -103,7 +103,7 @@ pub fn corrupt(
             *value = raw.map(|component| nominal.to_si(component));
         }
         set_unit(&mut read.manifest, kind, triad.unit_in, nominal);
-        let triple = Triple { values, unit: triad.unit_in, nominal, full_scale: None };
+        let triple = Triple { values, unit: triad.unit_in, nominal, full_scale: None, single: false };
         match kind {
             SensorKind::Acc => read.acc = Some(triple),
             SensorKind::Gyr => read.gyr = Some(triple),

@@ -22,6 +22,7 @@ fn ideal(rows: usize) -> Recording {
         unit,
         nominal: Nominal::IDENTITY,
         full_scale: None,
+        single: false,
     };
     recording.acc = Some(triple(12.0, Unit::MetrePerSecondSquared));
     recording.gyr = Some(triple(3.0, Unit::RadianPerSecond));
@@ -65,6 +66,7 @@ fn a_corrupted_still_stream_has_the_noise_that_was_asked_for() {
         unit,
         nominal: Nominal::IDENTITY,
         full_scale: None,
+        single: false,
     };
     still.gyr = Some(triple(Unit::RadianPerSecond));
     let noise = noise();

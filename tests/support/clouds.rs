@@ -65,7 +65,7 @@ impl CapCloud {
         Self {
             coverage,
             noise,
-            sensor: Triple { values, unit: Unit::Counts, nominal, full_scale: None },
+            sensor: Triple { values, unit: Unit::Counts, nominal, full_scale: None, single: false },
             field,
             truth: nominal_truth.in_unit(nominal.offset, nominal.per_unit),
         }

@@ -12,7 +12,7 @@
 //! Sources: W. J. Riley, Handbook of Frequency Stability Analysis, NIST SP 1065 (2008); C. A. Greenhall & W. J. Riley (PTTI
 //! 2003); IEEE Std 952, annex C. `imucal-host/docs/noise.md` shows what a command prints.
 
-use std::path::Path;
+use std::{ops::ControlFlow, path::Path};
 
 pub mod cascade;
 pub mod clock;
@@ -85,6 +85,7 @@ pub fn noise(path: &Path, mapping: &Mapping, limits: &Limits) -> Result<Noise, R
                 }
             }
         }
+        ControlFlow::Continue(())
     })?;
     let (recording, manifest, there) = described.unwrap_or_default();
     streams.iter_mut().for_each(SensorStream::end);

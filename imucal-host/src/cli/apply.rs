@@ -13,10 +13,11 @@ use super::{
     load,
     output::say,
     overwrite::{Overwrite, Planned, files_of},
+    progress::Progress,
     reading::Reading,
     refuse, warn,
 };
-use crate::apply;
+use crate::apply::{self, Source, StreamError};
 
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  imucal apply tumble.csv --calibration unit.bin --out tumble-si.csv")]
@@ -45,22 +46,31 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut inputs = files_of(&arguments.recording);
     inputs.push(arguments.calibration.clone());
     let mut files = arguments.overwrite.plan(&inputs, &Planned::recording(&out))?;
-    let recording = columns::read(&arguments.recording, &arguments.columns, arguments.reading)?;
     let stored = match load(&arguments.calibration, arguments.reading)? {
         Ok(stored) => stored,
         Err(damaged) => return Ok(refuse(&damaged)),
     };
     let record = stored.to_record(&arguments.calibration)?;
-    let warning = match apply::check(&recording, &stored, &record, arguments.other_serial) {
-        Ok(warning) => warning,
-        Err(refusal) => return Ok(refuse(&refusal)),
+    let (mapping, limits) = (arguments.columns.mapping()?, arguments.reading.limits());
+    let source = Source { path: &arguments.recording, mapping: &mapping, limits: &limits };
+    let progress = Progress::reading(source.path);
+    let applied = apply::stream(source, (&stored, &record), arguments.other_serial, &out, &mut files);
+    drop(progress);
+    let applied = match applied {
+        Ok(applied) => applied,
+        Err(StreamError::Refused { refusal, warnings }) => {
+            warnings.iter().for_each(|warning| warn(warning));
+            return Ok(refuse(&refusal));
+        }
+        Err(StreamError::Read(error)) => {
+            return Err(columns::explained(source.path, error, arguments.reading));
+        }
+        Err(error) => return Err(error.into()),
     };
-    if let Some(warning) = warning {
-        warn(&warning);
-    }
-    apply::apply(&recording, &stored, &record)?.write_into(&out, &mut files)?;
+    applied.warnings.iter().for_each(|warning| warn(warning));
+    applied.remark.iter().for_each(|remark| warn(remark));
     files.commit()?;
-    say!("{}: {} rows corrected into {}", recording.name, recording.rows(), out.display());
+    say!("{}: {} rows corrected into {}", applied.recording, applied.rows, out.display());
     Ok(Ending::Done)
 }
 

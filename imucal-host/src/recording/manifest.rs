@@ -332,6 +332,7 @@ impl Manifest {
             unit: self.units.of(kind),
             nominal: self.nominal(kind)?,
             full_scale: self.ranges.of(kind),
+            single: false,
         })
     }
 }

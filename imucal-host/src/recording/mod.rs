@@ -204,7 +204,21 @@ impl Recording {
     ///
     /// As [`Recording::write`].
     pub fn write_into(&self, path: &Path, files: &mut OutputSet) -> Result<(), WriteError> {
-        write::writer::write(self, path, files)
+        write::writer::write([self], path, files).map(|_| ())
+    }
+
+    /// As [`Recording::write_into`], of consecutive parts in constant memory; gives the number of rows. The files are those
+    /// that the whole would give.
+    ///
+    /// # Errors
+    ///
+    /// As [`Recording::write`], and for a part whose columns or manifest are not those of the first.
+    pub fn write_parts(
+        parts: impl IntoIterator<Item = Self>,
+        path: &Path,
+        files: &mut OutputSet,
+    ) -> Result<usize, WriteError> {
+        write::writer::write(parts, path, files)
     }
 
     /// Number of rows.

@@ -1,6 +1,6 @@
 //! Recordings of any length, read by parts in constant memory.
 
-use std::{mem, path::Path};
+use std::{mem, ops::ControlFlow, path::Path};
 
 use super::{
     Format, Manifest, Mapping, ReadError, Recording, SensorKind, Warning, log_topics::TopicFault, read,
@@ -13,7 +13,7 @@ const ROWS: usize = 1 << 16;
 
 impl Recording {
     /// Reads a recording by parts, each a recording of consecutive rows. What is odd but harmless is returned, each kind
-    /// of warning once, and in [`Recording::warnings`] of no part.
+    /// of warning once, and in [`Recording::warnings`] of no part. No part follows one that `take` breaks off at.
     ///
     /// A part of a text file has 65 536 rows; one of a Parquet file is a row group, and a log is one part. `limits` hold for one part, so that
     /// the file may be of any length.
@@ -25,7 +25,7 @@ impl Recording {
         path: &Path,
         mapping: &Mapping,
         limits: &Limits,
-        take: &mut dyn FnMut(&Self),
+        take: &mut dyn FnMut(Self) -> ControlFlow<()>,
     ) -> Result<Vec<Warning>, ReadError> {
         let (format, manifest, warnings) = opened(path, mapping, None, limits)?;
         let misled = misled(&warnings);
@@ -44,9 +44,8 @@ impl Recording {
             #[cfg(not(feature = "parquet"))]
             Format::Parquet => return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() }),
             #[cfg(feature = "logs")]
-            Format::Log => {
-                read::logs::read(path, &mapping.topics, field_is_stated, limits).and_then(&mut next)
-            }
+            Format::Log => read::logs::read(path, &mapping.topics, field_is_stated, limits)
+                .and_then(|table| next(table).map(|_| ())),
             #[cfg(not(feature = "logs"))]
             Format::Log => return Err(ReadError::LogsNotBuilt { path: path.to_path_buf() }),
         };
@@ -169,15 +168,15 @@ struct Parts<'a> {
     warnings: Vec<Warning>,
     /// The last time of the parts before, s.
     last: Option<f64>,
-    take: &'a mut dyn FnMut(&Recording),
+    take: &'a mut dyn FnMut(Recording) -> ControlFlow<()>,
 }
 
 impl Parts<'_> {
-    fn next(&mut self, mut table: read::columns::Table) -> Result<(), ReadError> {
+    fn next(&mut self, mut table: read::columns::Table) -> Result<ControlFlow<()>, ReadError> {
         let empty = table.columns[read::columns::TIME].is_empty();
         if empty && self.last.is_some() {
             self.note(mem::take(&mut table.warnings));
-            return Ok(());
+            return Ok(ControlFlow::Continue(()));
         }
         table.warnings.splice(0..0, mem::take(&mut self.of_manifest));
         let (clock, place) = (table.clock.clone(), table.places.of(0));
@@ -198,8 +197,7 @@ impl Parts<'_> {
         }
         self.note(mem::take(&mut part.warnings));
         self.last = part.time.last().copied();
-        (self.take)(&part);
-        Ok(())
+        Ok((self.take)(part))
     }
 
     /// Keeps what no part before has said.
@@ -209,8 +207,10 @@ impl Parts<'_> {
             return;
         }
         for warning in warnings {
+            let count = |kept: &mut Warning| kept.counted_with(&warning);
             let same = |kept: &Warning| mem::discriminant(kept) == mem::discriminant(&warning);
-            if !self.warnings.iter().any(same) {
+            let absurd = matches!(warning, Warning::Absurd { .. });
+            if !self.warnings.iter_mut().any(count) && (absurd || !self.warnings.iter().any(same)) {
                 self.warnings.push(warning);
             }
         }
@@ -241,6 +241,7 @@ mod tests {
             Recording::read_parts(&fixture.path, &Mapping::default(), &Limits::default(), &mut |part| {
                 read.lengths.push(part.rows());
                 read.values.extend(part.gyr.iter().flat_map(|gyr| gyr.values.iter().map(|rate| rate.z)));
+                ControlFlow::Continue(())
             })?;
         Ok(read)
     }
@@ -254,6 +255,19 @@ mod tests {
         assert!(whole.time.iter().zip(&values).all(|(time, rate)| *rate == time / 1024.0));
         assert_eq!(whole.rows(), values.len());
         assert_eq!(whole.warnings, warnings);
+    }
+
+    #[test]
+    fn samples_that_nothing_measures_are_counted_over_all_parts() {
+        let row = |k: usize| {
+            let lost = if k % ROWS == 7 { 1e9 } else { 0.0 };
+            format!("{},{lost},0,{}\n", k as f64 / 256.0, if k == ROWS + 9 { 1e8 } else { 0.5 })
+        };
+        let fixture =
+            csv((0..2 * ROWS + 9).fold("t,gyr_x,gyr_y,gyr_z\n".to_owned(), |text, k| text + &row(k)));
+        let whole = fixture.read().warnings;
+        assert_eq!(parts(&fixture).unwrap().warnings, whole);
+        assert_says(&whole[1].to_string(), &["line 9, column `gyr_x`", "2 more"]);
     }
 
     #[test]

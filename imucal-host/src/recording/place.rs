@@ -25,17 +25,20 @@ impl fmt::Display for Place {
 pub(crate) enum Places {
     /// The line of each row; blank lines and quoted line ends make it more than a count.
     Lines(Vec<u64>),
-    /// Rows are numbered.
-    Rows,
+    /// Rows are numbered, after so many of the parts before.
+    Rows { before: u64 },
 }
 
 impl Places {
+    /// Rows of a whole file.
+    pub(crate) const WHOLE: Self = Self::Rows { before: 0 };
+
     /// Place of a row counted from 0.
     pub(crate) fn of(&self, row: usize) -> Place {
         let numbered = row as u64 + 1;
         match self {
             Self::Lines(lines) => Place::Line(lines.get(row).copied().unwrap_or(numbered)),
-            Self::Rows => Place::Row(numbered),
+            Self::Rows { before } => Place::Row(before + numbered),
         }
     }
 }

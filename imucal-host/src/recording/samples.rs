@@ -57,7 +57,7 @@ impl Recording {
         let mut clock = Clock::new(manifest.units.t);
         let mut time = samples.time;
         time.iter_mut().for_each(|t| *t = clock.take_number(*t));
-        check_time(path, &time, (&Places::Rows, &clock), manifest.units.t)?;
+        check_time(path, &time, (&Places::WHOLE, &clock), manifest.units.t)?;
         let per_si = clock.per_si();
         if per_si != 1.0 {
             time.iter_mut().for_each(|t| *t /= per_si);
@@ -88,7 +88,7 @@ impl Recording {
         };
         keep_assumed(&mut recording);
         note_columns(&mut recording);
-        checked(recording, &Places::Rows)
+        checked(recording, &Places::WHOLE)
     }
 }
 
@@ -137,7 +137,7 @@ fn check_finite(path: &Path, samples: &Samples) -> Result<(), ReadError> {
             let column = names.get(at).map_or_else(String::new, |name| (*name).to_owned());
             Some(ReadError::Infinite {
                 path: path.to_path_buf(),
-                place: Places::Rows.of(row),
+                place: Places::WHOLE.of(row),
                 column,
                 found: values[at].to_string(),
             })

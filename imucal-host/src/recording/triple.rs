@@ -42,6 +42,9 @@ pub struct Triple {
     pub nominal: Nominal,
     /// Full scale of `[ranges]`, in the file's unit (for counts: from the nominal offset); positive.
     pub full_scale: Option<f64>,
+    /// In the file's unit the values are those of an `f32`, as a device puts them out; a text file has the shortest digits
+    /// that are this `f32`.
+    pub single: bool,
 }
 
 impl Triple {
@@ -81,8 +84,13 @@ mod tests {
     fn the_median_norm_leaves_missing_rows_out() {
         let values =
             vec![Vector3::new(3.0, 4.0, 0.0), Vector3::new(f64::NAN, 0.0, 0.0), Vector3::new(5.0, 0.0, 0.0)];
-        let triple =
-            Triple { values, unit: Unit::MicroTesla, nominal: Nominal::IDENTITY, full_scale: Some(2.0) };
+        let triple = Triple {
+            values,
+            unit: Unit::MicroTesla,
+            nominal: Nominal::IDENTITY,
+            full_scale: Some(2.0),
+            single: false,
+        };
         assert_eq!(triple.median_norm(), Some(5.0));
         assert_eq!(triple.full_scale_si(), Some(2.0));
     }

@@ -244,6 +244,21 @@ pub enum Warning {
     },
 }
 
+impl Warning {
+    /// Counts the samples of the same column in a later part with those of this one; false where it is another warning.
+    pub(super) fn counted_with(&mut self, later: &Self) -> bool {
+        match (self, later) {
+            (Self::Absurd { column, more, .. }, Self::Absurd { column: same, more: others, .. })
+                if column == same =>
+            {
+                *more += others + 1;
+                true
+            }
+            _ => false,
+        }
+    }
+}
+
 fn units(assumed: &[(&'static str, String)]) -> String {
     assumed.iter().map(|(key, unit)| format!("{key} = \"{unit}\"")).collect::<Vec<_>>().join(", ")
 }

@@ -42,6 +42,16 @@ pub enum WriteError {
         "{path}, row {row}, column `t`: found a time that is one with that of the row before as a double, expected times whole in their unit; write t = \"ns\" below [units] and whole nanoseconds, or write CSV"
     )]
     TimeTooFine { path: PathBuf, row: usize },
+    /// A part of a recording is not of the one before.
+    #[error(
+        "{path}, row {row}: found a part with other columns or another manifest, expected those of the first part; write it as a recording of its own"
+    )]
+    PartDiffers { path: PathBuf, row: usize },
+    /// Times with decimals that come after so many without that the column was begun as integers.
+    #[error(
+        "{path}, row {row}, column `t`: found a time with decimals after whole ones, expected a column of integers; write t = \"ns\" below [units], or write CSV"
+    )]
+    TimeNotWhole { path: PathBuf, row: usize },
     /// An infinite value, which no reader takes.
     #[error(
         "{path}, row {row}, column `{column}`: found an infinite value, expected a finite one or NaN for not measured; correct the recording before writing it"

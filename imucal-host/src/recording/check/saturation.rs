@@ -201,7 +201,13 @@ mod tests {
     use crate::recording::triple::Nominal;
 
     fn triple(values: Vec<Vector3<f64>>) -> Triple {
-        Triple { values, unit: Unit::RadianPerSecond, nominal: Nominal::IDENTITY, full_scale: None }
+        Triple {
+            values,
+            unit: Unit::RadianPerSecond,
+            nominal: Nominal::IDENTITY,
+            full_scale: None,
+            single: false,
+        }
     }
 
     /// Integers −2 to 2, much alike at each call.

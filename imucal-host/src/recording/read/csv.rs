@@ -1,6 +1,6 @@
 //! Reading samples as CSV, plain or gzipped.
 
-use std::path::Path;
+use std::{ops::ControlFlow, path::Path};
 
 use super::{
     clock::Clock,
@@ -39,7 +39,7 @@ pub(crate) fn read_parts(
     mapping: &Mapping,
     limits: &Limits,
     length: usize,
-    take: &mut dyn FnMut(Table) -> Result<(), ReadError>,
+    take: &mut dyn FnMut(Table) -> Result<ControlFlow<()>, ReadError>,
 ) -> Result<(), ReadError> {
     let unlimited = Limits { size: u64::MAX, ..*limits };
     let mut rows = Rows::open(path, &unlimited)?;
@@ -48,8 +48,7 @@ pub(crate) fn read_parts(
     loop {
         let table = reader.part(&mut rows, length).map_err(|error| explained(error, &mut rows))?;
         let last = reader.ended;
-        take(table)?;
-        if last {
+        if take(table)?.is_break() || last {
             return Ok(());
         }
     }

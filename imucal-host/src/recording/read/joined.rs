@@ -109,7 +109,7 @@ pub(crate) fn join(path: &Path, mut series: Vec<Series>, limits: &Limits) -> Res
     if (rows as u64).saturating_mul(layout.row_size() as u64) > limits.size {
         return Err(ReadError::TooManySamples { path: path.to_path_buf(), limit: Size(limits.size) });
     }
-    let mut table = layout.table(rows, Places::Rows, Clock::new(TimeUnit::Nanosecond));
+    let mut table = layout.table(rows, Places::WHOLE, Clock::new(TimeUnit::Nanosecond));
     for stamp in &first.stamps_ns {
         let time = table.clock.take_integer(*stamp);
         table.columns[TIME].push(time);

@@ -125,7 +125,7 @@ fn series(role: Role, stream: &Stream, field_is_stated: bool) -> Series {
 
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
+    use std::{ops::ControlFlow, path::PathBuf};
 
     use super::*;
     use crate::recording::{Mapping, Recording, fixture::assert_says};
@@ -187,8 +187,11 @@ mod tests {
         let mapping = Mapping::default().with_topics(&["imu=/imu/data".to_owned()]).unwrap();
         let mut lengths = Vec::new();
         let path = fixture("ros2-lz4.mcap");
-        Recording::read_parts(&path, &mapping, &Limits::default(), &mut |part| lengths.push(part.rows()))
-            .unwrap();
+        Recording::read_parts(&path, &mapping, &Limits::default(), &mut |part| {
+            lengths.push(part.rows());
+            ControlFlow::Continue(())
+        })
+        .unwrap();
         assert_eq!(lengths, [40]);
         let limits = Limits { size: 3_000, ..Limits::default() };
         let error = Recording::read_as(&path, &mapping, &limits).unwrap_err().to_string();

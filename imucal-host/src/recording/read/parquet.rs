@@ -1,6 +1,10 @@
 //! Samples as Parquet: the columns of the CSV, numbers as doubles, unknown columns as text.
 
-use std::{fs::File, ops::Range, path::Path};
+use std::{
+    fs::File,
+    ops::{ControlFlow, Range},
+    path::Path,
+};
 
 use ::parquet::{
     basic::ConvertedType,
@@ -40,18 +44,24 @@ pub(crate) fn read_parts(
     unit: TimeUnit,
     mapping: &Mapping,
     limits: &Limits,
-    take: &mut dyn FnMut(Table) -> Result<(), ReadError>,
+    take: &mut dyn FnMut(Table) -> Result<ControlFlow<()>, ReadError>,
 ) -> Result<(), ReadError> {
     let reader = open(path)?;
     let mut clock = Clock::new(unit);
+    let mut before = 0;
     // A file without a group is one without a row, which a whole reading says.
     if reader.num_row_groups() == 0 {
-        return take(groups(path, &reader, 0..0, clock, mapping, limits)?);
+        return take(groups(path, &reader, 0..0, clock, mapping, limits)?).map(|_| ());
     }
     for group in 0..reader.num_row_groups() {
-        let table = groups(path, &reader, group..group + 1, clock, mapping, limits)?;
+        let mut table = groups(path, &reader, group..group + 1, clock, mapping, limits)?;
         clock = table.clock.clone();
-        take(table)?;
+        let rows = table.columns[TIME].len() as u64;
+        table.places = Places::Rows { before };
+        before += rows;
+        if take(table)?.is_break() {
+            break;
+        }
     }
     Ok(())
 }
@@ -83,7 +93,7 @@ fn groups(
     let memory = Memory::new(path, limits.size);
     memory.take(rows.saturating_mul(layout.row_size() as u64));
     memory.check()?;
-    let mut table = layout.table(rows as usize, Places::Rows, clock);
+    let mut table = layout.table(rows as usize, Places::WHOLE, clock);
     for group in which {
         let group = reader.get_row_group(group).map_err(damaged)?;
         for (at, target) in layout.targets.iter().enumerate() {

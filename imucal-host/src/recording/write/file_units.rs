@@ -20,6 +20,17 @@ const DIGITS: usize = 14;
 /// Digits kept of a time: microseconds since 1970 have sixteen.
 const TIME_DIGITS: usize = 16;
 
+/// Which columns of [`table_of`] hold numbers of an `f32`.
+pub(crate) fn singles_of(recording: &Recording) -> [bool; KNOWN] {
+    let mut singles = [false; KNOWN];
+    for kind in SensorKind::ALL {
+        if recording.sensor(kind).is_some_and(|triple| triple.single) {
+            singles[slot_of(kind)..][..3].fill(true);
+        }
+    }
+    singles
+}
+
 /// The recording in file units.
 pub(crate) fn table_of(recording: &Recording) -> Table {
     let units = &recording.manifest.units;
@@ -48,7 +59,7 @@ pub(crate) fn table_of(recording: &Recording) -> Table {
     let label = |label: &Option<i64>| label.map_or(f64::NAN, |label| label as f64);
     columns[SEGMENT] = recording.segment.iter().flatten().map(label).collect();
     let extra = recording.extra.clone();
-    Table { columns, extra, places: Places::Rows, clock, warnings: Vec::new() }
+    Table { columns, extra, places: Places::WHOLE, clock, warnings: Vec::new() }
 }
 
 fn put_simulated(recording: &Recording, columns: &mut [Vec<f64>]) {
@@ -71,6 +82,9 @@ fn converted(values: impl Iterator<Item = f64>, per_si: f64, digits: usize) -> V
 
 fn raw(triple: &Triple, axis: usize) -> Vec<f64> {
     let values = triple.values.iter().map(|value| value[axis]);
+    if triple.single {
+        return values.map(|value| f64::from(triple.nominal.to_raw(value) as f32)).collect();
+    }
     if triple.nominal == Nominal::IDENTITY {
         return values.collect();
     }

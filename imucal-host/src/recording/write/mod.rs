@@ -4,4 +4,5 @@ mod csv_writer;
 mod file_units;
 #[cfg(feature = "parquet")]
 pub(crate) mod parquet_writer;
+mod samples;
 pub(crate) mod writer;

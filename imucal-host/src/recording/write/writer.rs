@@ -1,12 +1,10 @@
 //! Writing a recording: back to file units, into the files of a set.
 
-use std::{io, path::Path};
+use std::{borrow::Borrow, io, path::Path};
 
-use flate2::{Compression, write::GzEncoder};
-
-use super::file_units::table_of;
+use super::{file_units::table_of, samples::Samples};
 use crate::{
-    file::{Output, OutputError, OutputSet},
+    file::{OutputError, OutputSet},
     recording::{
         Recording,
         format::Format,
@@ -20,59 +18,86 @@ use crate::{
     },
 };
 
-/// Writes the samples to `path` and the manifest next to it.
-pub(crate) fn write(recording: &Recording, path: &Path, files: &mut OutputSet) -> Result<(), WriteError> {
+/// Writes the samples of consecutive parts to `path` and the manifest of the first next to it; gives the number of rows.
+pub(crate) fn write<R: Borrow<Recording>>(
+    parts: impl IntoIterator<Item = R>,
+    path: &Path,
+    files: &mut OutputSet,
+) -> Result<usize, WriteError> {
     let format =
         Format::of(path).map_err(|found| WriteError::UnknownFormat { path: path.to_path_buf(), found })?;
-    check(recording, path)?;
-    let table = table_of(recording);
-    check_table(&table, path)?;
+    let mut parts = parts.into_iter();
+    let Some(first) = parts.next() else { return Ok(0) };
     let manifest_path = Manifest::path_beside(path)
         .ok_or_else(|| failed(path, io::Error::other("the name has no ending of a recording")))?;
-    let manifest = recording.manifest.to_toml().map_err(|error| failed(path, io::Error::other(error)))?;
-    write_samples(format, &table, recording.rows(), path, files.create(path)?)?;
-    Ok(files.add(&manifest_path, manifest.as_bytes())?)
+    let manifest = first.borrow().manifest.clone();
+    manifest.check().map_err(|fault| WriteError::Manifest { path: path.to_path_buf(), fault })?;
+    let text = manifest.to_toml().map_err(|error| failed(path, io::Error::other(error)))?;
+    let mut sequence = Sequence { path, manifest, rows: 0, last: None };
+    let table = sequence.table(first.borrow())?;
+    let mut samples = Samples::begin(format, first.borrow(), &table, path, files.create(path)?)?;
+    drop(first);
+    samples.append(&table)?;
+    drop(table);
+    for part in parts {
+        samples.append(&sequence.table(part.borrow())?)?;
+    }
+    samples.finish()?;
+    files.add(&manifest_path, text.as_bytes())?;
+    Ok(sequence.rows)
 }
 
 fn failed(path: &Path, cause: io::Error) -> WriteError {
     OutputError::System { path: path.to_path_buf(), cause }.into()
 }
 
-fn write_samples(
-    format: Format,
-    table: &Table,
+/// What the parts have been so far.
+struct Sequence<'a> {
+    path: &'a Path,
+    manifest: Manifest,
     rows: usize,
-    path: &Path,
-    file: &mut Output,
-) -> Result<(), WriteError> {
-    let unwritable = |cause: io::Error| failed(path, cause);
-    match format {
-        Format::Csv => super::csv_writer::write(table, rows, file).map_err(unwritable),
-        Format::CsvGz => {
-            let mut encoder = GzEncoder::new(file, Compression::default());
-            super::csv_writer::write(table, rows, &mut encoder).map_err(unwritable)?;
-            encoder.finish().map(|_| ()).map_err(unwritable)
+    /// The last time in the table of the part before.
+    last: Option<f64>,
+}
+
+impl Sequence<'_> {
+    /// The table of the next part.
+    fn table(&mut self, part: &Recording) -> Result<Table, WriteError> {
+        if part.manifest != self.manifest {
+            return Err(WriteError::PartDiffers { path: self.path.to_path_buf(), row: self.rows + 1 });
         }
-        #[cfg(feature = "parquet")]
-        Format::Parquet => {
-            let times = super::parquet_writer::Times::of(table);
-            if let Some(row) = times.repeated() {
-                return Err(WriteError::TimeTooFine { path: path.to_path_buf(), row: row + 1 });
+        check_lengths(part, self.path)?;
+        let table = table_of(part);
+        self.check(&table)?;
+        self.rows += part.rows();
+        self.last = table.columns[TIME].last().copied().or(self.last);
+        Ok(table)
+    }
+
+    fn check(&self, table: &Table) -> Result<(), WriteError> {
+        let times = &table.columns[TIME];
+        let path = || self.path.to_path_buf();
+        let follows = |before: f64, found: f64| found > before && found.is_finite();
+        if let Some((before, found)) =
+            self.last.zip(times.first().copied()).filter(|(before, found)| !follows(*before, *found))
+        {
+            return Err(WriteError::TimeOrder { path: path(), row: self.rows + 1, found, before });
+        }
+        if let Some(at) = times.windows(2).position(|pair| !follows(pair[0], pair[1])) {
+            let (before, found) = (times[at], times[at + 1]);
+            return Err(WriteError::TimeOrder { path: path(), row: self.rows + at + 2, found, before });
+        }
+        for (slot, column) in table.columns.iter().enumerate() {
+            if let Some(at) = column.iter().position(|value| value.is_infinite()) {
+                let column = NAMES[slot].to_owned();
+                return Err(WriteError::Infinite { path: path(), row: self.rows + at + 1, column });
             }
-            super::parquet_writer::write(table, &times, rows, file).map_err(unwritable)
         }
-        #[cfg(not(feature = "parquet"))]
-        Format::Parquet => Err(WriteError::ParquetNotBuilt { path: path.to_path_buf() }),
-        Format::Log => {
-            let found = path.extension().unwrap_or_default().to_string_lossy();
-            Err(WriteError::UnknownFormat { path: path.to_path_buf(), found: format!(".{found}") })
-        }
+        Ok(())
     }
 }
 
-fn check(recording: &Recording, path: &Path) -> Result<(), WriteError> {
-    let fault = |fault| WriteError::Manifest { path: path.to_path_buf(), fault };
-    recording.manifest.check().map_err(fault)?;
+fn check_lengths(recording: &Recording, path: &Path) -> Result<(), WriteError> {
     let expected = recording.rows();
     for (column, found) in lengths(recording) {
         if found != expected {
@@ -104,21 +129,6 @@ fn lengths(recording: &Recording) -> Vec<(String, usize)> {
     lengths.extend(recording.segment.as_ref().map(|column| (named(SEGMENT), column.len())));
     lengths.extend(recording.extra.iter().map(|column| (column.name.clone(), column.values.len())));
     lengths
-}
-
-fn check_table(table: &Table, path: &Path) -> Result<(), WriteError> {
-    let times = &table.columns[TIME];
-    if let Some(at) = times.windows(2).position(|pair| pair[1] <= pair[0] || !pair[1].is_finite()) {
-        let (before, found) = (times[at], times[at + 1]);
-        return Err(WriteError::TimeOrder { path: path.to_path_buf(), row: at + 2, found, before });
-    }
-    for (slot, column) in table.columns.iter().enumerate() {
-        if let Some(at) = column.iter().position(|value| value.is_infinite()) {
-            let column = NAMES[slot].to_owned();
-            return Err(WriteError::Infinite { path: path.to_path_buf(), row: at + 1, column });
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -313,6 +323,47 @@ mod tests {
         let unit = refused(|recording| recording.manifest.units.gyr = Unit::Gauss);
         assert_says(&unit, &["run.csv", "gyr = \"G\"", "expected rad/s"]);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn parts_that_do_not_follow_each_other_are_not_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        let refused = |change: fn(&mut Recording)| {
+            let mut second = full();
+            second.time.iter_mut().for_each(|time| *time += 0.03);
+            change(&mut second);
+            Recording::write_parts([full(), second], &path, &mut OutputSet::default())
+                .unwrap_err()
+                .to_string()
+        };
+        let order = refused(|second| second.time[0] = 0.02);
+        assert_says(&order, &["run.csv, row 4, column `t`", "strictly increasing"]);
+        for change in [
+            |second: &mut Recording| second.gimbal = None,
+            |second: &mut Recording| second.extra[0].name.push('s'),
+            |second: &mut Recording| second.manifest.units.acc = Unit::MetrePerSecondSquared,
+        ] {
+            assert_says(&refused(change), &["run.csv, row 4", "those of the first part"]);
+        }
+        let infinite = refused(|second| second.temperature = Some(vec![0.0, f64::INFINITY, 0.0]));
+        assert_says(&infinite, &["row 5, column `temp`"]);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[cfg(feature = "parquet")]
+    #[test]
+    fn a_column_of_whole_times_takes_no_other() {
+        let [first, second] = [vec![0.0, 1e-6], vec![1.5e-6]].map(|time| {
+            let mut part = Recording::new("run.parquet", Manifest::default(), time);
+            part.manifest.units.t = TimeUnit::Microsecond;
+            part.epoch = Some(Epoch::of_picoseconds(1_700_000_000 * 10i128.pow(12)));
+            part
+        });
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.parquet");
+        let error = Recording::write_parts([first, second], &path, &mut OutputSet::default()).unwrap_err();
+        assert_says(&error.to_string(), &["run.parquet, row 3, column `t`", "with decimals", "t = \"ns\""]);
     }
 
     proptest! {

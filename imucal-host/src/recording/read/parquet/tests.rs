@@ -13,7 +13,7 @@ use super::*;
 use crate::recording::{
     Recording,
     fixture::{Fixture, assert_says},
-    write::parquet_writer::{Times, write},
+    write::parquet_writer::ParquetWriter,
 };
 
 /// Nullable floats, integers and a text, as other programs write them.
@@ -60,6 +60,13 @@ fn nullable_floats_and_integers_in_several_groups_are_read() {
     let acc = recording.acc.unwrap().values;
     assert!(acc[0].x.is_nan() && acc[2].y.is_nan());
     assert_eq!((acc[1].x, acc[3].y, acc[2].z), (0.5, 0.5, 10.0));
+}
+
+/// What the writer makes of a table.
+fn write(table: &Table, bytes: &mut Vec<u8>) {
+    let mut writer = ParquetWriter::begin(bytes, table, [false; KNOWN]).unwrap();
+    writer.append(table, Path::new("run.parquet"), 0).unwrap().unwrap();
+    writer.finish().unwrap();
 }
 
 /// Required columns of doubles, but for `t` if it is to be of integers.
@@ -115,12 +122,12 @@ fn a_damaged_file_and_text_for_numbers_are_refused() {
     assert_says(&message, &["run.parquet", "damaged", "expected an intact Parquet file", "copy"]);
 
     let layout = Layout::new(&["t", "speed"], Path::new("a")).unwrap();
-    let mut table = layout.table(1, Places::Rows, Clock::new(TimeUnit::Second));
+    let mut table = layout.table(1, Places::WHOLE, Clock::new(TimeUnit::Second));
     table.columns[0].push(0.0);
     table.extra[0].name = "temp".to_owned();
     table.extra[0].values.push("warm".to_owned());
     let mut bytes = Vec::new();
-    write(&table, &Times::of(&table), 1, &mut bytes).unwrap();
+    write(&table, &mut bytes);
     let message = Fixture::new("run.parquet", "", bytes).error();
     assert_says(&message, &["run.parquet, column `temp`", "BYTE_ARRAY", "expected floating-point", "f64"]);
 }
@@ -134,11 +141,11 @@ fn more_than_the_limits_allow_is_refused_before_it_is_read() {
         &["more than 3 columns", "--max-columns"],
     );
     let layout = Layout::new(&["t", "note"], Path::new("a")).unwrap();
-    let mut table = layout.table(0, Places::Rows, Clock::new(TimeUnit::Second));
+    let mut table = layout.table(0, Places::WHOLE, Clock::new(TimeUnit::Second));
     table.columns[0] = (0..300).map(f64::from).collect();
     table.extra[0].values = vec!["long ".repeat(300); 300];
     let mut bytes = Vec::new();
-    write(&table, &Times::of(&table), 300, &mut bytes).unwrap();
+    write(&table, &mut bytes);
     assert!(bytes.len() < 1 << 16, "the dictionary keeps one text: {}", bytes.len());
     let fixture = Fixture::new("run.parquet", "", bytes);
     let limits = Limits { size: 1 << 16, ..Limits::default() };
