@@ -108,11 +108,9 @@ fn read(
     parts: SyncSender<Recording>,
     mut correct: impl FnMut(Recording) -> Option<Recording>,
 ) -> Result<Vec<Warning>, ReadError> {
-    Recording::read_parts(source.path, source.mapping, source.limits, &mut |part| match correct(part)
-        .map(|part| parts.send(part))
-    {
-        Some(Ok(())) => ControlFlow::Continue(()),
-        _ => ControlFlow::Break(()),
+    Recording::read_parts(source.path, source.mapping, source.limits, &mut |part| {
+        let sent = correct(part).is_some_and(|part| parts.send(part).is_ok());
+        if sent { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     })
 }
 
@@ -174,7 +172,7 @@ cross_std = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
             let row = |k: usize| {
                 let temperature =
                     if k % 65_536 < 40 && k > 40 { String::new() } else { (20 + k % 7).to_string() };
-                let note = if k % 3 == 0 { "\"a, \"\"b\"\"\"" } else { "c" };
+                let note = if k.is_multiple_of(3) { "\"a, \"\"b\"\"\"" } else { "c" };
                 let x = 33_000 + k % 611;
                 format!(
                     "{},{x},{},38300,{temperature},{},{note}\n",

@@ -27,8 +27,8 @@ pub(crate) struct Samples<'a> {
 }
 
 enum Sink<'a> {
-    Csv(CsvWriter<&'a mut Output>),
-    CsvGz(CsvWriter<GzEncoder<&'a mut Output>>),
+    Csv(Box<CsvWriter<&'a mut Output>>),
+    CsvGz(Box<CsvWriter<GzEncoder<&'a mut Output>>>),
     #[cfg(feature = "parquet")]
     Parquet(Box<ParquetWriter<&'a mut Output>>),
 }
@@ -44,10 +44,10 @@ impl<'a> Samples<'a> {
     ) -> Result<Self, WriteError> {
         let singles = singles_of(first);
         let sink = match format {
-            Format::Csv => Sink::Csv(CsvWriter::begin(file, table, singles)),
+            Format::Csv => Sink::Csv(Box::new(CsvWriter::begin(file, table, singles))),
             Format::CsvGz => {
                 let encoder = GzEncoder::new(file, Compression::default());
-                Sink::CsvGz(CsvWriter::begin(encoder, table, singles))
+                Sink::CsvGz(Box::new(CsvWriter::begin(encoder, table, singles)))
             }
             #[cfg(feature = "parquet")]
             Format::Parquet => {
