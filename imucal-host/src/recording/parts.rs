@@ -3,13 +3,15 @@
 use std::{mem, ops::ControlFlow, path::Path};
 
 use super::{
-    Format, Manifest, Mapping, ReadError, Recording, SensorKind, Warning, log_topics::TopicFault, read,
-    unit::TimeUnit,
+    Format, Manifest, Mapping, ReadError, Recording, SensorKind, Triple, Warning, log_topics::TopicFault,
+    read, unit::TimeUnit,
 };
 use crate::file::Limits;
 
 /// Rows of a part of a text file: a second at 65 kHz, 10 MiB of ten columns.
 const ROWS: usize = 1 << 16;
+/// Samples by which a sensor's unit is judged.
+const JUDGED: usize = 100;
 
 impl Recording {
     /// Reads a recording by parts, each a recording of consecutive rows. What is odd but harmless is returned, each kind
@@ -20,7 +22,7 @@ impl Recording {
     ///
     /// # Errors
     ///
-    /// As [`Recording::read`]; units are judged by the first part alone.
+    /// As [`Recording::read`]; intervals are judged by the first part alone, and the unit of a sensor by the first parts that it is in.
     pub fn read_parts(
         path: &Path,
         mapping: &Mapping,
@@ -32,8 +34,15 @@ impl Recording {
         let unit = manifest.units.t;
         #[cfg(feature = "logs")]
         let field_is_stated = mapping.states_field(&manifest);
-        let mut parts =
-            Parts { path, manifest, of_manifest: warnings, warnings: Vec::new(), last: None, take };
+        let mut parts = Parts {
+            path,
+            manifest,
+            of_manifest: warnings,
+            warnings: Vec::new(),
+            last: None,
+            not_begun: SensorKind::ALL.to_vec(),
+            take,
+        };
         let mut next = |table| parts.next(table);
         let read = match format {
             Format::Csv | Format::CsvGz => {
@@ -168,7 +177,14 @@ struct Parts<'a> {
     warnings: Vec<Warning>,
     /// The last time of the parts before, s.
     last: Option<f64>,
+    /// Sensors of which too few samples have come to judge their unit.
+    not_begun: Vec<SensorKind>,
     take: &'a mut dyn FnMut(Recording) -> ControlFlow<()>,
+}
+
+/// Samples that were measured.
+fn measured(sensor: &Triple) -> usize {
+    sensor.values.iter().filter(|value| value.iter().all(|axis| axis.is_finite())).count()
 }
 
 impl Parts<'_> {
@@ -180,11 +196,12 @@ impl Parts<'_> {
         }
         table.warnings.splice(0..0, mem::take(&mut self.of_manifest));
         let (clock, place) = (table.clock.clone(), table.places.of(0));
-        let assemble = match self.last {
-            None => read::assembly::assemble,
-            Some(_) => read::assembly::continued,
+        let manifest = self.manifest.clone();
+        let mut part = match self.last {
+            None => read::assembly::assemble(self.path, manifest, table)?,
+            Some(_) => read::assembly::continued(self.path, manifest, table, &self.not_begun)?,
         };
-        let mut part = assemble(self.path, self.manifest.clone(), table)?;
+        self.not_begun.retain(|kind| part.sensor(*kind).is_none_or(|sensor| measured(sensor) < JUDGED));
         let text = |time: f64| clock.text(time * clock.per_si());
         if let Some((last, first)) = self.last.zip(part.time.first().copied()).filter(|(last, t)| t <= last) {
             return Err(ReadError::TimeOrder {
@@ -278,5 +295,21 @@ mod tests {
             &message,
             &[&format!("line {}", ROWS + 2), "found 0 after 255.99609375", "sort the rows"],
         );
+    }
+
+    #[test]
+    fn the_unit_of_a_sensor_that_begins_late_is_judged_where_it_begins() {
+        let text = |length: f64| {
+            let header = "t,gyr_x,gyr_y,gyr_z,acc_x,acc_y,acc_z\n".to_owned();
+            (0..ROWS + 3000).fold(header, |text, k| {
+                let force = if k < ROWS + 500 { ",,".to_owned() } else { format!("0,0,{length}") };
+                text + &format!("{},0,0,0.01,{force}\n", k as f64 / 256.0)
+            })
+        };
+        let refused = csv(text(1.0));
+        let message = parts(&refused).err().unwrap().to_string();
+        assert_says(&message, &["acc", "about 9.8 m/s²", "`g`"]);
+        assert_eq!(message, refused.error());
+        assert_eq!(parts(&csv(text(9.8))).unwrap().warnings.len(), csv(text(9.8)).read().warnings.len());
     }
 }

@@ -36,7 +36,12 @@ fn usual(kind: SensorKind) -> Usual {
 
 /// Refuses samples that are clearly in another unit and notes those that are merely unusual.
 pub(crate) fn check(recording: &mut Recording) -> Result<(), ReadError> {
-    for kind in SensorKind::ALL {
+    check_of(recording, &SensorKind::ALL)
+}
+
+/// The same of some sensors.
+pub(crate) fn check_of(recording: &mut Recording, kinds: &[SensorKind]) -> Result<(), ReadError> {
+    for kind in kinds.iter().copied() {
         let Some(triple) = recording.sensor(kind) else {
             continue;
         };

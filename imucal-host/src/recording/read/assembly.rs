@@ -40,9 +40,16 @@ pub(crate) fn checked(mut recording: Recording, places: &Places) -> Result<Recor
     Ok(recording)
 }
 
-/// The same of rows that follow others of one file. Units were judged by those; a few rows at the end show none.
-pub(crate) fn continued(path: &Path, manifest: Manifest, table: Table) -> Result<Recording, ReadError> {
+/// The same of rows that follow others of one file. Units were judged by those, but for sensors that had not begun; a few rows at the
+/// end show none.
+pub(crate) fn continued(
+    path: &Path,
+    manifest: Manifest,
+    table: Table,
+    begins: &[SensorKind],
+) -> Result<Recording, ReadError> {
     let (mut recording, places) = converted(path, manifest, table)?;
+    unit_check::check_of(&mut recording, begins)?;
     absurd::mask(&mut recording, &places);
     Ok(recording)
 }
