@@ -3,7 +3,16 @@
 //!
 //! `IMUCAL_PYTHON=PROGRAM` names the Python that has SciPy; without one its column is empty, and that is said.
 
-use std::{env, ffi::OsString, fmt::Write, fs, hint::black_box, path::Path, process::Command, time::Instant};
+use std::{
+    env,
+    ffi::OsString,
+    fmt::Write,
+    fs,
+    hint::black_box,
+    path::{Path, PathBuf},
+    process::Command,
+    time::Instant,
+};
 
 use imucal_core::{
     model::{norm::NormModel, parameterisation::UPPER_TRIANGULAR},
@@ -31,29 +40,19 @@ const LENGTH: f64 = 9.8;
 fn main() {
     let folder = tempfile::tempdir().expect("a folder");
     println!("Rests of a recording at 50 Hz, `imucal calibrate`:\n");
-    println!(
-        "| rests | rows | s | s a rest over that of {} | MiB |\n| --- | --- | --- | --- | --- |",
-        RESTS[0]
-    );
-    let mut first = None;
-    for rests in RESTS {
+    table("rest", &RESTS, |rests| {
         let unit = SimulatedUnit { interval: 0.02, ..SimulatedUnit::mtx() };
         let recording = record("rests.csv", &Tumble::new(rests, 1), &unit, 1);
         let path = folder.path().join("rests.csv");
         recording.write(&path).expect("room");
-        row(rests, recording.rows(), calibrate(&path), &mut first);
-    }
+        (path, recording.rows())
+    });
     println!("\nSamples of a magnetometer, `imucal calibrate`:\n");
-    println!(
-        "| samples | rows | s | s a sample over that of {} | MiB |\n| --- | --- | --- | --- | --- |",
-        SAMPLES[0]
-    );
-    let mut first = None;
-    for samples in SAMPLES {
+    table("sample", &SAMPLES, |samples| {
         let path = folder.path().join("cloud.csv");
         cloud(&path, samples);
-        row(samples, samples, calibrate(&path), &mut first);
-    }
+        (path, samples)
+    });
     println!(
         "\nAn accelerometer's nine parameters by the core in f64, and SciPy's least_squares (MINPACK, numerical derivatives):\n"
     );
@@ -68,14 +67,18 @@ fn main() {
     }
 }
 
-fn calibrate(path: &Path) -> process::Run {
-    process::run(Command::new(env!("CARGO_BIN_EXE_imucal")).arg("calibrate").arg(path))
-}
-
-fn row(count: usize, rows: usize, run: process::Run, first: &mut Option<f64>) {
-    let each = run.seconds / count as f64;
-    let growth = each / *first.get_or_insert(each);
-    println!("| {count} | {rows} | {:.2} | {growth:.2} | {:.0} |", run.seconds, run.mebibytes);
+/// Calibrates a recording of each length, which `made` gives with its rows, and prints how time grows.
+fn table(what: &str, counts: &[usize], made: impl Fn(usize) -> (PathBuf, usize)) {
+    println!("| {what}s | rows | s | s a {what} over that of {} | MiB |", counts[0]);
+    println!("| --- | --- | --- | --- | --- |");
+    let mut first = None;
+    for count in counts {
+        let (path, rows) = made(*count);
+        let run = process::run(Command::new(env!("CARGO_BIN_EXE_imucal")).arg("calibrate").arg(&path));
+        let each = run.seconds / *count as f64;
+        let growth = each / *first.get_or_insert(each);
+        println!("| {count} | {rows} | {:.2} | {growth:.2} | {:.0} |", run.seconds, run.mebibytes);
+    }
 }
 
 /// Points near a sphere of a length, as a sensor with errors and noise gives them.
