@@ -17,11 +17,11 @@
 //! its 99.99 % point over 5 where that is larger and asked for; correlations are those of its covariance. Not modelled: noise of a third kind; A of another fit than V⁻¹'s is not
 //! independent of s².
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
-use super::restricted::Restricted;
+use super::{blocked_cholesky, restricted::Restricted};
 
 /// The normal distribution's 97.5 % point.
 pub const NORMAL: f64 = 1.959_963_984_540_054;
@@ -53,11 +53,33 @@ pub enum Scale {
     Near,
 }
 
+/// V₀ + ρ V₁, as a likelihood and errors need it.
+pub trait Whitening: Sync {
+    /// L⁻¹ X of two matrices, where V₀ + ρ V₁ = L Lᵀ, and ln |V₀ + ρ V₁|; `None` where that is no covariance.
+    fn whitened(&self, ratio: f64, x: [DMatrix<f64>; 2]) -> Option<([DMatrix<f64>; 2], f64)>;
+
+    /// AᵀV₀A and AᵀV₁A.
+    fn carried(&self, influence: &DMatrix<f64>) -> [DMatrix<f64>; 2];
+}
+
+/// V₀ and V₁ written out.
+impl Whitening for [DMatrix<f64>; 2] {
+    fn whitened(&self, ratio: f64, x: [DMatrix<f64>; 2]) -> Option<([DMatrix<f64>; 2], f64)> {
+        let (lower, log_determinant) = blocked_cholesky::factor(&self[0] + &self[1] * ratio)?;
+        let [one, other] = x.map(|x| lower.solve_lower_triangular(&x));
+        Some(([one?, other?], log_determinant))
+    }
+
+    fn carried(&self, influence: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
+        self.each_ref().map(|part| influence.tr_mul(&(part * influence)))
+    }
+}
+
 /// Noise of two parts.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Parts<'a> {
     /// V₀ and V₁.
-    pub parts: [&'a DMatrix<f64>; 2],
+    pub parts: &'a dyn Whitening,
     /// Each ρ with its prior weight.
     pub ratios: &'a [(f64, f64)],
     /// What is known of s².
@@ -115,7 +137,7 @@ impl Parts<'_> {
         jacobian: &DMatrix<f64>,
         influence: &DMatrix<f64>,
     ) -> Option<Errors> {
-        let carried = self.parts.map(|part| influence.tr_mul(&(part * influence)));
+        let carried = self.parts.carried(influence);
         let column = DMatrix::from_column_slice(residuals.len(), 1, residuals.as_slice());
         self.errors_of(carried, &column, jacobian)?.pop()
     }
@@ -172,11 +194,8 @@ impl Parts<'_> {
         residuals: &DMatrix<f64>,
         jacobian: &DMatrix<f64>,
     ) -> Option<Vec<(f64, Sizes)>> {
-        let factor = Cholesky::new(self.parts[0] + self.parts[1] * ratio)?;
-        let lower = factor.l();
-        let log_determinant = 2.0 * lower.diagonal().iter().map(|d| d.ln()).sum::<f64>();
-        let (data, unit) =
-            (lower.solve_lower_triangular(residuals)?, lower.solve_lower_triangular(jacobian)?);
+        let ([data, unit], log_determinant) =
+            self.parts.whitened(ratio, [residuals.clone(), jacobian.clone()])?;
         let of_column = |column: usize| {
             let found = Restricted::of_rows(&data.columns(column, 1).into(), unit.clone(), log_determinant);
             let (log, sizes) = self.sizes(found.left, found.freedom as f64);
@@ -276,7 +295,8 @@ mod tests {
         let white = DMatrix::identity(count, count);
         let walk = DMatrix::from_fn(count, count, |i, j| (i.min(j) + 1) as f64);
         let ratios = [(0.0, 0.5), (0.003, 0.1), (0.012, 0.1), (0.05, 0.1), (0.2, 0.1), (0.8, 0.1)];
-        let parts = Parts { parts: [&white, &walk], ratios: &ratios, scale, five: false };
+        let parts = [white, walk];
+        let parts = Parts { parts: &parts, ratios: &ratios, scale, five: false };
         let ones = DMatrix::repeat(count, 1, 1.0);
         let mut random = Random::new(4, Purpose::Noise);
         let hold = (0..2000).filter(|_| {
@@ -314,9 +334,8 @@ mod tests {
 
     #[test]
     fn noise_far_above_what_is_known_is_found_and_noise_below_is_not_believed() {
-        let white = DMatrix::identity(40, 40);
-        let parts =
-            Parts { parts: [&white, &white], ratios: &[(0.0, 1.0)], scale: Scale::AtLeastOne, five: false };
+        let parts = [DMatrix::identity(40, 40), DMatrix::identity(40, 40)];
+        let parts = Parts { parts: &parts, ratios: &[(0.0, 1.0)], scale: Scale::AtLeastOne, five: false };
         let ones = DMatrix::repeat(40, 1, 1.0);
         let mut random = Random::new(5, Purpose::Noise);
         let values = DVector::from_fn(40, |_, _| random.normal());
@@ -330,8 +349,8 @@ mod tests {
 
     #[test]
     fn of_one_part_alone_the_standard_error_is_student_s() {
-        let white = DMatrix::identity(5, 5);
-        let parts = Parts { parts: [&white, &white], ratios: &[(0.0, 1.0)], scale: Scale::Free, five: false };
+        let parts = [DMatrix::identity(5, 5), DMatrix::identity(5, 5)];
+        let parts = Parts { parts: &parts, ratios: &[(0.0, 1.0)], scale: Scale::Free, five: false };
         let ones = DMatrix::repeat(5, 1, 1.0);
         let values = DVector::from_column_slice(&[1.0, -1.0, 2.0, 0.0, -2.0]);
         let errors = parts.errors(&values, &ones, &(&ones / 5.0)).unwrap();

@@ -24,7 +24,9 @@
 //! | [`restricted`] | the restricted likelihood |
 //! | [`white`], [`within`] | white noise of samples, and drift within rests |
 //! | [`estimate`] | w and d from residuals |
+//! | [`blocked_cholesky`] | factor of a dense covariance |
 //! | [`interval`] | standard errors whose ±1.96 hold 95 % |
+//! | [`semiseparable`] | covariance of means over spans, whitened in the order of time |
 //!
 //! Not modelled: axes that err alike, scatter whose size or direction depends on the pose, an error that repeats when a
 //! pose comes back.
@@ -57,7 +59,11 @@ pub mod within;
 
 pub mod estimate;
 
+pub mod blocked_cholesky;
+
 pub mod interval;
+
+pub mod semiseparable;
 
 pub use estimate::Residuals;
 

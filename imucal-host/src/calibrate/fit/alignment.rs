@@ -83,12 +83,8 @@ pub fn align_at_rests(
                 triad.gain.tr_mul(&across).map(|x| x * x).dot(&seen.variance)
             }),
         );
-        let parts = Parts {
-            parts: [&directions.propagated(at_rest.len(), &moves), &DMatrix::from_diagonal(&of_field)],
-            ratios: &RATIOS,
-            scale: Scale::AtLeastOne,
-            five: false,
-        };
+        let parts = [directions.propagated(at_rest.len(), &moves), DMatrix::from_diagonal(&of_field)];
+        let parts = Parts { parts: &parts, ratios: &RATIOS, scale: Scale::AtLeastOne, five: false };
         let rows = Rows::of(model, theta);
         let jacobian = rows.derivatives(at_rest.len(), &[0, 1, 2, 3]);
         let residuals = DVector::from_column_slice(&rows.residuals);

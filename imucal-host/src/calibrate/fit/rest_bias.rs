@@ -15,13 +15,14 @@
 //! ([`quantum`]). Not modelled: headings that are all the same; a gain far from one (Ω sin λ is 5e-5 rad/s).
 
 use imucal_core::observation::Rest;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, Vector3};
 
 use super::rest_noise::{self, AtRest};
 use crate::{
     noise::{
         flicker,
-        interval::{Parts, Scale},
+        interval::{Parts, Scale, Whitening},
+        semiseparable::{Mean, Semiseparable},
     },
     observe::quantum,
 };
@@ -48,11 +49,13 @@ pub fn errors(rests: &[Rest<f64>], means: &[Vector3<f64>], at_rest: &AtRest<'_>)
     let total: f64 = rests.iter().map(|rest| f64::from(rest.gyr.count())).sum();
     let influence = DMatrix::from_fn(count, 1, |k, _| f64::from(rests[k].gyr.count()) / total);
     let length = |k: usize| spans[k].end - spans[k].start;
-    let white = DMatrix::from_diagonal(&DVector::from_fn(count, |k, _| 1.0 / length(k)));
-    let drift = flicker::covariance_of(&spans, &flicker::processes(&spans, 1.0));
+    let mean_over =
+        |k: usize| Mean { row: k, span: spans[k].clone(), white: 1.0 / length(k), drifts: Vector3::x() };
+    let noise =
+        Semiseparable::new(vec![(0..count).map(mean_over).collect()], flicker::processes(&spans, 1.0));
     let ratios = rest_noise::drifts(&at_rest.within(), &spans);
-    let parts = Parts { parts: [&white, &drift], ratios: &ratios, scale: Scale::AtLeastOne, five: true };
-    let carried = [&white, &drift].map(|part| influence.tr_mul(&(part * &influence)));
+    let parts = Parts { parts: &noise, ratios: &ratios, scale: Scale::AtLeastOne, five: true };
+    let carried = noise.carried(&influence);
     let bias = mean(rests, means);
     // In units of the white noise; an axis without any does not move, but for the steps.
     let root = density.map(f64::sqrt);

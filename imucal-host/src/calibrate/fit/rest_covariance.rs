@@ -12,13 +12,13 @@ use super::rest_noise::RestNoise;
 use crate::noise::{
     Noise, Span, flicker,
     interval::{Errors, Parts, Scale},
+    semiseparable::{Mean, Semiseparable},
 };
 
 /// V₀ and V₁ of some rests, and what is known of the drift.
 #[derive(Clone, Debug)]
 pub struct RestCovariance {
-    white: DMatrix<f64>,
-    drift: DMatrix<f64>,
+    noise: Semiseparable,
     ratios: Vec<(f64, f64)>,
     five: bool,
     density: Vector3<f64>,
@@ -28,20 +28,18 @@ pub struct RestCovariance {
 impl RestCovariance {
     /// Of one component each, along these unit vectors; `None` where an axis shows no noise.
     pub fn along(shown: &RestNoise, used: &[usize], normals: &[Vector3<f64>]) -> Option<Self> {
-        let components: Vec<(usize, Vector3<f64>)> =
-            normals.iter().enumerate().map(|(k, normal)| (k, *normal)).collect();
-        Self::of(shown, used, &components)
+        Self::of(shown, used, &[normals.iter().copied().enumerate().collect()])
     }
 
     /// Of all three components of each, in order; `None` where an axis shows no noise.
     pub fn of_vectors(shown: &RestNoise, used: &[usize]) -> Option<Self> {
-        let axes = |k: usize| (0..3).map(move |axis| (k, Vector3::ith(axis, 1.0)));
-        let components: Vec<(usize, Vector3<f64>)> = (0..used.len()).flat_map(axes).collect();
-        Self::of(shown, used, &components)
+        // Axes are independent.
+        let along = |axis: usize| (0..used.len()).map(move |k| (3 * k + axis, Vector3::ith(axis, 1.0)));
+        Self::of(shown, used, &[0, 1, 2].map(|axis| along(axis).collect()))
     }
 
-    /// Of components of the means, by the position of the rest among those used.
-    fn of(shown: &RestNoise, used: &[usize], components: &[(usize, Vector3<f64>)]) -> Option<Self> {
+    /// Of chains of components of the means, each in the order of the rests used, with the row that it is in.
+    fn of(shown: &RestNoise, used: &[usize], chains: &[Vec<(usize, Vector3<f64>)>]) -> Option<Self> {
         let spans: Vec<Span> = used.iter().map(|k| shown.spans[*k].clone()).collect();
         let length = |k: usize| spans[k].end - spans[k].start;
         let own = |k: usize| shown.density / length(k) + shown.steps[used[k]];
@@ -51,19 +49,18 @@ impl RestCovariance {
         if density.iter().any(|axis| axis.is_nan() || *axis <= 0.0) {
             return None;
         }
-        let between = flicker::covariance_of(&spans, &flicker::processes(&spans, 1.0));
-        let alike =
-            |i: usize, j: usize, of: &Vector3<f64>| components[i].1.component_mul(&components[j].1).dot(of);
-        let rows = components.len();
-        let white = DMatrix::from_fn(rows, rows, |i, j| {
-            if components[i].0 == components[j].0 { alike(i, j, &own(components[i].0)) } else { 0.0 }
-        });
-        let drift = DMatrix::from_fn(rows, rows, |i, j| {
-            between[(components[i].0, components[j].0)] * alike(i, j, &shown.density)
-        });
+        let root = shown.density.map(f64::sqrt);
+        let mean = |(k, (row, normal)): (usize, &(usize, Vector3<f64>))| Mean {
+            row: *row,
+            span: spans[k].clone(),
+            white: normal.component_mul(normal).dot(&own(k)),
+            drifts: normal.component_mul(&root),
+        };
+        let chains = chains.iter().map(|chain| chain.iter().enumerate().map(mean).collect());
+        let noise = Semiseparable::new(chains.collect(), flicker::processes(&spans, 1.0));
         let ratios = shown.drifts(&spans);
         let five = !shown.within.is_empty();
-        Some(Self { white, drift, ratios, five, density, shown: shown.density })
+        Some(Self { noise, ratios, five, density, shown: shown.density })
     }
 
     /// Errors of what follows from the components by `influence`; see [`Parts::errors`].
@@ -73,12 +70,8 @@ impl RestCovariance {
         jacobian: &DMatrix<f64>,
         influence: &DMatrix<f64>,
     ) -> Option<Errors> {
-        let parts = Parts {
-            parts: [&self.white, &self.drift],
-            ratios: &self.ratios,
-            scale: Scale::AtLeastOne,
-            five: self.five,
-        };
+        let parts =
+            Parts { parts: &self.noise, ratios: &self.ratios, scale: Scale::AtLeastOne, five: self.five };
         parts.errors(residuals, jacobian, influence)
     }
 

@@ -67,6 +67,14 @@ pub fn weakest_inflation<const P: usize>(
     inflation().filter(|inflation| inflation.is_finite()).unwrap_or(1.0)
 }
 
+/// Rows that are multiplied at a time: few enough to stay in a processor's cache.
+const PART: usize = 512;
+
+/// So many rows by parts.
+pub(super) fn parts(rows: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..rows).step_by(PART).map(move |from| from..(from + PART).min(rows))
+}
+
 /// J (JᵀJ)⁻¹: by how much each residual moves each parameter of a fit of least squares. `None` where J is not of full
 /// rank.
 pub fn influence(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
@@ -77,7 +85,12 @@ pub fn influence(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     };
     let mut unit = jacobian.clone();
     scaled(&mut unit);
-    let mut influence = &unit * unit.tr_mul(&unit).try_inverse()?;
+    let mut products = DMatrix::zeros(unit.ncols(), unit.ncols());
+    for part in parts(unit.nrows()) {
+        let own = unit.rows(part.start, part.len());
+        products += own.tr_mul(&own);
+    }
+    let mut influence = &unit * products.try_inverse()?;
     scaled(&mut influence);
     Some(influence)
 }

@@ -20,7 +20,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::rows::influence;
+use super::rows::{influence, parts};
 
 /// A column is distinguished from the model's own where this share of its length is left by their projection.
 const LEAST_LEFT: f64 = 1e-4;
@@ -66,32 +66,88 @@ impl ScoreTest {
         if left < 1.0 {
             return None;
         }
-        let (projected, coefficients) = self.regress(columns)?;
-        let before = self.residual.norm_squared();
-        let after = (&self.residual + projected * &coefficients).norm_squared();
-        let f = ((before - after) / rank as f64) / (after / left);
-        Some(Score {
-            p: upper_tail(f, rank as f64, left)?,
-            ..self.score(columns, &coefficients, before, after, left)
-        })
+        let found = self.regress(columns)?;
+        let score = self.score(&found, left);
+        let f = (score.explained / rank as f64) / ((1.0 - score.explained) / left);
+        Some(Score { p: upper_tail(f, rank as f64, left)?, ..score })
     }
 
     /// Tests columns of residuals that are alike in time, by what is left over in blocks of neighbours, as many as
     /// each of `blocks` says: the largest probability counts.
     pub fn test_in_blocks(&self, columns: &DMatrix<f64>, blocks: &[usize]) -> Option<Score> {
-        let (projected, coefficients) = self.regress(columns)?;
-        let left = &self.residual + &projected * &coefficients;
-        let chances: Option<Vec<f64>> =
-            blocks.iter().map(|blocks| self.chance_in_blocks(&projected, &left, *blocks)).collect();
+        let found = self.regress(columns)?;
+        let chances: Option<Vec<f64>> = blocks.iter().map(|blocks| found.chance_in_blocks(*blocks)).collect();
         let p = chances?.into_iter().fold(0.0, f64::max);
-        let (before, after) = (self.residual.norm_squared(), left.norm_squared());
-        let freedom = self.freedom - columns.ncols() as f64;
-        Some(Score { p, ..self.score(columns, &coefficients, before, after, freedom) })
+        Some(Score { p, ..self.score(&found, self.freedom - columns.ncols() as f64) })
     }
 
+    fn score(&self, found: &Regression, left: f64) -> Score {
+        let (before, after) = (self.residual.norm_squared(), found.left.norm_squared());
+        Score {
+            p: 1.0,
+            coefficients: found.coefficients.clone(),
+            explained: 1.0 - after / before,
+            shift: -(&found.taken * &found.coefficients),
+            tighter: ((after / left) / (before / self.freedom)).sqrt(),
+        }
+    }
+
+    /// Regresses the residual on what the model leaves of columns.
+    fn regress(&self, columns: &DMatrix<f64>) -> Option<Regression> {
+        let (rows, count) = columns.shape();
+        let mut taken = DMatrix::zeros(self.jacobian.ncols(), count);
+        for part in parts(rows) {
+            let (from, length) = (part.start, part.len());
+            taken += self.influence.rows(from, length).tr_mul(&columns.rows(from, length));
+        }
+        let mut projected = columns.clone();
+        let (mut products, mut along) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        for part in parts(rows) {
+            let (from, length) = (part.start, part.len());
+            let mut own = projected.rows_mut(from, length);
+            own.gemm(-1.0, &self.jacobian.rows(from, length), &taken, 1.0);
+            products += own.tr_mul(&own);
+            along += own.tr_mul(&self.residual.rows(from, length));
+        }
+        let length = products.diagonal().map(f64::sqrt);
+        let distinguished =
+            length.iter().zip(columns.column_iter()).all(|(length, b)| *length > LEAST_LEFT * b.norm());
+        if !distinguished {
+            return None;
+        }
+        // Columns at unit length: parameters of different units would spoil the factorisation.
+        let unit = DMatrix::from_fn(count, count, |i, j| products[(i, j)] / (length[i] * length[j]));
+        let coefficients = -unit.cholesky()?.solve(&along.component_div(&length)).component_div(&length);
+        if !coefficients.iter().all(|c| c.is_finite()) {
+            return None;
+        }
+        let mut left = self.residual.clone();
+        for part in parts(rows) {
+            let own = projected.rows(part.start, part.len());
+            left.rows_mut(part.start, part.len()).gemv(1.0, &own, &coefficients, 1.0);
+        }
+        Some(Regression { projected, along, coefficients, taken, left })
+    }
+}
+
+/// The residual by what the model leaves of some columns.
+struct Regression {
+    /// M Z.
+    projected: DMatrix<f64>,
+    /// (M Z)ᵀ r.
+    along: DVector<f64>,
+    /// c.
+    coefficients: DVector<f64>,
+    /// (JᵀJ)⁻¹ Jᵀ Z.
+    taken: DMatrix<f64>,
+    /// r + M Z c.
+    left: DVector<f64>,
+}
+
+impl Regression {
     /// Hotelling's T² of the whole sum of `zᵢ rᵢ`, by the covariance that the blocks' sums have once Z is estimated.
-    fn chance_in_blocks(&self, z: &DMatrix<f64>, left: &DVector<f64>, blocks: usize) -> Option<f64> {
-        let (rows, q) = z.shape();
+    fn chance_in_blocks(&self, blocks: usize) -> Option<f64> {
+        let (rows, q) = self.projected.shape();
         let freedom = blocks as f64 - q as f64;
         if freedom < 1.0 || rows < blocks {
             return None;
@@ -99,39 +155,12 @@ impl ScoreTest {
         let mut spread = DMatrix::zeros(q, q);
         for block in 0..blocks {
             let (from, to) = (block * rows / blocks, (block + 1) * rows / blocks);
-            let sum = z.rows(from, to - from).tr_mul(&left.rows(from, to - from));
+            let sum = self.projected.rows(from, to - from).tr_mul(&self.left.rows(from, to - from));
             spread += &sum * sum.transpose();
         }
-        let total = z.tr_mul(&self.residual);
-        let t2 = total.dot(&spread.cholesky()?.solve(&total));
+        let t2 = self.along.dot(&spread.cholesky()?.solve(&self.along));
         // T² (B − q) / (q B) is Fisher–Snedecor's (q, B − q).
         upper_tail(t2 * freedom / (q as f64 * blocks as f64), q as f64, freedom)
-    }
-
-    fn score(&self, columns: &DMatrix<f64>, c: &DVector<f64>, before: f64, after: f64, left: f64) -> Score {
-        Score {
-            p: 1.0,
-            coefficients: c.clone(),
-            explained: 1.0 - after / before,
-            shift: -self.influence.tr_mul(&(columns * c)),
-            tighter: ((after / left) / (before / self.freedom)).sqrt(),
-        }
-    }
-
-    /// The columns without what the model takes of them, and their coefficients.
-    fn regress(&self, columns: &DMatrix<f64>) -> Option<(DMatrix<f64>, DVector<f64>)> {
-        let projected = columns - &self.jacobian * self.influence.tr_mul(columns);
-        let distinguished =
-            projected.column_iter().zip(columns.column_iter()).all(|(a, b)| a.norm() > LEAST_LEFT * b.norm());
-        let length: Vec<f64> = projected.column_iter().map(|column| column.norm()).collect();
-        if !distinguished {
-            return None;
-        }
-        let mut unit = projected.clone();
-        unit.column_iter_mut().zip(&length).for_each(|(mut column, length)| column /= *length);
-        let mut coefficients = unit.tr_mul(&unit).cholesky()?.solve(&-unit.tr_mul(&self.residual));
-        coefficients.iter_mut().zip(&length).for_each(|(c, length)| *c /= *length);
-        coefficients.iter().all(|c| c.is_finite()).then_some((projected, coefficients))
     }
 }
 

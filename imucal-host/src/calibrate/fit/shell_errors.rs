@@ -231,18 +231,13 @@ fn blocked<const P: usize>(
     });
     let ends: Vec<Range<usize>> = (0..number).map(|k| bounds(k)..bounds(k + 1)).collect();
     let steps = steps(&blocks, (&starts, total), |k| &at[ends[k].clone()], shown) / variance;
-    let white = DMatrix::identity(total, total) + &steps;
-    let parts = Parts {
-        parts: [&white, &drift],
-        ratios: &ratios,
-        scale: Scale::Free,
-        five: !shown.within.is_empty(),
-    };
     // The points' own white noise, of which blocks show only a part.
     let all = DMatrix::from_fn(P, P, |i, j| unscaled[(i, j)]);
     let influence = &jacobian * &all;
     let drifting = influence.tr_mul(&(&drift * &influence));
-    let all = all + influence.tr_mul(&(steps * &influence));
+    let all = all + influence.tr_mul(&(&steps * &influence));
+    let parts = [DMatrix::identity(total, total) + steps, drift];
+    let parts = Parts { parts: &parts, ratios: &ratios, scale: Scale::Free, five: !shown.within.is_empty() };
     let column = DMatrix::from_column_slice(total, 1, residuals.as_slice());
     parts.errors_of([all, drifting], &column, &jacobian)?.pop()
 }

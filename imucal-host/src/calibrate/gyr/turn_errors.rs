@@ -119,10 +119,7 @@ pub fn errors(
 
 /// V_a and V_g of turns, two rows each.
 #[derive(Clone, Debug)]
-pub struct TurnCovariance {
-    of_directions: DMatrix<f64>,
-    of_rates: DMatrix<f64>,
-}
+pub struct TurnCovariance([DMatrix<f64>; 2]);
 
 impl TurnCovariance {
     /// Of turns near a gain.
@@ -141,9 +138,7 @@ impl TurnCovariance {
             })
         };
         let moves: Vec<Move> = turns.iter().enumerate().flat_map(of_ends).flatten().collect();
-        let of_directions = directions.propagated(rows, &moves);
-        let of_rates = of_rates(&turns, directions, rates);
-        Self { of_directions, of_rates }
+        Self([directions.propagated(rows, &moves), of_rates(&turns, directions, rates)])
     }
 
     /// Errors of what follows from the rows by `influence`; see [`Parts::errors`].
@@ -153,12 +148,7 @@ impl TurnCovariance {
         jacobian: &DMatrix<f64>,
         influence: &DMatrix<f64>,
     ) -> Option<Errors> {
-        let parts = Parts {
-            parts: [&self.of_directions, &self.of_rates],
-            ratios: &RATIOS,
-            scale: Scale::Near,
-            five: false,
-        };
+        let parts = Parts { parts: &self.0, ratios: &RATIOS, scale: Scale::Near, five: false };
         parts.errors(residuals, jacobian, influence)
     }
 }
