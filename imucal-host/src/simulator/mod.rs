@@ -23,6 +23,7 @@ pub mod replay;
 pub mod robot;
 pub mod run;
 pub mod streamed;
+mod swing_fit;
 pub mod tracked;
 pub mod truth;
 pub mod tumble;

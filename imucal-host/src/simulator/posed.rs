@@ -20,8 +20,7 @@ use rayon::prelude::*;
 use super::{
     place::Place,
     position_smoother::{Readings, Smoothed},
-    recent::Recent,
-    replay::nearest,
+    recent::{Recent, nearest},
     tracked::Tracked,
     truth::{Motion, Recorded},
 };
@@ -157,10 +156,11 @@ impl Motion for Posed {
 
     fn truth_among(&self, time: f64, rig: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
         let mut truth = self.tracked.truth_among(time, rig, recent);
-        truth.p_p = self.positions[nearest(&self.time, time)];
+        let row = recent.nearest(&self.time, time);
+        truth.p_p = self.positions[row];
         let acceleration = self.between(&self.accelerations, time);
         truth.f_t += (truth.c_p_n * truth.c_t_p).tr_mul(&(truth.c_p_n * acceleration));
-        if self.tracked.moving()[nearest(&self.time, time)] {
+        if self.tracked.moving()[row] {
             let turning = self.between(&self.angular_accelerations, time);
             truth.dw_it_t = turning - truth.w_pt_t.cross(&truth.w_ie_t);
         }

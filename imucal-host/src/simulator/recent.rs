@@ -5,11 +5,16 @@ use nalgebra::{Matrix3, Vector3};
 use super::{gimbal::base, place::Place};
 use crate::effect::Machine;
 
+/// Rows that are looked at after the last one, before all are.
+const SOON: usize = 16;
+
 /// What the last row was asked for, and what it was answered.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Recent {
     base: Last<(f64, [f64; 2]), Matrix3<f64>>,
     earth_rate: Last<f64, Vector3<f64>>,
+    /// The first row that is not before the time asked for last.
+    row: usize,
 }
 
 impl Recent {
@@ -22,6 +27,27 @@ impl Recent {
     pub fn earth_rate_n(&mut self, place: &Place) -> Vector3<f64> {
         self.earth_rate.get(place.latitude_deg, |_| place.earth_rate_n())
     }
+
+    /// The row nearest to a time, s: as a rule soon after the last one.
+    pub fn nearest(&mut self, times: &[f64], time: f64) -> usize {
+        let soon = self.row..(self.row + SOON).min(times.len());
+        let begins_before =
+            self.row.checked_sub(1).is_none_or(|row| times.get(row).is_some_and(|t| *t < time));
+        let found =
+            times.get(soon).filter(|_| begins_before).and_then(|soon| soon.iter().position(|t| *t >= time));
+        self.row = found.map_or_else(|| times.partition_point(|t| *t < time), |at| self.row + at);
+        let after = self.row.min(times.len().saturating_sub(1));
+        let before = after.saturating_sub(1);
+        match (times.get(before), times.get(after)) {
+            (Some(b), Some(a)) if time - b < a - time => before,
+            _ => after,
+        }
+    }
+}
+
+/// The row nearest to a time, s.
+pub fn nearest(times: &[f64], time: f64) -> usize {
+    Recent::default().nearest(times, time)
 }
 
 /// The last answer, and what was asked.
@@ -40,6 +66,21 @@ impl<K: PartialEq + Copy, V: Copy> Last<K, V> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_nearest_row_does_not_depend_on_what_was_asked_before() {
+        let times: Vec<f64> = (0..200).map(|k| 0.01 * f64::from(k) + 0.003 * f64::from(k % 3)).collect();
+        let asked = (0..300).map(|k| 0.009 * f64::from(k * 7 % 300) - 0.2);
+        let in_order = (0..300).map(|k| 0.0081 * f64::from(k) - 0.2);
+        let mut recent = Recent::default();
+        for time in asked.chain(in_order).chain([times[4], times[4], f64::NAN]) {
+            let found = recent.nearest(&times, time);
+            assert_eq!(found, nearest(&times, time), "{time}");
+            let apart = |row: usize| (times[row] - time).abs();
+            assert!(time.is_nan() || (0..200).all(|row| apart(found) <= apart(row)), "{time}");
+        }
+        assert_eq!(recent.nearest(&[], 1.0), 0);
+    }
 
     #[test]
     fn another_base_and_another_place_are_not_taken_for_the_last() {

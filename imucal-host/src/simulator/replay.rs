@@ -12,13 +12,14 @@
 use crate::recording::order_statistics::std_of_median;
 use std::{f64::consts::TAU, sync::OnceLock};
 
-use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::{
     gimbal::{Pose, direction, pose},
     place::Place,
-    recent::Recent,
+    recent::{Recent, nearest},
+    swing_fit::{SwingFit, swing, window},
     truth::{Motion, Recorded, at_pose, on_rig},
 };
 use crate::{
@@ -38,8 +39,8 @@ const CREEP: f64 = 3e-3;
 const NOISES: f64 = 8.0;
 /// Two rates further apart than this, rad/s, and than their noise are those of a jerk.
 const JERK: f64 = 1e-3;
-/// Poses of so many rows are remembered, half a kilobyte each.
-const REMEMBERED: usize = 500_000;
+/// Poses of so many rows are remembered, a third of a kilobyte each: of eleven minutes at 1 kHz.
+const REMEMBERED: usize = 700_000;
 /// At least this many readings to each side.
 const FEWEST: usize = 2;
 
@@ -118,7 +119,7 @@ impl Motion for Replay {
     }
 
     fn truth_among(&self, time: f64, rig: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
-        let row = nearest(&self.time, time);
+        let row = recent.nearest(&self.time, time);
         let since = time - self.time.get(row).copied().unwrap_or(time);
         let exact = self.machine(row, since);
         let mut machine = exact;
@@ -166,16 +167,6 @@ impl Recorded for Replay {
             Some(steady) => &**steady,
             None => self,
         }
-    }
-}
-
-/// The row nearest to a time, s.
-pub fn nearest(times: &[f64], time: f64) -> usize {
-    let after = times.partition_point(|t| *t < time).min(times.len().saturating_sub(1));
-    let before = after.saturating_sub(1);
-    match (times.get(before), times.get(after)) {
-        (Some(b), Some(a)) if time - b < a - time => before,
-        _ => after,
     }
 }
 
@@ -269,8 +260,11 @@ fn swings(
         if !moving[row] {
             return (swing(time, angles, row, patient), false);
         }
-        let near = swing(time, angles, row, reach);
-        let wide = swing(time, angles, row, reach + 1);
+        let (narrow, wide) = (window(time.len(), row, reach), window(time.len(), row, reach + 1));
+        let mut fit = SwingFit::of(time, angles, row, narrow.clone());
+        let near = fit.swing();
+        (wide.start..narrow.start).chain(narrow.end..wide.end).for_each(|k| fit.add(k));
+        let wide = fit.swing();
         // Noise of a rate is about that of a reading in the time between two.
         let jerked = (0..3).any(|gimbal| {
             let apart = (near[gimbal].rate - wide[gimbal].rate).abs();
@@ -284,33 +278,6 @@ fn swings(
         known[row.saturating_sub(reach)..to].fill(false);
     }
     (swings, known)
-}
-
-/// The cubic through the readings about a row, by least squares.
-fn swing(time: &[f64], angles: &[[f64; 3]], row: usize, reach: usize) -> [Swing; 3] {
-    let from = row.saturating_sub(reach).min(time.len().saturating_sub(2 * reach + 1));
-    let to = (from + 2 * reach + 1).min(time.len());
-    let scale = 1.0 / (time[to - 1] - time[from]).max(f64::MIN_POSITIVE);
-    let mut normal = Matrix4::zeros();
-    let mut right = [Vector4::zeros(); 3];
-    for k in from..to {
-        let s = (time[k] - time[row]) * scale;
-        let powers = Vector4::new(1.0, s, s * s, s * s * s);
-        normal += powers * powers.transpose();
-        for (axis, right) in right.iter_mut().enumerate() {
-            // From the row's own reading, so that many turns cost no digits.
-            *right += powers * (angles[k][axis] - angles[row][axis]);
-        }
-    }
-    let inverse = normal.try_inverse().unwrap_or_else(Matrix4::zeros);
-    std::array::from_fn(|axis| {
-        let cubic = inverse * right[axis];
-        Swing {
-            angle: angles[row][axis] + cubic[0],
-            rate: cubic[1] * scale,
-            acceleration: 2.0 * cubic[2] * scale * scale,
-        }
-    })
 }
 
 #[cfg(test)]

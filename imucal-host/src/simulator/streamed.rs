@@ -23,8 +23,8 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use super::{
     cubic::{Cubic, sample_before},
     place::Place,
-    recent::Recent,
-    replay::{nearest, readings_noise},
+    recent::{Recent, nearest},
+    replay::readings_noise,
     truth::{Motion, Recorded, in_the_open},
 };
 use crate::{
@@ -207,7 +207,7 @@ impl Motion for Streamed {
         (truth.w_it_t, truth.dw_it_t) = (w, dw);
         truth.f_t = of(SensorKind::Acc).unwrap_or(still).0;
         truth.b_t = of(SensorKind::Mag).unwrap_or(still).0;
-        let row = nearest(&self.rows, time);
+        let row = recent.nearest(&self.rows, time);
         truth.temperature = self.temperature.get(row).copied().unwrap_or(truth.temperature);
         truth
     }

@@ -19,7 +19,6 @@ use super::{
     gimbal::{Pose, direction},
     place::Place,
     recent::Recent,
-    replay::nearest,
     truth::{Motion, Recorded, at_pose},
 };
 use crate::{
@@ -111,7 +110,7 @@ impl Motion for Tracked {
 
     /// Of the rig, heading and levelling tilt act; there are no gimbals.
     fn truth_among(&self, time: f64, rig: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
-        let row = nearest(&self.time, time);
+        let row = recent.nearest(&self.time, time);
         let since = time - self.time.get(row).copied().unwrap_or(time);
         let still = State { c_t_p: Matrix3::identity(), w_pt_t: Vector3::zeros(), dw_pt_t: Vector3::zeros() };
         let State { c_t_p, w_pt_t, dw_pt_t } = self.states.get(row).copied().unwrap_or(still);
