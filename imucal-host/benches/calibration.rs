@@ -1,7 +1,9 @@
 //! How long a calibration takes: `imucal calibrate` by rests and by samples of a magnetometer, and the fit of an accelerometer alone by
-//! the core, next to SciPy where Python has it. Prints the tables of docs/performance.md; figures are ratios within one run.
+//! the core, next to the crate `levenberg-marquardt` and to SciPy where Python has it. Prints the tables of
+//! docs/performance.md; figures are ratios within one run.
 //!
-//! `IMUCAL_PYTHON=PROGRAM` names the Python that has SciPy; without one its column is empty, and that is said.
+//! `IMUCAL_PYTHON=PROGRAM` names the Python that has SciPy. The crate is compiled by this Cargo, with its own lock file. Where one of
+//! them is missing, its column is empty, and that is said.
 
 use std::{
     env,
@@ -54,16 +56,19 @@ fn main() {
         (path, samples)
     });
     println!(
-        "\nAn accelerometer's nine parameters by the core in f64, and SciPy's least_squares (MINPACK, numerical derivatives):\n"
+        "\nAn accelerometer's nine parameters by the core in f64, and the time of others over its own:\n"
     );
-    println!("| points | s | SciPy's time over it |\n| --- | --- | --- |");
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/peers/norm_fit.py");
+    println!("| points | s | SciPy's least_squares | crate levenberg-marquardt |\n| --- | --- | --- | --- |");
     for (count, repeats) in POINTS {
         let points = points(count, 0.003, LENGTH);
         let ours = fit(&points, repeats);
-        let peer = peer(&script, folder.path(), &points, repeats.min(50));
-        let ratio = peer.map_or_else(|| "–".to_owned(), |peer| format!("{:.1}", peer / ours));
-        println!("| {count} | {ours:.2e} | {ratio} |");
+        let path = written(folder.path(), &points);
+        let others = [(scipy(), repeats.min(50)), (levenberg_marquardt(), repeats)];
+        let ratio = |(mut program, repeats): (Command, usize)| {
+            program.arg(&path).arg(LENGTH.to_string()).arg(repeats.to_string());
+            seconds(program).map_or_else(|| "–".to_owned(), |theirs| format!("{:.2}", theirs / ours))
+        };
+        println!("| {count} | {ours:.2e} | {} |", others.map(ratio).join(" | "));
     }
 }
 
@@ -120,22 +125,43 @@ fn fit(points: &[ShellPoint<f64>], repeats: usize) -> f64 {
     (0..repeats).map(timed).fold(f64::INFINITY, f64::min)
 }
 
-/// Seconds that SciPy takes of the same points, if Python has it.
-fn peer(script: &Path, folder: &Path, points: &[ShellPoint<f64>], repeats: usize) -> Option<f64> {
+/// The points as a file of three columns.
+fn written(folder: &Path, points: &[ShellPoint<f64>]) -> PathBuf {
     let path = folder.join("points.csv");
     let lines = points.iter().map(|point| format!("{},{},{}\n", point.value.x, point.value.y, point.value.z));
     fs::write(&path, lines.collect::<String>()).expect("room");
-    let python = env::var_os("IMUCAL_PYTHON").unwrap_or_else(|| OsString::from("python3"));
-    let mut command = Command::new(&python);
-    command.arg(script).arg(&path).arg(LENGTH.to_string()).arg(repeats.to_string());
-    match command.output() {
+    path
+}
+
+fn peers() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/peers")
+}
+
+/// MINPACK with numerical derivatives.
+fn scipy() -> Command {
+    let mut python = Command::new(env::var_os("IMUCAL_PYTHON").unwrap_or_else(|| OsString::from("python3")));
+    python.arg(peers().join("norm_fit.py"));
+    python
+}
+
+/// MINPACK's algorithm in Rust, with derivatives.
+fn levenberg_marquardt() -> Command {
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["run", "--quiet", "--release", "--locked", "--target-dir", env!("CARGO_TARGET_TMPDIR")]);
+    cargo.arg("--manifest-path").arg(peers().join("levenberg_marquardt/Cargo.toml")).arg("--");
+    cargo
+}
+
+/// What a program says that it took, if it runs.
+fn seconds(mut program: Command) -> Option<f64> {
+    match program.output() {
         Ok(ended) if ended.status.success() => String::from_utf8_lossy(&ended.stdout).trim().parse().ok(),
         Ok(ended) => {
-            eprintln!("*** SKIPPED: SciPy: {} ***", String::from_utf8_lossy(&ended.stderr).trim());
+            eprintln!("*** SKIPPED: {} ***", String::from_utf8_lossy(&ended.stderr).trim());
             None
         }
         Err(fault) => {
-            eprintln!("*** SKIPPED: SciPy: {}: {fault} ***", python.to_string_lossy());
+            eprintln!("*** SKIPPED: {}: {fault} ***", program.get_program().to_string_lossy());
             None
         }
     }

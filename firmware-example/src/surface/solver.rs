@@ -4,7 +4,7 @@ use imucal_core::{
     accept::{self, Limits, Refusal},
     coverage::Coverage,
     fit::{self, Criteria, FitSummary, Observed, Units},
-    model::{Cost, RowSink, norm::NormModel, parameterisation::UPPER_TRIANGULAR},
+    model::{Cost, RowSink, SquaredSum, norm::NormModel, parameterisation::UPPER_TRIANGULAR},
     observation::ShellPoint,
     record::RawUnit,
     solver::{
@@ -53,7 +53,8 @@ fn descent(shell: &NormModel<'_, f32, 9>) -> LevenbergMarquardt<f32, 9> {
     reach!(solver::lm::LevenbergMarquardt::run(&mut fit, shell));
     reach!(solver::lm::LevenbergMarquardt::theta(&fit));
     reach!(solver::lm::LevenbergMarquardt::iterations(&fit));
-    reach!(solver::lm::LevenbergMarquardt::factor(&fit));
+    let mut factor = *reach!(solver::lm::LevenbergMarquardt::factor(&fit));
+    reach!(solver::panel::triangularise(shell, &theta, &mut factor));
     reach!(solver::lm::LevenbergMarquardt::variance(&fit));
     reach!(solver::lm::LevenbergMarquardt::covariance(&fit));
     reach!(solver::jacobian_check::largest_jacobian_error(shell, &theta));
@@ -104,6 +105,8 @@ fn factor() {
     let row = SVector::repeat(0.5);
     reach!(solver::triangular::Triangular::push(&mut factor, 0.5, &row));
     reach!(solver::triangular::Triangular::row(&mut factor, 0.5, &row));
+    let mut sum = SquaredSum(0.0f32);
+    reach!(solver::triangular::Triangular::stream(&factor, &mut sum));
     reach!(solver::triangular::Triangular::squared_sum(&factor));
     reach!(solver::triangular::Triangular::gradient(&factor));
     let norms = reach!(solver::triangular::Triangular::column_norms(&factor));

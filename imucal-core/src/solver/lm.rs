@@ -12,7 +12,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::{
     condition::normalised_condition,
-    panel::Panel,
+    panel::triangularise,
     report::{SolveReport, Termination},
     triangular::{Triangular, dot, weighted_square},
 };
@@ -138,14 +138,7 @@ impl<T: Scalar, const P: usize> LevenbergMarquardt<T, P> {
 
     /// Triangularises the rows at the present parameters.
     fn factorise(&mut self, model: &impl Model<T, P>) -> Result<(), Termination> {
-        self.factor = Triangular::default();
-        if T::PANELS {
-            let mut panel = Panel::new(&mut self.factor);
-            model.rows(&self.theta, &mut panel);
-            panel.end();
-        } else {
-            model.rows(&self.theta, &mut self.factor);
-        }
+        triangularise(model, &self.theta, &mut self.factor);
         self.evaluations = self.evaluations.saturating_add(1);
         self.independent_rows = model.independent_rows();
         let finite = self.factor.squared_sum().finite()

@@ -12,7 +12,7 @@ pub mod condition;
 pub mod gauge;
 pub mod jacobian_check;
 pub mod lm;
-mod panel;
+pub mod panel;
 pub mod report;
 pub mod swarm;
 pub mod triangular;

@@ -18,7 +18,27 @@
 use nalgebra::SVector;
 
 use super::triangular::Triangular;
-use crate::{model::RowSink, scalar::Scalar};
+use crate::{
+    model::{Model, RowSink},
+    scalar::Scalar,
+};
+
+/// Triangularises the rows of a model at `theta` into `factor`, whatever that held: in panels where [`Scalar::PANELS`] says so.
+#[inline]
+pub fn triangularise<T: Scalar, const P: usize>(
+    model: &impl Model<T, P>,
+    theta: &SVector<T, P>,
+    factor: &mut Triangular<T, P>,
+) {
+    *factor = Triangular::default();
+    if T::PANELS {
+        let mut panel = Panel::new(factor);
+        model.rows(theta, &mut panel);
+        panel.end();
+    } else {
+        model.rows(theta, factor);
+    }
+}
 
 /// Rows of a panel.
 const ROWS: usize = 32;

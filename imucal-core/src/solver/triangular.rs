@@ -31,6 +31,20 @@ impl<T: Scalar, const P: usize> Triangular<T, P> {
         rotate_in(self.r.as_mut_slice(), self.q.as_mut_slice(), row.as_mut_slice(), residual);
     }
 
+    /// As many rows as there are parameters and one more, of the same least squares as all those that were streamed.
+    pub fn stream(&self, sink: &mut impl RowSink<T, P>) {
+        for (k, q) in self.q.iter().enumerate() {
+            let mut row = SVector::<T, P>::zeros();
+            let entries = self.r.iter().skip(k).step_by(P.max(1));
+            row.iter_mut().zip(entries).for_each(|(slot, entry)| *slot = *entry);
+            sink.row(*q, &row);
+        }
+        let rest = self.squared_sum - dot(self.q.as_slice(), self.q.as_slice());
+        // Rounding may leave it below zero.
+        let rest = if rest > T::zero() { rest } else { T::zero() };
+        sink.row(rest.root(), &SVector::zeros());
+    }
+
     /// R by columns, q, and Σ r², for whoever takes in many rows at a time.
     pub(super) fn parts(&mut self) -> (&mut [T], &mut [T], &mut T) {
         (self.r.as_mut_slice(), self.q.as_mut_slice(), &mut self.squared_sum)
@@ -262,6 +276,12 @@ mod tests {
             prop_assert!((t.r().transpose() * t.r() - normal).norm() < 1e-10);
             prop_assert!((t.gradient() - image).norm() < 1e-10);
             prop_assert!((t.squared_sum() - sum).abs() < 1e-10);
+            // Its own few rows stand for all of them.
+            let mut again = Triangular::default();
+            t.stream(&mut again);
+            prop_assert!((again.r().transpose() * again.r() - normal).norm() < 1e-10);
+            prop_assert!((again.gradient() - image).norm() < 1e-10);
+            prop_assert!((again.squared_sum() - sum).abs() < 1e-10);
         }
 
         #[test]

@@ -247,6 +247,29 @@ cross_std = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
         }
     }
 
+    #[cfg(feature = "parquet")]
+    #[test]
+    fn in_parquet_corrected_numbers_are_those_of_the_core_and_others_doubles() {
+        use parquet::{
+            basic::Type::{DOUBLE, FLOAT},
+            file::reader::{FileReader, SerializedFileReader},
+        };
+        let bench = Bench::new();
+        bench.stream("out.parquet").unwrap();
+        let (whole, again) = (bench.whole(), Recording::read(&bench.path("out.parquet")).unwrap());
+        let bits = |recording: &Recording| -> Vec<[u32; 3]> {
+            let values = &recording.acc.as_ref().unwrap().values;
+            values.iter().map(|v| v.map(|x| (x as f32).to_bits()).into()).collect()
+        };
+        assert_eq!(bits(&whole), bits(&again));
+        let reader = SerializedFileReader::new(fs::File::open(bench.path("out.parquet")).unwrap()).unwrap();
+        let schema = reader.metadata().file_metadata().schema_descr_ptr();
+        let kinds = schema.columns().iter().map(|column| (column.name(), column.physical_type()));
+        for (name, kind) in kinds.filter(|(name, _)| name.starts_with("acc") || name.starts_with("gyr")) {
+            assert_eq!(kind, if name.starts_with("acc") { FLOAT } else { DOUBLE }, "{name}");
+        }
+    }
+
     fn fields(line: &str) -> Vec<&str> {
         line.splitn(5, ',').collect()
     }

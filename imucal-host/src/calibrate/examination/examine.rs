@@ -20,7 +20,7 @@ use imucal_core::{
     observation::ShellPoint,
     triad::Triad,
 };
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::{
@@ -78,11 +78,13 @@ pub fn examine(recording: &Recording, integrity: &Integrity, calibration: &mut C
         Some(Evidence::Shell { diagonal: true, .. })
     );
     let mut leant_on = None;
-    for outcome in &mut calibration.sensors {
-        if outcome.status() == Status::Refused {
-            continue;
-        }
-        let mut found = scene.suspicions(outcome, accelerometer_rms);
+    let examined = calibration.sensors.par_iter().map(|outcome| {
+        let refused = outcome.status() == Status::Refused;
+        (!refused).then(|| scene.suspicions(outcome, accelerometer_rms))
+    });
+    let examined: Vec<_> = examined.collect();
+    for (outcome, found) in calibration.sensors.iter_mut().zip(examined) {
+        let Some(mut found) = found else { continue };
         if square && matches!(outcome.evidence, Some(Evidence::Turns(_))) {
             // Six parameters were asked for, and what they leave out is left in the turns.
             calibration.warnings.extend(found.drain(..).map(|found| {
@@ -207,18 +209,12 @@ impl Scene<'_> {
         let count = residuals / each;
         // A direction has two residuals though its chord has three.
         let rank = if each == 3 { 2 } else { each };
-        let mut tests = Vec::new();
-        for k in 0..count {
-            let column =
-                DMatrix::from_fn(residuals, each, |row, axis| f64::from(u8::from(row == each * k + axis)));
+        let alone = |k: usize| {
+            let score = test.test_alone(each * k..each * (k + 1), rank)?;
             let name = format!("{} alone, against its neighbours", name(k));
-            tests.extend(test.test(&column, rank).map(|score| Tested {
-                follows: Follows::Neighbours,
-                name,
-                score,
-            }));
-        }
-        tests
+            Some(Tested { follows: Follows::Neighbours, name, score })
+        };
+        (0..count).filter_map(alone).collect()
     }
 
     fn excess_of_rests(

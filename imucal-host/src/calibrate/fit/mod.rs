@@ -9,6 +9,7 @@
 //! | [`rows`] | derivatives as a dense matrix, its covariance and leverages |
 //! | [`norm_fit`], [`rig_fit`], [`reference_fit`], [`gyr_rig_fit`] | least squares for each kind of observation |
 //! | [`least_squares`] | one fit by the core's solver |
+//! | [`parallel_rows`] | the same rows on all cores, where they are very many |
 //! | [`outlier`] | observations that are left out, and the fit without them |
 //! | [`held_out`], [`leverage`] | residuals of observations that the fit has not seen, from one factor of all |
 //! | [`report`] | the figures of any of these fits |
@@ -31,6 +32,7 @@ pub mod least_squares;
 pub mod leverage;
 pub mod norm_fit;
 pub mod outlier;
+pub mod parallel_rows;
 pub mod reference_fit;
 pub mod report;
 pub mod rest_bias;

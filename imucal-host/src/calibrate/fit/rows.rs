@@ -78,21 +78,23 @@ pub(super) fn parts(rows: usize) -> impl Iterator<Item = Range<usize>> {
 /// J (JᵀJ)⁻¹: by how much each residual moves each parameter of a fit of least squares. `None` where J is not of full
 /// rank.
 pub fn influence(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    // Columns at unit length: parameters of different units would spoil the inverse.
-    let length: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
-    let scaled = |matrix: &mut DMatrix<f64>| {
-        matrix.column_iter_mut().zip(&length).for_each(|(mut column, length)| column /= *length);
-    };
-    let mut unit = jacobian.clone();
-    scaled(&mut unit);
-    let mut products = DMatrix::zeros(unit.ncols(), unit.ncols());
-    for part in parts(unit.nrows()) {
-        let own = unit.rows(part.start, part.len());
+    Some(jacobian * inverse(jacobian)?)
+}
+
+/// (JᵀJ)⁻¹; `None` where J is not of full rank.
+pub(super) fn inverse(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let count = jacobian.ncols();
+    let mut products = DMatrix::zeros(count, count);
+    for part in parts(jacobian.nrows()) {
+        let own = jacobian.rows(part.start, part.len());
         products += own.tr_mul(&own);
     }
-    let mut influence = &unit * products.try_inverse()?;
-    scaled(&mut influence);
-    Some(influence)
+    // Columns at unit length: parameters of different units would spoil the inverse.
+    let length = products.diagonal().map(f64::sqrt);
+    let scaled = |matrix: &DMatrix<f64>| {
+        DMatrix::from_fn(count, count, |i, j| matrix[(i, j)] / (length[i] * length[j]))
+    };
+    Some(scaled(&scaled(&products).try_inverse()?))
 }
 
 impl<const P: usize> RowSink<f64, P> for Rows<P> {

@@ -17,10 +17,12 @@
 //! Source: Rao 1948 (score test); Hotelling 1931; Liang & Zeger 1986 (blocks). Not modelled: noise that differs
 //! from observation to observation, and what the parameters do beyond first order.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::rows::{influence, parts};
+use super::rows::{inverse, parts};
 
 /// A column is distinguished from the model's own where this share of its length is left by their projection.
 const LEAST_LEFT: f64 = 1e-4;
@@ -30,8 +32,10 @@ const LEAST_LEFT: f64 = 1e-4;
 pub struct ScoreTest {
     residual: DVector<f64>,
     jacobian: DMatrix<f64>,
-    /// J (JᵀJ)⁻¹.
-    influence: DMatrix<f64>,
+    /// (JᵀJ)⁻¹.
+    inverse: DMatrix<f64>,
+    /// Jᵀr: at the optimum, what rounding leaves.
+    gradient: DVector<f64>,
     /// Independent residuals less parameters.
     freedom: f64,
 }
@@ -55,19 +59,35 @@ impl ScoreTest {
     /// Of a fit with so many independent residuals; `None` where its derivatives are not of full rank.
     pub fn new(residuals: &[f64], jacobian: DMatrix<f64>, independent: usize) -> Option<Self> {
         let freedom = independent as f64 - jacobian.ncols() as f64;
-        let influence = influence(&jacobian)?;
-        Some(Self { residual: DVector::from_column_slice(residuals), jacobian, influence, freedom })
+        let inverse = inverse(&jacobian)?;
+        let residual = DVector::from_column_slice(residuals);
+        let gradient = jacobian.tr_mul(&residual);
+        Some(Self { residual, jacobian, inverse, gradient, freedom })
     }
 
     /// Tests columns of which `rank` are independent of each other, by the residual's own variance. `None` where the
     /// model has them already, or too few residuals are left.
     pub fn test(&self, columns: &DMatrix<f64>, rank: usize) -> Option<Score> {
+        self.judged(&self.regress(&self.products(columns))?, rank)
+    }
+
+    /// Tests whether some residuals, which lie next to each other, follow nothing but themselves: a column for each.
+    pub fn test_alone(&self, rows: Range<usize>, rank: usize) -> Option<Score> {
+        let (from, count) = (rows.start, rows.len());
+        let products = Products {
+            own: DMatrix::identity(count, count),
+            residual: self.residual.rows(from, count).into_owned(),
+            model: self.jacobian.rows(from, count).transpose(),
+        };
+        self.judged(&self.regress(&products)?, rank)
+    }
+
+    fn judged(&self, found: &Regression, rank: usize) -> Option<Score> {
         let left = self.freedom - rank as f64;
         if left < 1.0 {
             return None;
         }
-        let found = self.regress(columns)?;
-        let score = self.score(&found, left);
+        let score = self.score(found, left);
         let f = (score.explained / rank as f64) / ((1.0 - score.explained) / left);
         Some(Score { p: upper_tail(f, rank as f64, left)?, ..score })
     }
@@ -75,79 +95,22 @@ impl ScoreTest {
     /// Tests columns of residuals that are alike in time, by what is left over in blocks of neighbours, as many as
     /// each of `blocks` says: the largest probability counts.
     pub fn test_in_blocks(&self, columns: &DMatrix<f64>, blocks: &[usize]) -> Option<Score> {
-        let found = self.regress(columns)?;
-        let chances: Option<Vec<f64>> = blocks.iter().map(|blocks| found.chance_in_blocks(*blocks)).collect();
+        let found = self.regress(&self.products(columns))?;
+        let left = self.left(columns, &found);
+        let chances: Option<Vec<f64>> =
+            blocks.iter().map(|blocks| self.chance_in_blocks((columns, &left), &found, *blocks)).collect();
         let p = chances?.into_iter().fold(0.0, f64::max);
         Some(Score { p, ..self.score(&found, self.freedom - columns.ncols() as f64) })
     }
 
-    fn score(&self, found: &Regression, left: f64) -> Score {
-        let (before, after) = (self.residual.norm_squared(), found.left.norm_squared());
-        Score {
-            p: 1.0,
-            coefficients: found.coefficients.clone(),
-            explained: 1.0 - after / before,
-            shift: -(&found.taken * &found.coefficients),
-            tighter: ((after / left) / (before / self.freedom)).sqrt(),
-        }
-    }
-
-    /// Regresses the residual on what the model leaves of columns.
-    fn regress(&self, columns: &DMatrix<f64>) -> Option<Regression> {
-        let (rows, count) = columns.shape();
-        let mut taken = DMatrix::zeros(self.jacobian.ncols(), count);
-        for part in parts(rows) {
-            let (from, length) = (part.start, part.len());
-            taken += self.influence.rows(from, length).tr_mul(&columns.rows(from, length));
-        }
-        let mut projected = columns.clone();
-        let (mut products, mut along) = (DMatrix::zeros(count, count), DVector::zeros(count));
-        for part in parts(rows) {
-            let (from, length) = (part.start, part.len());
-            let mut own = projected.rows_mut(from, length);
-            own.gemm(-1.0, &self.jacobian.rows(from, length), &taken, 1.0);
-            products += own.tr_mul(&own);
-            along += own.tr_mul(&self.residual.rows(from, length));
-        }
-        let length = products.diagonal().map(f64::sqrt);
-        let distinguished =
-            length.iter().zip(columns.column_iter()).all(|(length, b)| *length > LEAST_LEFT * b.norm());
-        if !distinguished {
-            return None;
-        }
-        // Columns at unit length: parameters of different units would spoil the factorisation.
-        let unit = DMatrix::from_fn(count, count, |i, j| products[(i, j)] / (length[i] * length[j]));
-        let coefficients = -unit.cholesky()?.solve(&along.component_div(&length)).component_div(&length);
-        if !coefficients.iter().all(|c| c.is_finite()) {
-            return None;
-        }
-        let mut left = self.residual.clone();
-        for part in parts(rows) {
-            let own = projected.rows(part.start, part.len());
-            left.rows_mut(part.start, part.len()).gemv(1.0, &own, &coefficients, 1.0);
-        }
-        Some(Regression { projected, along, coefficients, taken, left })
-    }
-}
-
-/// The residual by what the model leaves of some columns.
-struct Regression {
-    /// M Z.
-    projected: DMatrix<f64>,
-    /// (M Z)ᵀ r.
-    along: DVector<f64>,
-    /// c.
-    coefficients: DVector<f64>,
-    /// (JᵀJ)⁻¹ Jᵀ Z.
-    taken: DMatrix<f64>,
-    /// r + M Z c.
-    left: DVector<f64>,
-}
-
-impl Regression {
     /// Hotelling's T² of the whole sum of `zᵢ rᵢ`, by the covariance that the blocks' sums have once Z is estimated.
-    fn chance_in_blocks(&self, blocks: usize) -> Option<f64> {
-        let (rows, q) = self.projected.shape();
+    fn chance_in_blocks(
+        &self,
+        (columns, left): (&DMatrix<f64>, &DVector<f64>),
+        found: &Regression,
+        blocks: usize,
+    ) -> Option<f64> {
+        let (rows, q) = columns.shape();
         let freedom = blocks as f64 - q as f64;
         if freedom < 1.0 || rows < blocks {
             return None;
@@ -155,13 +118,96 @@ impl Regression {
         let mut spread = DMatrix::zeros(q, q);
         for block in 0..blocks {
             let (from, to) = (block * rows / blocks, (block + 1) * rows / blocks);
-            let sum = self.projected.rows(from, to - from).tr_mul(&self.left.rows(from, to - from));
+            let left = left.rows(from, to - from);
+            let by_model = self.jacobian.rows(from, to - from).tr_mul(&left);
+            let sum = columns.rows(from, to - from).tr_mul(&left) - found.taken.tr_mul(&by_model);
             spread += &sum * sum.transpose();
         }
-        let t2 = self.along.dot(&spread.cholesky()?.solve(&self.along));
+        let t2 = found.along.dot(&spread.cholesky()?.solve(&found.along));
         // T² (B − q) / (q B) is Fisher–Snedecor's (q, B − q).
         upper_tail(t2 * freedom / (q as f64 * blocks as f64), q as f64, freedom)
     }
+
+    fn score(&self, found: &Regression, left: f64) -> Score {
+        Score {
+            p: 1.0,
+            coefficients: found.coefficients.clone(),
+            explained: found.explained,
+            shift: found.shift.clone(),
+            tighter: ((1.0 - found.explained) * self.freedom / left).sqrt(),
+        }
+    }
+
+    fn products(&self, columns: &DMatrix<f64>) -> Products {
+        let (rows, count) = columns.shape();
+        let mut products = Products {
+            own: DMatrix::zeros(count, count),
+            residual: DVector::zeros(count),
+            model: DMatrix::zeros(self.jacobian.ncols(), count),
+        };
+        for part in parts(rows) {
+            let own = columns.rows(part.start, part.len());
+            products.own += own.tr_mul(&own);
+            products.residual += own.tr_mul(&self.residual.rows(part.start, part.len()));
+            products.model += self.jacobian.rows(part.start, part.len()).tr_mul(&own);
+        }
+        products
+    }
+
+    /// Regresses the residual on what the model leaves of columns: at least [`LEAST_LEFT`] of them, whose square loses half
+    /// of the digits.
+    fn regress(&self, of: &Products) -> Option<Regression> {
+        let taken = &self.inverse * &of.model;
+        let products = &of.own - of.model.tr_mul(&taken);
+        let along = &of.residual - taken.tr_mul(&self.gradient);
+        let length = products.diagonal().map(|square| square.max(0.0).sqrt());
+        let whole = of.own.diagonal().map(f64::sqrt);
+        if !length.iter().zip(&whole).all(|(length, whole)| *length > LEAST_LEFT * whole) {
+            return None;
+        }
+        // Columns at unit length: parameters of different units would spoil the factorisation.
+        let unit = products.map_with_location(|i, j, product| product / (length[i] * length[j]));
+        let coefficients = -unit.cholesky()?.solve(&along.component_div(&length)).component_div(&length);
+        let explained = -along.dot(&coefficients) / self.residual.norm_squared();
+        let shift = -(&taken * &coefficients);
+        let finite = coefficients.iter().all(|c| c.is_finite());
+        finite.then_some(Regression { along, coefficients, taken, shift, explained })
+    }
+
+    /// r + M Z c.
+    fn left(&self, columns: &DMatrix<f64>, found: &Regression) -> DVector<f64> {
+        let mut left = self.residual.clone();
+        for part in parts(columns.nrows()) {
+            let mut left = left.rows_mut(part.start, part.len());
+            left.gemv(1.0, &columns.rows(part.start, part.len()), &found.coefficients, 1.0);
+            left.gemv(1.0, &self.jacobian.rows(part.start, part.len()), &found.shift, 1.0);
+        }
+        left
+    }
+}
+
+/// What a regression needs of columns.
+struct Products {
+    /// ZᵀZ.
+    own: DMatrix<f64>,
+    /// Zᵀr.
+    residual: DVector<f64>,
+    /// JᵀZ.
+    model: DMatrix<f64>,
+}
+
+/// The residual by what the model leaves of some columns.
+struct Regression {
+    /// (M Z)ᵀ r.
+    along: DVector<f64>,
+    /// c.
+    coefficients: DVector<f64>,
+    /// (JᵀJ)⁻¹ Jᵀ Z.
+    taken: DMatrix<f64>,
+    /// δ.
+    shift: DVector<f64>,
+    /// Share of the squared residual that it takes.
+    explained: f64,
 }
 
 /// Probability that a ratio of variances exceeds `f`; `None` where it is not one.
@@ -172,7 +218,7 @@ pub fn upper_tail(f: f64, above: f64, below: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::rows::influence, *};
     use crate::simulator::random::{Purpose, Random};
 
     const ROWS: usize = 400;
@@ -229,6 +275,25 @@ mod tests {
         // Until the parabola is estimated, the line is too high by its mean, 1/12 of it; parameters lower the residual.
         assert!((score.shift[0] - 5.0 / 12.0).abs() < 0.2, "{score:?}");
         assert!(score.shift[1].abs() < 0.05, "{score:?}");
+    }
+
+    #[test]
+    fn residuals_alone_are_tested_as_by_their_columns() {
+        let (test, _) = parabola(1.0, 0.0, 2);
+        let columns = DMatrix::from_fn(ROWS, 2, |row, k| f64::from(u8::from(row == 30 + k)));
+        let (alone, by_columns) = (test.test_alone(30..32, 2).unwrap(), test.test(&columns, 2).unwrap());
+        assert!((alone.p / by_columns.p - 1.0).abs() < 1e-9, "{alone:?} {by_columns:?}");
+        assert!((alone.shift - by_columns.shift).amax() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_left_is_the_residual_of_a_fit_with_the_columns() {
+        let (test, columns) = parabola(5.0, 0.0, 3);
+        let found = test.regress(&test.products(&columns)).unwrap();
+        let left = test.left(&columns, &found);
+        let share = left.norm_squared() / test.residual.norm_squared();
+        assert!((1.0 - found.explained - share).abs() < 1e-12);
+        assert!(columns.tr_mul(&left).amax() < 1e-9 && test.jacobian.tr_mul(&left).amax() < 1e-9);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Samples as Parquet: the columns of the CSV, numbers as doubles, unknown columns as text.
+//! Samples as Parquet: the columns of the CSV, numbers as doubles, those of an `f32` as floats, unknown columns as text.
 
 use std::{
     fs::File,

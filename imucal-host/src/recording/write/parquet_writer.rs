@@ -4,7 +4,7 @@ use std::{io, ops::Range, path::Path, sync::Arc};
 
 use ::parquet::{
     basic::{Compression, ConvertedType, Repetition, Type as Physical},
-    data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type},
+    data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int64Type},
     errors::ParquetError,
     file::{
         properties::WriterProperties,
@@ -95,13 +95,14 @@ const GROUP: usize = 1 << 16;
 pub(crate) struct ParquetWriter<W: io::Write + Send> {
     writer: SerializedFileWriter<W>,
     present: Vec<usize>,
+    singles: [bool; KNOWN],
     /// The last time that was written, as the column has it; none at first.
     last: Times,
 }
 
 impl<W: io::Write + Send> ParquetWriter<W> {
     /// Starts with the columns of a table, which has the first rows; `singles` are columns whose numbers are those of an
-    /// `f32`.
+    /// `f32`, and are stored as such.
     pub(crate) fn begin(out: W, table: &Table, singles: [bool; KNOWN]) -> io::Result<Self> {
         Self::open(out, table, singles).map_err(io::Error::other)
     }
@@ -112,7 +113,11 @@ impl<W: io::Write + Send> ParquetWriter<W> {
         let mut properties = WriterProperties::builder().set_compression(Compression::SNAPPY);
         let mut fields = Vec::new();
         for slot in &present {
-            let physical = if *slot == TIME { times.physical() } else { Physical::DOUBLE };
+            let physical = match *slot {
+                TIME => times.physical(),
+                slot if singles[slot] => Physical::FLOAT,
+                _ => Physical::DOUBLE,
+            };
             fields.push(field(NAMES[*slot], physical, ConvertedType::NONE)?);
             // A dictionary of numbers of which each is another costs more than the numbers.
             if *slot == TIME || singles[*slot] {
@@ -128,7 +133,7 @@ impl<W: io::Write + Send> ParquetWriter<W> {
             Times::Whole(_) => Times::Whole(Vec::new()),
             Times::Doubles(_) => Times::Doubles(Vec::new()),
         };
-        Ok(Self { writer, present, last })
+        Ok(Self { writer, present, singles, last })
     }
 
     /// Appends the rows of a table that has the columns of the first; `before` were written already.
@@ -164,6 +169,11 @@ impl<W: io::Write + Send> ParquetWriter<W> {
             };
             match *slot {
                 TIME => times.write(rows.clone(), &mut column)?,
+                slot if self.singles[slot] => {
+                    let values = &table.columns[slot][rows.clone()];
+                    let values: Vec<f32> = values.iter().map(|value| *value as f32).collect();
+                    column.typed::<FloatType>().write_batch(&values, None, None)?
+                }
                 slot => {
                     let values = &table.columns[slot][rows.clone()];
                     column.typed::<DoubleType>().write_batch(values, None, None)?
