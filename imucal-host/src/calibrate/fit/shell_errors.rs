@@ -168,10 +168,10 @@ fn steps<'a, const P: usize>(
 ) -> DMatrix<f64> {
     let mut covariance = DMatrix::zeros(total, total);
     for (span, steps) in shown.spans.iter().zip(&shown.steps) {
-        // Shares of the blocks that lie in this rest.
+        // Shares of the blocks that lie in this rest; points are in time order.
         let share = |k: usize| {
-            let within = at(k).iter().filter(|at| span.contains(at)).count();
-            within as f64 / at(k).len() as f64
+            let before = |until: f64| at(k).partition_point(|at| *at < until);
+            before(span.end).saturating_sub(before(span.start)) as f64 / at(k).len() as f64
         };
         let shares: Vec<(usize, f64)> =
             (0..blocks.len()).map(|k| (k, share(k))).filter(|(_, share)| *share > 0.0).collect();
