@@ -66,7 +66,7 @@ fn main() {
     );
     for rows in ROWS.into_iter().chain(more) {
         let text = recording(folder, rows);
-        let columns = folder.join(format!("{rows}.parquet"));
+        let columns = folder.join(format!("columns-{rows}.parquet"));
         correct(&text, &calibration, &columns);
         for source in [text, columns] {
             compared(rows, &source, &calibration, &script, &there);

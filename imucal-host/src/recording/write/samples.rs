@@ -43,16 +43,16 @@ impl<'a> Samples<'a> {
         file: &'a mut Output,
     ) -> Result<Self, WriteError> {
         let singles = singles_of(first);
+        let begun = |cause| failed(path, cause);
         let sink = match format {
-            Format::Csv => Sink::Csv(Box::new(CsvWriter::begin(file, table, singles))),
+            Format::Csv => Sink::Csv(Box::new(CsvWriter::begin(file, table, singles).map_err(begun)?)),
             Format::CsvGz => {
                 let encoder = GzEncoder::new(file, Compression::default());
-                Sink::CsvGz(Box::new(CsvWriter::begin(encoder, table, singles)))
+                Sink::CsvGz(Box::new(CsvWriter::begin(encoder, table, singles).map_err(begun)?))
             }
             #[cfg(feature = "parquet")]
             Format::Parquet => {
-                let writer = ParquetWriter::begin(file, table, singles);
-                Sink::Parquet(Box::new(writer.map_err(|cause| failed(path, cause))?))
+                Sink::Parquet(Box::new(ParquetWriter::begin(file, table, singles).map_err(begun)?))
             }
             #[cfg(not(feature = "parquet"))]
             Format::Parquet => return Err(WriteError::ParquetNotBuilt { path: path.to_path_buf() }),
@@ -89,8 +89,8 @@ impl<'a> Samples<'a> {
     /// Ends the file.
     pub(crate) fn finish(self) -> Result<(), WriteError> {
         let ended = match self.sink {
-            Sink::Csv(writer) => writer.finish().map(|_| ()),
-            Sink::CsvGz(writer) => writer.finish().and_then(GzEncoder::finish).map(|_| ()),
+            Sink::Csv(_) => Ok(()),
+            Sink::CsvGz(writer) => writer.finish().finish().map(|_| ()),
             #[cfg(feature = "parquet")]
             Sink::Parquet(writer) => writer.finish(),
         };
