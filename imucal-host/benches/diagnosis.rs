@@ -1,5 +1,5 @@
 //! How long `imucal diagnose` takes over nine channels at 100 Hz, reading included, and how much memory it holds: 650 s with no
-//! effect and with one to three, an hour, and four hours; and a robot's recording of 650 s with its simulator's stream, of
+//! effect and with one to three, also at 1 kHz, an hour, and four hours; and a robot's recording of 650 s with its simulator's stream, of
 //! each machine. Fails above its limits, so that it needs a machine with nothing else to do. `IMUCAL_BEFORE=PROGRAM` runs an older program on the same recordings and prints the ratio.
 
 use std::{
@@ -17,8 +17,10 @@ const EFFECTS: [&str; 3] = ["acc.scale_quadratic=3", "mag.gimbal_hard_iron_outer
 /// Machines, and the effect that their recordings have.
 const ROBOTS: [&str; 3] = ["legged", "wheeled", "flying"];
 const ROBOT_EFFECT: &str = "gyr.g_sensitivity=3";
-/// Length of a usual recording, s, and of longer ones.
+/// Length of a usual recording, s, its rate, Hz, and lengths of longer ones.
 const USUAL: u32 = 650;
+/// See [`USUAL`].
+const RATE: u32 = 100;
 const LONGER: [u32; 2] = [3600, 14_400];
 /// Most that the diagnosis of a usual recording may take, s, and hold, MiB.
 const LIMITS: (f64, f64) = (5.0, 1024.0);
@@ -31,20 +33,23 @@ fn main() -> ExitCode {
     let folder = tempfile::tempdir().expect("a folder");
     let before = env::var_os("IMUCAL_BEFORE");
     let threads = thread::available_parallelism().map_or(1, usize::from);
-    println!("nine channels at 100 Hz, {threads} threads");
+    println!("nine channels, {threads} threads");
     let mut within = true;
     let mut usual = f64::INFINITY;
     for count in 0..=EFFECTS.len() {
-        let (seconds, mebibytes) = measured(folder.path(), USUAL, count, before.as_deref());
+        let (seconds, mebibytes) = measured(folder.path(), (USUAL, RATE), count, before.as_deref());
         within &= seconds <= LIMITS.0 && mebibytes <= LIMITS.1;
         if count == 1 {
             usual = seconds;
         }
     }
+    let (seconds, mebibytes) = measured(folder.path(), (USUAL, 10 * RATE), 1, before.as_deref());
+    println!("        {:.1} times as long as at {RATE} Hz", seconds / usual);
+    within &= mebibytes <= LARGEST;
     for length in LONGER {
         // An engine whose memory grows with the square of the length is not asked for four hours.
         let before = before.as_deref().filter(|_| length < LONGER[1]);
-        let (seconds, mebibytes) = measured(folder.path(), length, 1, before);
+        let (seconds, mebibytes) = measured(folder.path(), (length, RATE), 1, before);
         println!("        {:.1} times as long as {USUAL} s", seconds / usual);
         within &= mebibytes <= LARGEST && (length > LONGER[0] || seconds <= HOUR * usual);
     }
@@ -55,11 +60,11 @@ fn main() -> ExitCode {
     if within { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Seconds and mebibytes of a recording of this length with so many effects, which are printed.
-fn measured(folder: &Path, length: u32, effects: usize, before: Option<&OsStr>) -> (f64, f64) {
-    let recording = folder.join(format!("{length}-{effects}.csv.gz"));
-    simulate(&recording, length, &EFFECTS[..effects]);
-    print!("{length:>6} s, {effects} effects  ");
+/// Seconds and mebibytes of a recording of this length, s, and rate, Hz, with so many effects, which are printed.
+fn measured(folder: &Path, (length, rate): (u32, u32), effects: usize, before: Option<&OsStr>) -> (f64, f64) {
+    let recording = folder.join(format!("{length}-{rate}-{effects}.csv.gz"));
+    simulate(&recording, (length, rate), &EFFECTS[..effects]);
+    print!("{length:>6} s at {rate:>4} Hz, {effects} effects  ");
     compared(&[&recording], before)
 }
 
@@ -106,9 +111,10 @@ fn imucal(program: &OsStr) -> Command {
     command
 }
 
-fn simulate(recording: &Path, length: u32, effects: &[&str]) {
+fn simulate(recording: &Path, (length, rate): (u32, u32), effects: &[&str]) {
     let mut command = imucal(&this());
     command.args(["simulate", "--programme", "mixed", "--duration"]).arg(length.to_string());
+    command.arg("--rate").arg(rate.to_string());
     command.arg("--out").arg(recording);
     effects.iter().for_each(|effect| {
         command.args(["--effect", effect]);

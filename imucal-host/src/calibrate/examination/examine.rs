@@ -157,21 +157,27 @@ impl Scene<'_> {
         form: Parameterisation<P>,
     ) -> Vec<Suspicion> {
         let model = NormModel { points: shell.points, norm: shell.norm, form };
-        let rows = Rows::of(&model, &form.theta(shell.triad));
-        let count = rows.residuals.len();
         let all: Vec<usize> = (0..P).collect();
-        // The residual has nothing of the terms of temperature left, and their freedom is gone.
-        let independent = count.saturating_sub(shell.warm);
-        let Some(test) = ScoreTest::new(&rows.residuals, rows.derivatives(count, &all), independent) else {
-            return Vec::new();
+        let fitted = || {
+            let rows = Rows::of(&model, &form.theta(shell.triad));
+            let count = rows.residuals.len();
+            // The residual has nothing of the terms of temperature left, and their freedom is gone.
+            let independent = count.saturating_sub(shell.warm);
+            let test = ScoreTest::new(&rows.residuals, rows.derivatives(count, &all), independent)?;
+            Some((test, rows.residuals))
         };
         let at: Vec<usize> = match kind {
             SensorKind::Mag => shell.places.to_vec(),
             _ => shell.places.iter().map(|rest| self.middle(*rest)).collect(),
         };
-        let directions: Vec<_> =
-            shell.points.iter().map(|p| shell.triad.correct(&p.value).normalize()).collect();
-        let courses = self.courses(&at);
+        let followed = || {
+            let direction = |p: &ShellPoint<f64>| shell.triad.correct(&p.value).normalize();
+            (shell.points.iter().map(direction).collect::<Vec<_>>(), self.courses(&at))
+        };
+        let (Some((test, residuals)), (directions, courses)) = rayon::join(fitted, followed) else {
+            return Vec::new();
+        };
+        let count = residuals.len();
         let mut tests: Vec<Tested> = norm_residual::columns(&directions, &courses, kind == SensorKind::Acc)
             .par_iter()
             .filter_map(|make| {
@@ -189,7 +195,7 @@ impl Scene<'_> {
             tests.extend(
                 self.single(&test, 1, count, &|k| format!("the rest at {:.0} s", self.recording.time[at[k]])),
             );
-            excess = self.excess_of_rests(shell, &directions, &rows.residuals, P + shell.warm);
+            excess = self.excess_of_rests(shell, &directions, &residuals, P + shell.warm);
             turning =
                 self.turning(shell.norm).and_then(|t| t.of_accelerometer(shell.std.gain.diagonal().min()));
         }

@@ -103,8 +103,9 @@ impl<const P: usize> ShellErrors<P> {
         let variance = fit.solver.variance().unwrap_or(f64::INFINITY);
         let at: Vec<f64> = fit.used.iter().map(|k| at[*k]).collect();
         let errors = fit.solver.factor().covariance(1.0).and_then(|unscaled| {
-            let normals = normals(&problem.form.triad(fit.solver.theta()), &fit.points);
-            blocked(&rows(problem, fit), &normals, (&at, shown), (&unscaled, variance))
+            let triad = problem.form.triad(fit.solver.theta());
+            let (rows, normals) = rayon::join(|| rows(problem, fit), || normals(&triad, &fit.points));
+            blocked(&rows, &normals, (&at, shown), (&unscaled, variance))
         });
         Self::new(classical, errors.as_ref())
     }

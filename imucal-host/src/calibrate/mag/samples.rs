@@ -78,7 +78,9 @@ fn outcome(
 
 /// Fits from the start that ends lower: an algebraic ellipsoid can be far off on a small part of the sphere.
 fn best_fit(problem: &NormProblem<'_, 9>) -> Option<NormFit<9>> {
-    let starts = [adjusted::start(problem.points, problem.norm), sphere::start(problem.points, problem.norm)];
+    let (points, norm) = (problem.points, problem.norm);
+    let (ellipsoid, sphere) = rayon::join(|| adjusted::start(points, norm), || sphere::start(points, norm));
+    let starts = [ellipsoid, sphere];
     let ends = starts.par_iter().flatten().map(|start| problem.ends(start));
     let (_, lowest) = ends.min_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(problem.fit(&lowest))
