@@ -10,7 +10,7 @@
 //! | d, r_j | row k of the factor, its diagonal first |
 //! | a, a_j | columns k and j of the panel |
 //!
-//! The factor is that of [`Triangular`] but for rounding, its diagonal not negative either. A panel takes (P + 1) · [`ROWS`] numbers; its
+//! The factor is that of [`Triangular`] but for rounding, its diagonal not negative either. A panel takes (P + 1) · `ROWS` numbers; its
 //! loops run over neighbours in memory, so that a processor with vector registers does several rows at once. Sums are in a fixed order.
 //! A device has few rows, and little memory: there, and wherever the host computes as the device does, [`Scalar::PANELS`] is false and
 //! rows are rotated in one by one. Source: Golub & Van Loan, *Matrix Computations*, 5.1 and 5.2.
