@@ -1,6 +1,11 @@
 //! `imucal export` and `imucal corrupt`: other programs' files, and what a unit would have read.
 
-use super::{Folder, estimating_noise::still};
+use std::process::Command;
+
+use imucal_tests::program::available;
+use serde_json::Value;
+
+use super::{Folder, estimating_noise::still, imucal};
 
 /// Targets that take raw values in any unit, and those that take no counts.
 const ANY: [&str; 5] = ["kalibr", "sdf", "python", "c-header", "csv"];
@@ -49,6 +54,86 @@ fn a_target_without_what_it_needs_is_a_refusal() {
         .run("export cal.toml --diagnosis diagnosis.json --to csv")
         .with(2)
         .telling(&["imucal-diagnosis/1"]);
+}
+
+/// Draws units and prints mean and covariance of the entries that were estimated.
+const DRAW: &str = "import json, sys, numpy as np, unit
+kind, count = sys.argv[1], int(sys.argv[2])
+rng = np.random.default_rng(1)
+drawn = [unit.sample_unit(rng)[kind] for _ in range(count)]
+all = np.array([np.concatenate([np.ravel(t['gain']), t['bias']]) for t in drawn])[:, unit.UNIT[kind]['entries']]
+print(json.dumps([all.mean(axis=0).tolist(), np.cov(all.T).tolist()]))";
+
+#[test]
+fn units_that_are_drawn_vary_together_as_the_errors_do() {
+    let python = std::env::var("IMUCAL_PYTHON").unwrap_or_else(|_| "python3".into());
+    if !available(&python, &["-c", "import numpy"], "Python with numpy (IMUCAL_PYTHON names one)", false) {
+        return;
+    }
+    let folder = Folder::with_recording();
+    folder.run("calibrate small.csv --out cal.toml --json cal.json").with(0);
+    folder.run("export cal.toml --covariance cal.json --to python --out unit.py").with(0);
+    let found: Value = serde_json::from_str(&folder.text("cal.json")).expect("JSON");
+    for kind in ["acc", "gyr"] {
+        let drawn = Command::new(&python)
+            .current_dir(folder.path("."))
+            .args(["-c", DRAW, kind, "4000"])
+            .output()
+            .expect("it runs");
+        assert!(drawn.status.success(), "{}", String::from_utf8_lossy(&drawn.stderr));
+        let [_, drawn]: [Value; 2] = serde_json::from_slice(&drawn.stdout).expect("JSON");
+        let stated = &found["sensors"][kind]["covariance"];
+        let entry = |of: &Value, i: usize, j: usize| of[i][j].as_f64().expect("a number");
+        let count = stated.as_array().expect("rows").len();
+        assert!(count >= 9);
+        for (i, j) in (0..count).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+            // 4000 units know a correlation, and a variance over itself, to 0.02.
+            let size = (entry(stated, i, i) * entry(stated, j, j)).sqrt();
+            let off = (entry(&drawn, i, j) - entry(stated, i, j)) / size;
+            assert!(off.abs() < 0.1, "{kind} {i} {j}: {off}");
+        }
+    }
+    // Some errors are far from independent, so that a draw of each by itself would not pass.
+    let acc = &found["sensors"]["acc"]["covariance"];
+    let entry = |i: usize, j: usize| acc[i][j].as_f64().expect("a number");
+    let correlation = |(i, j): (usize, usize)| entry(i, j) / (entry(i, i) * entry(j, j)).sqrt();
+    let pairs = (0..9).flat_map(|i| (0..i).map(move |j| (i, j)));
+    assert!(pairs.map(|pair| correlation(pair).abs()).fold(0.0, f64::max) > 0.2);
+}
+
+#[test]
+fn covariances_of_another_calibration_or_for_another_target_are_refused() {
+    let folder = Folder::with_recording();
+    folder.run("calibrate small.csv --out cal.toml --json cal.json").with(0);
+    let given = "--covariance cal.json";
+    folder.run(&format!("export cal.toml {given} --to csv")).with(2).telling(&["expected `python`"]);
+    folder.replace("cal.toml", "bias = [", "bias = [1");
+    folder.run(&format!("export cal.toml {given} --to python")).with(2).telling(&["another bias of acc"]);
+    folder.write("cal.json", "{\"format\": \"imucal-noise/1\", \"sensors\": {}}");
+    folder.run(&format!("export cal.toml {given} --to python")).with(2).telling(&["imucal-calibration/1"]);
+}
+
+#[test]
+fn what_a_diagnosis_found_is_listed_with_its_sizes() {
+    let folder = Folder::with_calibration();
+    let rig = folder.path("rig.csv");
+    let words = ["simulate", "--effect", "mag.bias_step=5", "--out"];
+    imucal(&[&words.map(str::as_ref)[..], &[rig.as_os_str()]].concat()).with(0);
+    folder.run("diagnose rig.csv --json gap.json");
+    let found: Value = serde_json::from_str(&folder.text("gap.json")).expect("JSON");
+    let causes = found["causes"].as_array().expect("a list");
+    assert!(causes.iter().any(|cause| cause["effect"] == "mag.bias_step"), "{found:#}");
+    let mut written = folder.run("export cal.toml --diagnosis gap.json --to csv --out cal.csv").with(0);
+    let text = folder.text("cal.csv");
+    for cause in causes {
+        let effect = cause["effect"].as_str().expect("text");
+        let amounts = cause["parameters"].as_array().into_iter().flatten();
+        let sizes = amounts.filter_map(|amount| amount["value"].as_f64()).map(|value| format!("{value:.4e}"));
+        for said in sizes.chain([format!("what the diagnosis found: {effect}")]) {
+            assert!(text.contains(&said), "{said}: {text}");
+        }
+        written = written.printing(&[effect]);
+    }
 }
 
 #[test]

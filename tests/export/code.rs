@@ -7,6 +7,7 @@ use std::process::Command;
 use imucal_core::corrector::{Compensator, FullCorrector};
 use imucal_host::export::Target;
 use imucal_host::recording::SensorKind;
+use imucal_tests::program::available;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -25,16 +26,6 @@ fn samples(kind: SensorKind, count: usize) -> Vec<([f32; 3], f32)> {
             (raw, if row % 3 == 0 { temperatures[row / 3 % temperatures.len()] } else { own })
         })
         .collect()
-}
-
-/// Whether a program is there; without it the test is skipped, loudly, and where it is `needed` it fails under `CI=true`.
-fn available(program: &str, arguments: &[&str], what: &str, needed: bool) -> bool {
-    if Command::new(program).args(arguments).output().is_ok_and(|output| output.status.success()) {
-        return true;
-    }
-    assert!(!needed || std::env::var_os("CI").is_none_or(|ci| ci != "true"), "no {what}");
-    eprintln!("\n*** SKIPPED: no {what} ***\n");
-    false
 }
 
 /// Bits of the header's corrections, by a program that reads bits and prints bits.

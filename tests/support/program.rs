@@ -2,6 +2,7 @@
 
 use std::ffi::OsStr;
 use std::time::Duration;
+use std::{env, process};
 
 /// A command that has not ended by then hangs: the slowest takes seconds.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -32,6 +33,20 @@ pub fn run<A: AsRef<OsStr>>(program: &str, variables: &[(&str, &str)], arguments
         .expect("the program starts");
     let text = |bytes| String::from_utf8(bytes).expect("the program writes UTF-8");
     Ended { status: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
+}
+
+/// Whether a program is there; without it the test is skipped, loudly, and where it is `needed` it fails under `CI=true`.
+///
+/// # Panics
+///
+/// Where it is needed under `CI=true`, and missing.
+pub fn available(program: &str, arguments: &[&str], what: &str, needed: bool) -> bool {
+    if process::Command::new(program).args(arguments).output().is_ok_and(|output| output.status.success()) {
+        return true;
+    }
+    assert!(!needed || env::var_os("CI").is_none_or(|ci| ci != "true"), "no {what}");
+    eprintln!("\n*** SKIPPED: no {what} ***\n");
+    false
 }
 
 /// Text on one line, with one blank where there were more.

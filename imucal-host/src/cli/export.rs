@@ -16,7 +16,7 @@ use crate::{
     diagnosis::finding::{self, Cause, Diagnosis},
     export::{self, Inputs, Target},
     file::Limits,
-    store::noise_file::NoiseFile,
+    store::{covariance_file::CovarianceFile, noise_file::NoiseFile},
 };
 
 #[derive(Args, Debug)]
@@ -32,6 +32,9 @@ pub(super) struct Arguments {
     /// The noise of the unit, by `imucal noise --json`
     #[arg(long, value_name = "NOISE.json")]
     noise: Option<PathBuf>,
+    /// How the calibration's errors vary together, by the `imucal calibrate --json` that wrote it; for `python`
+    #[arg(long, value_name = "CAL.json")]
+    covariance: Option<PathBuf>,
     /// What a diagnosis found, by `imucal diagnose --json`; the targets have no place for it and list it
     #[arg(long, value_name = "DIAGNOSIS.json")]
     diagnosis: Option<PathBuf>,
@@ -49,7 +52,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut inputs = vec![arguments.calibration.clone()];
-    inputs.extend(arguments.noise.iter().chain(&arguments.diagnosis).cloned());
+    inputs.extend(arguments.noise.iter().chain(&arguments.covariance).chain(&arguments.diagnosis).cloned());
     let outputs: Vec<Planned> = arguments.out.iter().map(Planned::new).collect();
     let mut files = arguments.overwrite.plan(&inputs, &outputs)?;
     let limits = arguments.reading.limits();
@@ -58,6 +61,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Err(damaged) => return Ok(refuse(&damaged)),
     };
     let noise = arguments.noise.as_ref().map(|path| NoiseFile::read(path, &limits)).transpose()?;
+    anyhow::ensure!(
+        arguments.covariance.is_none() || arguments.to.takes_covariance(),
+        "--covariance: found another target, expected `python`; the others have no place for covariances"
+    );
+    let covariance = arguments.covariance.as_ref();
+    let covariance = covariance.map(|path| CovarianceFile::read(path, &limits, &calibration)).transpose()?;
     let causes =
         arguments.diagnosis.as_ref().map(|path| causes(path, &limits)).transpose()?.unwrap_or_default();
     if let Some(noise) = noise.as_ref().filter(|noise| {
@@ -73,6 +82,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let given = Inputs {
         calibration: Some(&calibration),
         noise: noise.as_ref(),
+        covariance: covariance.as_ref(),
         causes: &causes,
         rate: arguments.rate,
     };

@@ -9,7 +9,7 @@
 
 use crate::{
     recording::SensorKind,
-    store::{StoredCalibration, noise_file::NoiseFile},
+    store::{StoredCalibration, covariance_file::CovarianceFile, noise_file::NoiseFile},
 };
 
 mod affine;
@@ -55,6 +55,8 @@ pub struct Inputs<'a> {
     pub calibration: Option<&'a StoredCalibration>,
     /// The noise of the unit.
     pub noise: Option<&'a NoiseFile>,
+    /// How the errors of the calibration's entries vary together.
+    pub covariance: Option<&'a CovarianceFile>,
     /// Causes that a diagnosis asserts, in words, with their sizes.
     pub causes: &'a [String],
     /// Samples a second of the target, Hz; without it those of the noise's recording.
@@ -96,6 +98,11 @@ pub fn document(target: Target, inputs: &Inputs<'_>) -> Result<Document, ExportE
 }
 
 impl Target {
+    /// Whether its file holds covariances of a calibration's entries.
+    pub fn takes_covariance(self) -> bool {
+        self == Self::Python
+    }
+
     /// A line of comment.
     fn comment(self, line: &str) -> String {
         match self {

@@ -10,6 +10,7 @@ use crate::{
     recording::SensorKind,
     store::{
         StoredTriad,
+        covariance_file::EntryCovariance,
         noise_file::{NoiseOfAxis, NoiseOfSensor},
     },
 };
@@ -22,16 +23,20 @@ pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
     let mut text = String::from(
         "\"\"\"A calibrated unit. calibrated = f * gain @ sense(raw - bias); apply() is the inverse, with noise.\"\"\"\n\n",
     );
-    let mut cannot = vec![
-        "correlations between errors of the calibration: sample_unit draws each number by itself".to_owned(),
-        "quantisation, saturation and bandwidth".into(),
-    ];
+    let mut cannot = vec!["quantisation, saturation and bandwidth".to_owned()];
     text.push_str("UNIT = {\n");
     for kind in SensorKind::ALL {
         let Some(triad) = calibration.triad(kind) else { continue };
         // Writing to a string cannot fail.
         let _ = writeln!(text, "    \"{kind}\": {{");
         of_triad(&mut text, triad);
+        match inputs.covariance.and_then(|covariance| covariance.sensor(kind)) {
+            Some(covariance) => of_covariance(&mut text, covariance),
+            None => cannot.push(format!(
+                "correlations between errors of {kind}: no --covariance with them was given, and sample_unit draws each number by \
+                 itself"
+            )),
+        }
         match inputs.noise.and_then(|noise| noise.sensor(kind)).filter(|noise| noise.axes.len() == 3) {
             Some(noise) => of_noise(&mut text, kind, noise, &mut cannot),
             None => cannot.push(format!("the noise of {kind}: no --noise with an estimate for it was given")),
@@ -80,6 +85,18 @@ fn of_triad(text: &mut String, triad: &StoredTriad) {
     line("cubic_std", vector(bent.map(|bent| &bent.cubic_std)), "standard errors");
     line("cross", matrix(bent.map(|bent| &bent.cross)), "per raw unit: xy, yz, zx");
     line("cross_std", matrix(bent.map(|bent| &bent.cross_std)), "standard errors");
+}
+
+fn of_covariance(text: &mut String, covariance: &EntryCovariance) {
+    let root = covariance.root();
+    let rows: Vec<Vec<f64>> = root.row_iter().map(|row| row.iter().copied().collect()).collect();
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        text,
+        "        \"entries\": {:?},  # estimated: gain by rows 0 to 8, bias 9 to 11\n        \"root\": {rows:?},  # their errors, by \
+         independent standard normal numbers",
+        covariance.entries
+    );
 }
 
 fn of_noise(text: &mut String, kind: SensorKind, noise: &NoiseOfSensor, cannot: &mut Vec<String>) {

@@ -8,6 +8,7 @@ use std::{
 use imucal_core::record::{self, DecodeError, Defect, EncodeError, HigherOrder, Order};
 use serde::{Deserialize, Serialize};
 
+pub mod covariance_file;
 pub mod form;
 pub mod higher_order;
 pub mod noise_file;

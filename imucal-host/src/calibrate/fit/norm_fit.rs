@@ -256,12 +256,31 @@ mod tests {
     use super::*;
     use crate::simulator::random::{Purpose, Random};
 
+    fn cloud(count: usize) -> Vec<ShellPoint<f64>> {
+        let mut random = Random::new(1, Purpose::Noise);
+        let point = |_| ShellPoint::new(random.normals().normalize() * 48.0 + random.normals() * 0.3);
+        (0..count).map(point).collect()
+    }
+
+    #[test]
+    fn of_very_many_points_a_sample_ends_near_and_parts_where_all_of_them_do() {
+        let points = cloud(FEW + 5000);
+        let problem = NormProblem { points: &points, norm: 48.0, form: UPPER_TRIANGULAR, serial: false };
+        let start = Triad::identity();
+        let whole = least_squares::solve(&problem.model(&points), problem.form.theta(&start));
+        let (_, end) = problem.ends(&start);
+        // Of every third point; five of its standard errors.
+        let std = whole.covariance().unwrap().diagonal().map(f64::sqrt) * 3f64.sqrt();
+        let apart = (problem.form.theta(&end) - whole.theta()).component_div(&std);
+        assert!((0.1..5.0).contains(&apart.amax()), "{apart}");
+        let fit = problem.fit(&end);
+        assert!(fit.left_out.is_empty());
+        assert!((fit.solver.theta() - whole.theta()).component_div(&std).amax() < 1e-4);
+    }
+
     #[test]
     fn what_a_step_says_of_parts_that_were_left_out_is_what_fits_without_them_say() {
-        let mut random = Random::new(1, Purpose::Noise);
-        let points: Vec<_> = (0..2000)
-            .map(|_| ShellPoint::new(random.normals().normalize() * 48.0 + random.normals() * 0.3))
-            .collect();
+        let points = cloud(2000);
         let problem = NormProblem { points: &points, norm: 48.0, form: UPPER_TRIANGULAR, serial: true };
         let fit = problem.fit(&Triad::identity());
         let (step, fits) = (problem.held_out_rms_by_factors(&fit, 5), problem.held_out_rms(&fit, 5));

@@ -17,8 +17,8 @@ use crate::recording::{
 
 /// Digits kept of a converted value: less than a conversion's rounding, more than any sensor has.
 const DIGITS: usize = 14;
-/// Digits kept of a time: microseconds since 1970 have sixteen.
-const TIME_DIGITS: usize = 16;
+/// Digits kept of a time: fifteen where they are read as the same time, else sixteen.
+const TIME_DIGITS: [usize; 2] = [15, 16];
 
 /// Which columns of [`table_of`] hold numbers of an `f32`.
 pub(crate) fn singles_of(recording: &Recording) -> [bool; KNOWN] {
@@ -36,7 +36,7 @@ pub(crate) fn table_of(recording: &Recording) -> Table {
     let units = &recording.manifest.units;
     let mut columns = vec![Vec::new(); KNOWN];
     let clock = Clock::of(units.t, recording.epoch);
-    columns[TIME] = converted(recording.time.iter().copied(), clock.per_si(), TIME_DIGITS);
+    columns[TIME] = recording.time.iter().map(|time| counted(*time, clock.per_si())).collect();
     for kind in SensorKind::ALL {
         if let Some(triple) = recording.sensor(kind) {
             for axis in 0..3 {
@@ -73,6 +73,15 @@ fn put_simulated(recording: &Recording, columns: &mut [Vec<f64>]) {
     columns[SIM_TEMPERATURE] = simulated.temperature.clone().unwrap_or_default();
 }
 
+/// A time, s, in a unit of which so many make a second.
+fn counted(time: f64, per_si: f64) -> f64 {
+    if per_si == 1.0 {
+        return time;
+    }
+    let [short, long] = TIME_DIGITS.map(|digits| round_to_digits(time * per_si, digits));
+    if short / per_si == time { short } else { long }
+}
+
 fn converted(values: impl Iterator<Item = f64>, per_si: f64, digits: usize) -> Vec<f64> {
     if per_si == 1.0 {
         return values.collect();
@@ -89,4 +98,24 @@ fn raw(triple: &Triple, axis: usize) -> Vec<f64> {
         return values.collect();
     }
     values.map(|value| round_to_digits(triple.nominal.to_raw(value), DIGITS)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_is_written_as_it_was_read() {
+        for (per_si, times) in
+            [(1e3, [8030.0, 0.1, 123_456.789_012_3]), (1e9, [999_999_999_999_999.0, 7.0, 1e14])]
+        {
+            for time in times {
+                assert_eq!(counted(time / per_si, per_si), time);
+            }
+        }
+        for row in 0..100_000 {
+            let time = f64::from(row) * 10.0;
+            assert_eq!(counted(time / 1e3, 1e3), time);
+        }
+    }
 }
