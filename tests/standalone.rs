@@ -15,7 +15,9 @@ use firmware_example::{
 use imucal_core::record::{self, SensorIdentity};
 use imucal_host::{
     calibrate::{Options, calibrate},
+    effect,
     recording::{Recording, SensorKind, check::integrity, unit::STANDARD_GRAVITY},
+    simulator::{Dose, Programme, Simulation},
 };
 use imucal_tests::{
     data,
@@ -132,6 +134,10 @@ fn on_device(folder: &Path, tape: &[u8]) -> String {
 fn stored(folder: &Path) -> Option<record::CalibrationRecord> {
     let mut bytes = vec![0; FLASH];
     std::fs::File::open(folder.join("memory.bin")).expect("a file").read_exact(&mut bytes).expect("bytes");
+    record_in(bytes)
+}
+
+fn record_in(bytes: Vec<u8>) -> Option<record::CalibrationRecord> {
     let mut buffer = [0; record::MAX_LEN];
     let mut slots = Slots::open(Memory(bytes)).expect("a flash");
     record::decode(slots.read(&mut buffer).expect("readable")).ok()
@@ -160,4 +166,31 @@ fn raw_samples_alone_end_in_a_stored_record_with_the_bits_of_the_host() {
         // Stored once, it is not replaced by a session that is no surer.
         assert!(on_device(folder.path(), &tape).contains("nothing stored"));
     }
+}
+
+#[test]
+fn a_session_that_warms_and_cools_ends_in_a_record_with_terms_of_temperature() {
+    if !ready() {
+        return;
+    }
+    let dose = |id: &str, values: [f64; 3]| Dose {
+        effect: effect::find(id).expect("an effect"),
+        values: values.to_vec(),
+    };
+    let slopes = [2.1e-3, -1.3e-3, 0.8e-3];
+    let doses = vec![dose("acc.temp_bias", slopes), dose("acc.temp_scale", [1.5e-4; 3])];
+    let simulation =
+        Simulation { programme: Programme::Full, rate: 50.0, seed: 100, doses, ..Simulation::default() };
+    let recording = simulation.record("thermal.csv").expect("a possible recording");
+    let folder = tempfile::tempdir().expect("a folder");
+    let tape = tape(&recording);
+    let device = on_device(folder.path(), &tape);
+    let mut flash = vec![0; FLASH];
+    assert_eq!(device, on_host(&tape, &mut flash));
+    let [there, here] = [stored(folder.path()), record_in(flash)]
+        .map(|record| record.expect("a record").acc.expect("accepted"));
+    assert_eq!(there.temperature, here.temperature);
+    let per_unit = recording.acc.as_ref().expect("recorded").nominal.per_unit;
+    let found = there.temperature.expect("terms").bias_slope.map(|slope| f64::from(slope) / per_unit);
+    assert!(found.iter().zip(slopes).all(|(found, slope)| (found - slope).abs() < 4e-4), "{found:?}");
 }

@@ -1,13 +1,13 @@
 //! Temperature from a fit: what it finds is off by what its standard errors say, held-out temperatures are predicted
 //! better, and what does not tell temperature is refused.
 
-use imucal_core::record::Date;
+use imucal_core::record::{Date, Sensor};
 use imucal_host::{
     calibrate::{
         Calibration, FitSummary, Options, calibrate,
         temperature::{TemperatureRefusal, finding::Part},
     },
-    effect,
+    capture, effect,
     recording::{Recording, SensorKind},
     simulator::{Dose, Programme, Simulation},
     store::StoredCalibration,
@@ -171,4 +171,54 @@ fn a_thermometer_that_is_stuck_or_jumps_is_refused() {
     assert!(matches!(refusal(&stuck), TemperatureRefusal::Stuck { .. }), "{:?}", refusal(&stuck));
     let jump = at(|share| hill(share) + if share > 0.6 { 15.0 } else { 0.0 });
     assert!(matches!(refusal(&jump), TemperatureRefusal::Jump { .. }), "{:?}", refusal(&jump));
+}
+
+/// Errors of the terms that a session of a device finds, in its standard errors, as [`scores`] has them.
+fn scores_of_session(recording: &Recording) -> [Vec<f64>; 2] {
+    let task = capture::task(&recording.manifest, capture::targets(recording)).expect("a task");
+    let session = capture::replay(recording, &task, &mut |_, _| {}).expect("a session");
+    let mut all = [Vec::new(), Vec::new()];
+    for (sensor, bias) in [Sensor::Accelerometer, Sensor::Gyroscope].into_iter().zip(BIAS) {
+        let Ok(mut fit) = session.warmth(sensor) else { continue };
+        while fit.work() {}
+        let Some(warm) = fit.found() else { continue };
+        let scale = SCALE / (1.0 + SCALE * (f64::from(warm.terms.reference) - 25.0));
+        for (axis, bias) in bias.into_iter().enumerate() {
+            let pairs = [
+                (warm.terms.bias_slope[axis], bias, warm.terms_std.bias_slope[axis]),
+                (warm.terms.scale_slope[axis], scale, warm.terms_std.scale_slope[axis]),
+            ];
+            for (scores, (found, truth, std)) in
+                all.iter_mut().zip(pairs).filter(|(_, (_, _, std))| *std > 0.0)
+            {
+                scores.push((f64::from(found) - truth) / f64::from(std));
+            }
+        }
+    }
+    all
+}
+
+#[test]
+fn a_session_of_a_device_finds_terms_of_temperature_within_its_own_errors() {
+    let all: Vec<[Vec<f64>; 2]> = SEEDS
+        .into_par_iter()
+        .map(|seed| scores_of_session(&recording(seed, Programme::Full, true)))
+        .collect();
+    for (part, name) in ["biases", "scales"].into_iter().enumerate() {
+        let scores: Vec<f64> = all.iter().flat_map(|of| of[part].iter().copied()).collect();
+        let rms = (scores.iter().map(|score| score * score).sum::<f64>() / scores.len() as f64).sqrt();
+        println!("on a device: {name} off by {rms:.3} standard errors rms, {} terms", scores.len());
+        assert!(scores.len() >= 30, "{} of {name}", scores.len());
+        assert!((0.8..=1.1).contains(&rms), "{name}: {rms}");
+    }
+}
+
+#[test]
+fn a_session_of_a_device_finds_no_terms_where_warmth_does_nothing() {
+    let none = SEEDS.into_par_iter().filter(|seed| {
+        scores_of_session(&recording(*seed, Programme::Full, false)).iter().all(Vec::is_empty)
+    });
+    let (none, of) = (none.count(), SEEDS.count());
+    println!("on a device: no terms in {none} of {of} sessions without drift");
+    assert!(none as f64 >= 0.95 * of as f64, "{none}");
 }

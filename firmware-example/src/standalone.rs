@@ -171,7 +171,7 @@ fn store<F: NorFlash>(
         .unwrap_or_else(|| CalibrationRecord::empty(unit.clone(), header.date));
     let mut surer = false;
     for (sensor, of) in Sensor::ALL.into_iter().zip(&header.task.sensors) {
-        if let Ok(triad) = session.better(sensor, &of.units(sensor), record.triad(sensor))
+        if let Ok(triad) = session.better_at_temperatures(sensor, &of.units(sensor), record.triad(sensor))
             && triad.check(sensor).is_ok()
         {
             record.adopt(sensor, &triad, unit, header.date);

@@ -19,6 +19,7 @@ use crate::{
     triad::Triad,
 };
 
+pub mod f_score;
 pub mod outlier;
 mod refusal;
 

@@ -29,6 +29,8 @@ use serde::{Deserialize, Serialize};
 use crate::scalar::Scalar;
 use crate::triad::Triad;
 
+pub mod course;
+
 /// First-order temperature dependence of a [`Triad`]. Plain arrays, since a record stores them as they stand.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -102,6 +104,16 @@ impl<T: Scalar> TemperatureTerms<T> {
     /// The same terms for raw values of another affine unit, as [`Triad::in_unit`] has it.
     pub fn in_unit(&self, per_unit: T) -> Self {
         Self { bias_slope: self.bias_slope.map(|slope| slope * per_unit), ..*self }
+    }
+
+    /// The same terms from another reference temperature, °C, where the triad is that of this temperature. One that is not finite
+    /// leaves the reference as it is.
+    #[must_use]
+    pub fn from_reference(&self, reference: T) -> Self {
+        let factor = self.factor(self.change(reference));
+        let [x, y, z] = self.scale_slope;
+        let reference = if reference.finite() { reference } else { self.reference };
+        Self { reference, scale_slope: [x / factor.x, y / factor.y, z / factor.z], ..*self }
     }
 
     #[inline]
@@ -236,6 +248,17 @@ mod tests {
             let a = w.correct(&t, &x, temperature);
             let b = w.in_unit(per_unit).correct(&t.in_unit(offset, per_unit), &counts, temperature);
             prop_assert!((a - b).norm() < 1e-9 * (1.0 + a.norm()));
+        }
+
+        #[test]
+        fn a_triad_at_another_reference_is_the_same_at_every_temperature(t in triad(), w in terms(),
+                x in uniform3(-100.0f64..100.0), other in 0.0f64..50.0, temperature in -40.0f64..85.0) {
+            let at = w.at(&t, other);
+            let moved = Triad { gain: Matrix3::from_diagonal(&at.factor) * t.gain, bias: at.bias };
+            let (a, b) = (w.correct(&t, &Vector3::from(x), temperature),
+                w.from_reference(other).correct(&moved, &Vector3::from(x), temperature));
+            prop_assert!((a - b).norm() < 1e-10 * (1.0 + a.norm()), "{} {}", a, b);
+            prop_assert_eq!(w.from_reference(f64::NAN), w);
         }
 
         #[test]

@@ -103,7 +103,8 @@ pub fn targets(recording: &Recording) -> [f32; 3] {
     [of(SensorKind::Acc, acc), of(SensorKind::Gyr, gyr), of(SensorKind::Mag, mag)]
 }
 
-/// The sensors that a session calibrated, of a recording's raw values; of the others why not.
+/// The sensors that a session calibrated, of a recording's raw values, with terms of temperature where its rests bear them out; of the
+/// others why not.
 pub fn calibration(
     session: &Capture,
     task: &CaptureTask,
@@ -114,7 +115,7 @@ pub fn calibration(
     let mut triad = |kind: SensorKind, sensor: Sensor| {
         recording.sensor(kind)?;
         let units = task.sensors[kind as usize].units(sensor);
-        match session.better(sensor, &units, None) {
+        match session.better_at_temperatures(sensor, &units, None) {
             Ok(record) => Some(StoredTriad::from_record(&record.with_order(HigherOrder::default()))),
             Err(why) => {
                 refused.push((kind, why));

@@ -80,6 +80,7 @@ fn warmth() {
     reach!(temperature::TemperatureTerms::predict(&terms, &truth, &raw, 31.0));
     reach!(temperature::TemperatureTerms::is_finite(&terms));
     let _wide: TemperatureTerms<f64> = reach!(temperature::TemperatureTerms::cast(&terms));
+    reach!(temperature::TemperatureTerms::from_reference(&terms, 31.0));
     reach!(temperature::Warmth::none(&truth));
     reach!(temperature::Warmth::correct(&warm, &truth, &raw));
     reach!(temperature::Warmth::sensed(&warm, &truth, &raw));

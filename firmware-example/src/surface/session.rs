@@ -9,6 +9,7 @@ use imucal_core::{
         self, Session, SessionSettings,
         bias::{MeanRate, RestBias},
     },
+    temperature,
 };
 use nalgebra::Vector3;
 
@@ -22,8 +23,8 @@ pub(super) fn reach_all() {
         let turning = row % 200 > 150;
         let rate = if turning { Vector3::repeat(0.5) } else { Vector3::zeros() };
         let acc = scene::spiral(pose as usize, 10) * 9.8 + rate * ((row % 7) as f32);
-        let sample =
-            Sample { time: u64::from(row) * 10_000, acc, gyr: Some(rate), temperature: Some(25.0f32) };
+        let temperature = Some(scene::spiral(pose as usize, 10).x * 10.0);
+        let sample = Sample { time: u64::from(row) * 10_000, acc, gyr: Some(rate), temperature };
         reach!(session::Session::push(&mut session, &sample));
         reach!(session::Session::push_field(&mut session, &(scene::spiral(row as usize, 2_000) * 50.0)));
         reach!(session::Session::work(&mut session));
@@ -39,6 +40,7 @@ pub(super) fn reach_all() {
         reach!(session::poses::Pose::has_turn(pose));
     }
     kept(&session);
+    warm(&session);
     rates();
     reach!(accept::outlier::gross(&[1.0f32, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0]));
 }
@@ -58,6 +60,25 @@ fn kept(session: &Session<8, 2, 16>) {
     }
     reach!(session::store::model_of(Sensor::Gyroscope));
     core::hint::black_box(&record);
+}
+
+#[inline(never)]
+fn warm(session: &Session<8, 2, 16>) {
+    let units =
+        Units { raw: RawUnit::Counts, calibrated: RawUnit::RadianPerSecond, offset: 0.0, per_unit: 100.0 };
+    if let Ok(mut fit) = reach!(session::Session::warmth(session, Sensor::Gyroscope)) {
+        while reach!(session::temperature::WarmthFit::work(&mut fit)) {}
+        reach!(session::temperature::WarmthFit::found(&fit));
+        let record = reach!(session::Session::better_warm(session, Sensor::Gyroscope, &fit, &units, None));
+        core::hint::black_box(&record);
+    }
+    let record =
+        reach!(session::Session::better_at_temperatures(session, Sensor::Accelerometer, &units, None));
+    core::hint::black_box(&record);
+    let temperatures = [20.0f32, 35.0, 22.0];
+    reach!(temperature::course::span(&temperatures));
+    reach!(temperature::course::apart(&temperatures, &mut [(0.0, 0.0); 3]));
+    reach!(accept::f_score::f_score(12.0, 3.0, 20.0));
 }
 
 #[inline(never)]

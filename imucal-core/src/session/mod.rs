@@ -14,6 +14,7 @@
 //! | [`design`] | which pose says most |
 //! | [`guide`] | what to do next, how sure each sensor is, what was thrown away |
 //! | [`store`] | whether a new record takes the place of the stored one |
+//! | [`temperature`] | what warmth does, from rests at several temperatures |
 //!
 //! A session is plain data of fixed size. [`Session::push`] takes a sample and costs a few hundred instructions;
 //! [`Session::work`] does one slice of a fit, and is called whenever there is time. All is in `f32`, and to the same bits on a host.
@@ -31,6 +32,7 @@ pub mod guide;
 mod judgement;
 pub mod poses;
 pub mod store;
+pub mod temperature;
 
 use nalgebra::Vector3;
 

@@ -137,6 +137,12 @@ impl<const N: usize, const B: usize> Poses<N, B> {
         &self.list
     }
 
+    /// Mean temperature of the rests that have one, °C; NaN without any.
+    pub(super) fn temperature(&self) -> f32 {
+        let measured = || self.list.iter().map(|pose| pose.temperature).filter(|value| value.is_finite());
+        measured().sum::<f32>() / measured().count() as f32
+    }
+
     /// Rests that had to go, since there was no more room.
     pub fn forgotten(&self) -> u16 {
         self.forgotten

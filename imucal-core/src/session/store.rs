@@ -33,7 +33,8 @@ pub enum NotStored {
 }
 
 impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
-    /// A sensor's calibration for the record, if it is accepted and surer than the one `stored`.
+    /// A sensor's calibration for the record, if it is accepted and surer than the one `stored`. Terms of temperature are those of the
+    /// stored one, from the mean temperature of the session's rests on.
     ///
     /// # Errors
     ///
@@ -46,7 +47,22 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     ) -> Result<TriadRecord, NotStored> {
         let estimate = self.estimate(sensor).ok_or(NotStored::NoEstimate)?;
         estimate.verdict.map_err(NotStored::Refused)?;
-        let new = estimate.record(model_of(sensor), units);
+        let mut new = estimate.record(model_of(sensor), units);
+        // What warmth does is not seen here, and stays as it is known.
+        let known =
+            stored.filter(|stored| stored.unit_in == new.unit_in).and_then(|stored| stored.temperature);
+        new.temperature = known.map(|terms| terms.from_reference(self.poses.temperature()));
+        self.surer(sensor, new, stored)
+    }
+
+    /// A new calibration, if it is surer than the one `stored`.
+    #[inline(never)]
+    pub(super) fn surer(
+        &self,
+        sensor: Sensor,
+        new: TriadRecord,
+        stored: Option<&TriadRecord>,
+    ) -> Result<TriadRecord, NotStored> {
         if let Some(stored) = stored {
             let length = self.length(sensor);
             let (old, now) = (stated_error(stored, length), stated_error(&new, length));

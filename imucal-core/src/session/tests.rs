@@ -3,9 +3,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::{session::guide::Advice, triad::Triad};
+use crate::{session::guide::Advice, temperature::TemperatureTerms, triad::Triad};
 
 mod fewest;
+mod warmth;
 
 type Held = Session<38, 4, 64>;
 
@@ -18,6 +19,10 @@ struct Hand {
     time: u64,
     /// Field of a magnet that the sensor carries along, µT.
     magnet: Vector3<f64>,
+    /// Temperature, °C, of time, s, where there is a thermometer.
+    climate: Option<fn(f64) -> f64>,
+    /// What warmth does to accelerometer and gyroscope.
+    warmth: [TemperatureTerms<f64>; 2],
     /// Each so many samples of the accelerometer one of the gyroscope and of the magnetometer.
     every: [u64; 2],
 }
@@ -48,7 +53,9 @@ impl Hand {
         let turned = Rotation3::new(Vector3::new(draw(0.02), draw(0.02), draw(0.02)));
         gyr.gain = turned.into_inner() * gyr.gain;
         let (c_n_s, magnet) = (Rotation3::identity(), Vector3::zeros());
-        Self { random, truth: [acc, gyr, mag], c_n_s, time: 0, magnet, every: [1; 2] }
+        let none = TemperatureTerms { reference: 25.0, bias_slope: [0.0; 3], scale_slope: [0.0; 3] };
+        let truth = [acc, gyr, mag];
+        Self { random, truth, c_n_s, time: 0, magnet, climate: None, warmth: [none; 2], every: [1; 2] }
     }
 
     fn normals(&mut self, size: f64) -> Vector3<f64> {
@@ -62,10 +69,23 @@ impl Hand {
         let noise = [0.01, 0.002, 0.3].map(|size| self.normals(size));
         let at = self.c_n_s.inverse();
         let true_values = [at * FORCE, *rate, at * FIELD + self.magnet];
-        let raw = |k: usize| (self.truth[k].predict(&true_values[k]).expect("regular") + noise[k]).cast();
+        let temperature = self.climate.map(|climate| climate(self.time as f64 * 1e-6));
+        let warmth = |k: usize| temperature.zip(self.warmth.get(k));
+        let raw = |k: usize| {
+            let value = match warmth(k) {
+                Some((temperature, terms)) => terms.predict(&self.truth[k], &true_values[k], temperature),
+                None => self.truth[k].predict(&true_values[k]),
+            };
+            (value.expect("regular") + noise[k]).cast()
+        };
         let [gyr, mag] = self.every.map(|every| (self.time / 10_000).is_multiple_of(every));
         let rate = gyr.then(|| raw(1));
-        session.push(&Sample { time: self.time, acc: raw(0), gyr: rate, temperature: None });
+        session.push(&Sample {
+            time: self.time,
+            acc: raw(0),
+            gyr: rate,
+            temperature: temperature.map(|t| t as f32),
+        });
         if mag {
             session.push_field(&raw(2));
         }

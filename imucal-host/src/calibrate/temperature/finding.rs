@@ -43,7 +43,7 @@ impl TemperatureFinding {
         let measured: Vec<f64> = temperatures.iter().copied().filter(|t| t.is_finite()).collect();
         let span = match measured.is_empty() {
             true => (f64::NAN, f64::NAN),
-            false => super::course::span(&measured),
+            false => imucal_core::temperature::course::span(&measured),
         };
         let reference = measured.iter().sum::<f64>() / measured.len() as f64;
         Self { span, reference, refusal: None, parts: Vec::new(), terms: None }

@@ -116,6 +116,11 @@ fn here(arguments: &Arguments, path: &Path, mut files: OutputSet) -> anyhow::Res
     for (kind, why) in &refused {
         say!("{} is not calibrated: {}", words(*kind), reason(why));
     }
+    for kind in recorded {
+        if let Some(terms) = stored.triad(kind).and_then(|triad| triad.temperature.as_ref()) {
+            say!("{} follows the temperature: gain and bias hold at {:.1} °C", words(kind), terms.reference);
+        }
+    }
     if SensorKind::ALL.into_iter().all(|kind| stored.triad(kind).is_none()) {
         warn_of_nothing(arguments);
     } else {
