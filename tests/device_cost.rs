@@ -5,8 +5,9 @@ use std::collections::HashMap;
 
 use firmware_example::{
     fitting::{self, Fitting},
-    standalone::Standalone,
+    standalone::{POSES, Standalone},
 };
+use imucal_core::session::temperature::WarmthFit;
 use imucal_tests::call_stack::CallGraph;
 use imucal_tests::coprocessor::painted_stack;
 use imucal_tests::firmware::{MEASURED, SHIFT, announce, counted, ready};
@@ -83,6 +84,8 @@ fn every_part_stays_within_its_instructions_flash_ram_and_stack() {
     announce(&format!("{:<46} {:>12}", "RAM: of them T9 of 64 rests", ram[0]));
     let session = size_of::<Standalone>();
     announce(&format!("{:<46} {session:>12}", "RAM: of them a session"));
+    let warmth = size_of::<WarmthFit<POSES>>();
+    announce(&format!("{:<46} {warmth:>12}", "RAM: of them its terms of temperature"));
     announce(&format!("{:<46} {:>12}", "RAM: of them a swarm of 40 in 12 parameters", ram[1]));
     let depths = stack.map(|graph| graph.depth("main"));
     both("stack: the co-processor, by analysis", [0, 1].map(|k| depths[k].bytes.into()));
@@ -97,6 +100,7 @@ fn every_part_stays_within_its_instructions_flash_ram_and_stack() {
     assert!(flash.fits <= FLASH_WITH_FITS, "{}", flash.fits);
     // By the host's pointers, which are wider.
     assert!(session <= 12 * 1024, "{session}");
+    assert!(warmth <= 2560, "{warmth}");
     assert!(ram.iter().zip(RAM).all(|(used, budget)| *used <= budget), "{ram:?}");
     for ((depth, painted), room) in depths.iter().zip(painted).zip(room) {
         let most = STACK.min(room);
@@ -205,6 +209,8 @@ fn print_costs([m4, m0]: &[Costs; 2]) {
         ("session: a sample of the field in a turn", "session_field_turn"),
         ("session: the longest slice of a fit", "session_slice"),
         ("session: what to do next", "session_guide"),
+        ("session: longest slice of its temperature terms", "session_warmth_slice"),
+        ("session: all temperature terms of 38 rests", "session_warmth"),
     ] {
         let part = &m4[name];
         announce(&format!("{what:<46} {:>12.0} {:>7}", part.instructions / part.count, part.stack));

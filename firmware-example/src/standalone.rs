@@ -32,7 +32,9 @@ pub const HEADER: usize = 56;
 pub const SAMPLE: usize = 48;
 
 /// The session that there is memory for: 38 poses, turns of four blocks, 64 places of the field.
-pub type Standalone = Session<38, 4, 64>;
+pub type Standalone = Session<POSES, 4, 64>;
+/// Rests that it keeps.
+pub const POSES: usize = 38;
 
 /// Gives bytes of the tape, from an offset on.
 pub trait Tape {

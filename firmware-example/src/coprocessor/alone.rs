@@ -3,18 +3,23 @@
 
 use heapless::Vec;
 use imucal_core::{
+    fit::Units,
     link::{CaptureOutcome, CaptureState, CaptureTask, Fault, RawSample},
     observer::{
         self,
         rest::{RestObserver, RestSettings, Stage},
     },
     record::{CalibrationRecord, RawUnit, Sensor, TriadRecord},
-    session::{bias::MeanRate, store::bias_of_the_day},
+    session::{
+        bias::MeanRate,
+        store::{NotStored, bias_of_the_day},
+        temperature::WarmthFit,
+    },
     watch::{CalibratedSample, Look, LookObserver, Watch, WatchSettings, WatchSummary},
 };
 use nalgebra::Vector3;
 
-use crate::standalone::Standalone;
+use crate::standalone::{POSES, Standalone};
 
 /// A gyroscope's bias moves less than this from day to day, rad/s.
 const MOST: f32 = 0.02;
@@ -39,8 +44,10 @@ pub(super) struct Capture {
     pub(super) task: CaptureTask,
     /// Samples taken.
     taken: u32,
-    /// What it came to, once it is over.
-    pub(super) outcomes: Option<[CaptureOutcome; 3]>,
+    /// Terms of temperature under way, once it has ended.
+    warmth: Vec<WarmthFit<POSES>, 1>,
+    /// What it came to: sensor after sensor, once it has ended.
+    outcomes: Vec<CaptureOutcome, 3>,
 }
 
 /// A watch under way.
@@ -78,7 +85,8 @@ impl<const N: usize> Alone<N> {
             session: Standalone::new(settings),
             task,
             taken: 0,
-            outcomes: None,
+            warmth: Vec::new(),
+            outcomes: Vec::new(),
         });
         Ok(())
     }
@@ -94,12 +102,12 @@ impl<const N: usize> Alone<N> {
         if N == 0 {
             return None;
         }
-        self.captures.first_mut().filter(|capture| capture.outcomes.is_none())
+        self.captures.first_mut().filter(|capture| !capture.outcomes.is_full())
     }
 
     /// What the session that is over came to.
     pub(super) fn outcomes(&self) -> Option<[CaptureOutcome; 3]> {
-        self.captures.first()?.outcomes
+        self.captures.first()?.outcomes.as_slice().try_into().ok()
     }
 
     /// What was watched and taken off belongs to the calibration before.
@@ -206,6 +214,48 @@ impl Capture {
     pub(super) fn push(&mut self, sample: &RawSample) {
         self.task.push(&mut self.session, sample);
         self.taken = self.taken.wrapping_add(1);
+    }
+
+    /// One slice of what is left once no more samples come: a sensor's terms of temperature. The sensor that is next to be stored,
+    /// where nothing else is left.
+    #[inline(never)]
+    pub(super) fn close(&mut self) -> Option<Sensor> {
+        let sensor = *Sensor::ALL.get(self.outcomes.len())?;
+        match self.warmth.first_mut() {
+            Some(fit) => (!fit.work()).then_some(sensor),
+            None => (!self.begin_warmth(sensor)).then_some(sensor),
+        }
+    }
+
+    /// Out of line: such a fit is larger than a stack's frame should be.
+    #[inline(never)]
+    fn begin_warmth(&mut self, sensor: Sensor) -> bool {
+        self.session.warmth(sensor).is_ok_and(|fit| self.warmth.push(fit).is_ok())
+    }
+
+    /// What it has found of a sensor, if that is surer than what is `stored`.
+    pub(super) fn better(
+        &self,
+        sensor: Sensor,
+        units: &Units,
+        stored: Option<&TriadRecord>,
+    ) -> Result<TriadRecord, NotStored> {
+        match self.warmth.first() {
+            Some(fit) => self.session.better_warm(sensor, fit, units, stored),
+            None => self.session.better(sensor, units, stored),
+        }
+    }
+
+    /// What became of the sensor that was next; whether it was the last one.
+    pub(super) fn settle(&mut self, outcome: CaptureOutcome) -> bool {
+        self.warmth.clear();
+        let _room = self.outcomes.push(outcome);
+        self.outcomes.is_full()
+    }
+
+    /// Any sensor's calibration is in use.
+    pub(super) fn is_adopted(&self) -> bool {
+        self.outcomes.contains(&CaptureOutcome::Adopted)
     }
 
     /// How far it is.

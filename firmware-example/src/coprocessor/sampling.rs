@@ -160,23 +160,24 @@ impl<
         outcomes.map_or(Reply::Fault(Fault::NotReady), Reply::Captured)
     }
 
-    /// A slice of the last fits; after them what is surer is taken.
+    /// A slice of the last fits; after them what is surer is taken, a sensor in a slice.
     #[inline(never)]
     pub(super) fn close_capture(&mut self, asked: Asked, date: Date) {
         if self.work_at_capture() {
             return;
         }
-        let mut outcomes = [CaptureOutcome::TooLittle; 3];
-        for (outcome, sensor) in outcomes.iter_mut().zip(Sensor::ALL) {
-            *outcome = self.adopt(sensor, date);
+        let Some(capture) = self.alone.as_mut().and_then(|alone| alone.capture()) else {
+            return self.end(asked, Due::Captured);
+        };
+        let Some(sensor) = capture.close() else { return };
+        let outcome = self.adopt(sensor, date);
+        let Some(capture) = self.alone.as_mut().and_then(|alone| alone.capture()) else { return };
+        if capture.settle(outcome) {
+            if capture.is_adopted() {
+                self.forget_watch();
+            }
+            self.end(asked, Due::Captured);
         }
-        if outcomes.contains(&CaptureOutcome::Adopted) {
-            self.forget_watch();
-        }
-        if let Some(capture) = self.alone.as_mut().and_then(|alone| alone.capture()) {
-            capture.outcomes = Some(outcomes);
-        }
-        self.end(asked, Due::Captured);
     }
 
     /// Takes what the session has found of a sensor, if it is surer than what is in use.
@@ -189,7 +190,7 @@ impl<
             return CaptureOutcome::TooLittle;
         };
         let in_use = self.calibration.record().triad(sensor);
-        match capture.session.better(sensor, &of.units(sensor), in_use) {
+        match capture.better(sensor, &of.units(sensor), in_use) {
             Err(NotStored::NoEstimate) => CaptureOutcome::TooLittle,
             Err(NotStored::Refused(refusal)) => CaptureOutcome::Refused(refusal),
             Err(NotStored::Surer { stored, new }) => CaptureOutcome::Surer { stored, new },

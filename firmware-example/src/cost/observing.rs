@@ -2,11 +2,15 @@
 
 use core::{fmt::Write, mem::MaybeUninit};
 
-use imucal_core::{observer::Sample, rotation::exp};
+use imucal_core::{observer::Sample, record::Sensor, rotation::exp};
 use nalgebra::{Matrix3, Vector3};
 
 use super::measured;
-use crate::{machine::Stopwatch, scene::Noise, standalone::Standalone};
+use crate::{
+    machine::Stopwatch,
+    scene::Noise,
+    standalone::{POSES, Standalone},
+};
 
 /// Samples of a rest, and of a turn, at 100 Hz.
 const RESTING: usize = 300;
@@ -18,6 +22,8 @@ struct Hand {
     /// From the sensor's axes to the local ones.
     attitude: Matrix3<f32>,
     time: u64,
+    /// Of the sensor, °C.
+    temperature: f32,
 }
 
 impl Hand {
@@ -25,10 +31,11 @@ impl Hand {
         self.attitude *= exp(&(rate * 0.01));
         self.time += 10_000;
         let to_sensor = self.attitude.transpose();
-        let acc = to_sensor * Vector3::new(0.0, 0.0, -9.8) + self.noise.vector(0.01);
+        let drift = Vector3::new(2e-3, -1e-3, 1e-3) * (self.temperature - 25.0);
+        let acc = to_sensor * Vector3::new(0.0, 0.0, -9.8) + drift + self.noise.vector(0.01);
         let field = to_sensor * Vector3::new(20.0, 2.0, 44.0) + self.noise.vector(0.3);
         let gyr = Some(rate + self.noise.vector(0.001));
-        (Sample { time: self.time, acc, gyr, temperature: Some(25.0) }, field)
+        (Sample { time: self.time, acc, gyr, temperature: Some(self.temperature) }, field)
     }
 }
 
@@ -45,9 +52,11 @@ fn place() -> &'static mut Standalone {
 #[inline(never)]
 pub(super) fn write(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
     let session = place();
-    let mut hand = Hand { noise: Noise(7), attitude: Matrix3::identity(), time: 0 };
+    let mut hand = Hand { noise: Noise(7), attitude: Matrix3::identity(), time: 0, temperature: 25.0 };
     let mut slice = 0;
-    for pose in 0..16u32 {
+    for pose in 0..POSES as u32 {
+        // By steps, up and down again.
+        hand.temperature = 25.0 + 2.5 * (pose % 12).min(12 - pose % 12) as f32;
         let turned = Vector3::new(0.9 - 0.1 * pose as f32, 0.5, 0.3 * (pose % 3) as f32);
         for (kind, count, rate) in [("rest", RESTING, Vector3::zeros()), ("turn", TURNING, turned)] {
             let (mut inertial, mut field) = (0u32, 0u32);
@@ -70,5 +79,21 @@ pub(super) fn write(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Resul
         }
     }
     writeln!(out, "session_slice ticks {slice} for 1 stack 0")?;
-    measured(out, watch, ("session_guide", 1), || session.guide()).map(drop)
+    measured(out, watch, ("session_guide", 1), || session.guide()).map(drop)?;
+    warmth(session, out, watch)
+}
+
+/// The terms of temperature of the accelerometer: their longest slice, and all of them.
+#[inline(never)]
+fn warmth(session: &Standalone, out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
+    let Ok(mut fit) = session.warmth(Sensor::Accelerometer) else { return Err(core::fmt::Error) };
+    let (mut longest, mut all, mut goes_on) = (0, 0u32, true);
+    while goes_on {
+        let before = watch.ticks();
+        goes_on = fit.work();
+        let took = watch.ticks().wrapping_sub(before);
+        (longest, all) = (took.max(longest), all.wrapping_add(took));
+    }
+    writeln!(out, "session_warmth_slice ticks {longest} for 1 stack 0")?;
+    writeln!(out, "session_warmth ticks {all} for 1 stack 0")
 }

@@ -7,6 +7,7 @@ use imucal_core::{
         cloud::CloudObserver,
         inertial::{InertialObserver, Seen},
         rest::{RestObserver, RestSettings, Stage},
+        thermometer::ThermometerObserver,
         turn::TurnObserver,
     },
     triad::Triad,
@@ -44,6 +45,15 @@ pub(super) fn reach_all() {
         reach!(observer::cloud::Slot::on_shell(slot, 50.0));
     }
     reach!(observer::cloud::CloudObserver::apart(&points));
+    let mut thermometer: ThermometerObserver<f32> = ThermometerObserver::default();
+    for row in 0..40u32 {
+        reach!(observer::thermometer::ThermometerObserver::push(
+            &mut thermometer,
+            u64::from(row) * 1_000_000,
+            (row / 2) as f32
+        ));
+    }
+    reach!(observer::thermometer::ThermometerObserver::fault(&thermometer));
     turns();
     inertial();
     reach!(coverage::missing((0..20).map(|k| scene::spiral(k, 20))));

@@ -5,6 +5,7 @@
 //! | [`rest`] | a [`Rest`](crate::observation::Rest) when it has ended |
 //! | [`turn`] | a turn between two rests, in a fixed number of blocks |
 //! | [`inertial`] | both, in the order in which they come about |
+//! | [`thermometer`] | whether a thermometer jumps or is stuck |
 //! | [`cloud`] | points of a magnetometer that are far apart, in a fixed number of slots |
 //!
 //! An observer is plain data of fixed size: it can be stopped after any sample, kept, and gone on with.
@@ -12,6 +13,7 @@
 pub mod cloud;
 pub mod inertial;
 pub mod rest;
+pub mod thermometer;
 pub mod turn;
 
 use nalgebra::Vector3;

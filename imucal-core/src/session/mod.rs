@@ -43,6 +43,7 @@ use crate::{
         cloud::{Chosen, CloudObserver},
         inertial::{InertialObserver, Seen},
         rest::{RestSettings, Stage},
+        thermometer::ThermometerObserver,
         turn::ObservedTurn,
     },
     record::Sensor,
@@ -93,6 +94,7 @@ pub struct Session<const N: usize, const B: usize, const M: usize> {
     settings: SessionSettings,
     observer: InertialObserver<f32, B>,
     cloud: CloudObserver<f32, M>,
+    thermometer: ThermometerObserver<f32>,
     /// The field while a rest goes on.
     field: Moments<f32>,
     poses: Poses<N, B>,
@@ -120,6 +122,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             settings,
             observer: InertialObserver::new(settings.rest),
             cloud: CloudObserver::new(settings.apart),
+            thermometer: ThermometerObserver::default(),
             field: Moments::default(),
             poses: Poses::default(),
             pending: None,
@@ -137,6 +140,9 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         let [acc, gyr, _] = self.settings.full_scale;
         let clips = beyond(&sample.acc, acc) || sample.gyr.as_ref().is_some_and(|rate| beyond(rate, gyr));
         let seen = if clips { self.clipped(sample) } else { self.observer.push(sample) };
+        if let Some(temperature) = sample.temperature.filter(|value| value.is_finite()) {
+            self.thermometer.push(sample.time, temperature);
+        }
         if !matches!(seen, Seen::Nothing) {
             self.take(&seen);
         }

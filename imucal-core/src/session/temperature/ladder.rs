@@ -3,17 +3,20 @@
 use heapless::Vec;
 use nalgebra::SMatrix;
 
-use super::evidence::{Evidence, Groups, P, Part, Theta};
+use super::evidence::{Evidence, FORM, Groups, P, Part, Theta};
 use crate::{
     accept::{f_score::f_score, outlier},
     model::{Model, SquaredSum},
     session::evidence::Used,
-    solver::LevenbergMarquardt,
+    solver::{LevenbergMarquardt, lm::Settings},
     temperature::TemperatureTerms,
 };
 
 /// Standard normal score of the chance with which a group is kept that is none: 1e-3.
 const SCORE: f32 = 3.09;
+
+/// Steps of a fit of terms of the order.
+const ORDER_ITERATIONS: u16 = 8;
 
 /// A fit with some terms, and what speaks for it.
 #[derive(Clone, Copy, Debug)]
@@ -89,7 +92,8 @@ impl<const N: usize> Ladder<N> {
         if self.last {
             return self.end(ended);
         }
-        self.trial.whole &= ended;
+        // Terms of the order are compared as far as they came.
+        self.trial.whole &= ended || self.part == Part::Order;
         match self.part {
             Part::Whole => {
                 self.trial.theta = *self.solver.theta();
@@ -120,9 +124,12 @@ impl<const N: usize> Ladder<N> {
     }
 
     fn begin(&mut self, part: Part) {
-        // Terms of the order are of another size.
-        let from = if part == Part::Order { self.start } else { self.trial.theta };
-        (self.part, self.solver) = (part, LevenbergMarquardt::new(from, Default::default()));
+        let (mut from, mut settings) = (self.trial.theta, Settings::default());
+        if part == Part::Order {
+            // From the triad alone, and not far from it: the order has no reason to fit.
+            (from, settings.iterations) = (FORM.theta(&FORM.cold(&from)), ORDER_ITERATIONS);
+        }
+        (self.part, self.solver) = (part, LevenbergMarquardt::new(from, settings));
     }
 
     /// The trial is compared with the best so far; the next one begins.

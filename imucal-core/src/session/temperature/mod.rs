@@ -27,7 +27,6 @@ use super::{
     Session,
     evidence::Used,
     fitting::acc_limits,
-    poses::Pose,
     store::{NotStored, model_of},
 };
 use crate::{
@@ -38,6 +37,7 @@ use crate::{
         thermal::UNIT,
     },
     observation::ShellPoint,
+    observer::thermometer::ThermometerFault,
     record::{Sensor, TriadRecord},
     temperature::{
         TemperatureTerms,
@@ -58,6 +58,8 @@ pub enum NoWarmth {
     OtherSensor,
     /// A rest has no temperature.
     NotMeasured,
+    /// The thermometer jumps or is stuck.
+    Thermometer(ThermometerFault<f32>),
     /// There are too few rests.
     TooFewRests {
         /// Rests.
@@ -110,19 +112,17 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     /// [`NoWarmth`]: why none can be fitted.
     #[inline(never)]
     pub fn warmth(&self, sensor: Sensor) -> Result<WarmthFit<N>, NoWarmth> {
-        let mean: fn(&Pose<B>) -> Vector3<f32> = match sensor {
-            Sensor::Accelerometer => |pose| pose.acc,
-            Sensor::Gyroscope => |pose| pose.gyr,
-            Sensor::Magnetometer => return Err(NoWarmth::OtherSensor),
-        };
+        if sensor == Sensor::Magnetometer {
+            return Err(NoWarmth::OtherSensor);
+        }
         let (mut means, mut temperatures) = (Vec::<Vector3<f32>, N>::new(), Vec::<f32, N>::new());
         for pose in self.poses.list() {
-            let mean = mean(pose);
+            let mean = if sensor == Sensor::Accelerometer { pose.acc } else { pose.gyr };
             if mean.x.is_finite() && mean.y.is_finite() && mean.z.is_finite() {
                 let _room = (means.push(mean), temperatures.push(pose.temperature));
             }
         }
-        let reference = check::<N>(&temperatures)?;
+        let reference = check::<N>(&temperatures, self.thermometer.fault())?;
         let rests = means.len();
         let last = rests.saturating_sub(1).max(1) as f32;
         let (mut changes, mut order) = (Vec::new(), Vec::new());
@@ -242,7 +242,13 @@ impl<const N: usize> WarmthFit<N> {
 }
 
 /// The mean of temperatures from which terms can be estimated, °C.
-fn check<const N: usize>(temperatures: &[f32]) -> Result<f32, NoWarmth> {
+fn check<const N: usize>(
+    temperatures: &[f32],
+    fault: Option<ThermometerFault<f32>>,
+) -> Result<f32, NoWarmth> {
+    if let Some(fault) = fault {
+        return Err(NoWarmth::Thermometer(fault));
+    }
     if temperatures.is_empty() || temperatures.iter().any(|value| !value.is_finite()) {
         return Err(NoWarmth::NotMeasured);
     }

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::*;
 use crate::{
     fit::Units,
+    observer::thermometer::ThermometerFault,
     record::{FitQuality, RawUnit, TriadRecord},
     session::{
         store::NotStored,
@@ -104,6 +105,10 @@ fn temperatures_that_show_nothing_are_refused() {
     let refused = |climate| session(3, climate, true).1.warmth(Sensor::Accelerometer).expect_err("a refusal");
     assert!(matches!(refused(|_| 25.0), NoWarmth::Narrow { .. }));
     assert!(matches!(refused(|time| 20.0 + 0.1 * time), NoWarmth::AloneWithTime { .. }));
+    let jumps = refused(|time| hill(time) + if time > 90.0 { 12.0 } else { 0.0 });
+    assert!(matches!(jumps, NoWarmth::Thermometer(ThermometerFault::Jump { .. })), "{jumps:?}");
+    let stuck = refused(|time| hill(f64::min(time, 60.0)));
+    assert!(matches!(stuck, NoWarmth::Thermometer(ThermometerFault::Stuck { .. })), "{stuck:?}");
     assert_eq!(refused(|time| if time > 90.0 { f64::NAN } else { 25.0 }), NoWarmth::NotMeasured);
     let session = Held::new(SessionSettings::default());
     assert_eq!(session.warmth(Sensor::Magnetometer).err(), Some(NoWarmth::OtherSensor));

@@ -1,89 +1,31 @@
-//! Whether a thermometer's readings are those of a sensor that warms and cools.
-//!
-//! | fault | criterion |
-//! | --- | --- |
-//! | it jumps | one reading differs from the one before by more than `LEAP` and `FASTEST` times the time between them |
-//! | it is stuck | one reading is repeated for longer than `LONG` and `LONGER` times as long as any other, and it is left by a leap of `STEPS` of its steps, or not at all |
-//!
-//! A sensor has a thermal mass: a package of a few grams warms by some tenths of a kelvin a second. A soak at a constant
-//! temperature is not stuck where the thermometer's last digit moves, or where it goes on by single steps. Source: ours.
-//! Not seen: a thermometer that is stuck from beginning to end, which is a constant temperature; a coarse one that
-//! rests on one digit until the recording ends counts as stuck.
+//! Whether a thermometer's readings are those of a sensor that warms and cools: the core's criteria, over a recording.
+
+use imucal_core::observer::thermometer::{ThermometerFault, ThermometerObserver};
 
 use super::refusal::TemperatureRefusal;
-
-/// The least jump, K.
-const LEAP: f64 = 3.0;
-/// How fast a sensor warms at most, K/s.
-const FASTEST: f64 = 1.0;
-/// The shortest repetition that is looked at, s.
-const LONG: f64 = 30.0;
-/// See the table.
-const LONGER: f64 = 10.0;
-/// See the table.
-const STEPS: f64 = 4.0;
-/// A leap of less is a step like others, K.
-const LEAST_LEAP: f64 = 0.5;
-
-/// A repetition of one reading.
-#[derive(Clone, Copy, Debug)]
-struct Run {
-    from: f64,
-    until: f64,
-    value: f64,
-    next: Option<f64>,
-}
-
-impl Run {
-    fn duration(&self) -> f64 {
-        self.until - self.from
-    }
-}
 
 /// Judges the readings, °C, of these times, s; those that are not finite are passed over.
 ///
 /// # Errors
 /// stuck or jump, with when and by how much.
 pub fn check(time: &[f64], readings: &[f64]) -> Result<(), TemperatureRefusal> {
-    let measured = || time.iter().zip(readings).filter(|(_, value)| value.is_finite());
-    let pairs = measured().zip(measured().skip(1));
-    for ((before, from), (at, to)) in pairs {
-        if (to - from).abs() > LEAP + FASTEST * (at - before) {
-            return Err(TemperatureRefusal::Jump { at: *at, by: to - from });
+    let begin = time.first().copied().unwrap_or(0.0);
+    let mut observer = ThermometerObserver::default();
+    for (at, reading) in time.iter().zip(readings).filter(|(_, reading)| reading.is_finite()) {
+        observer.push(((at - begin) * 1e6).round() as u64, *reading);
+    }
+    let seconds = |time: u64| time as f64 / 1e6;
+    match observer.fault() {
+        None => Ok(()),
+        Some(ThermometerFault::Jump { at, by }) => {
+            Err(TemperatureRefusal::Jump { at: begin + seconds(at), by })
         }
+        Some(ThermometerFault::Stuck { from, duration, usual }) => Err(TemperatureRefusal::Stuck {
+            from: begin + seconds(from),
+            duration: seconds(duration),
+            usual: seconds(usual),
+        }),
     }
-    let runs = runs(measured());
-    let Some(longest) = runs.iter().max_by(|a, b| a.duration().total_cmp(&b.duration())) else {
-        return Ok(());
-    };
-    let others = runs.iter().filter(|run| run.from != longest.from).map(Run::duration);
-    let usual = others.fold(0.0, f64::max);
-    let step =
-        runs.windows(2).map(|pair| (pair[1].value - pair[0].value).abs()).fold(f64::INFINITY, f64::min);
-    let leaps =
-        longest.next.is_none_or(|next| (next - longest.value).abs() > f64::max(STEPS * step, LEAST_LEAP));
-    let stuck = runs.len() > 2 && longest.duration() > f64::max(LONG, LONGER * usual) && leaps;
-    if stuck {
-        let (from, duration) = (longest.from, longest.duration());
-        return Err(TemperatureRefusal::Stuck { from, duration, usual });
-    }
-    Ok(())
-}
-
-fn runs<'a>(measured: impl Iterator<Item = (&'a f64, &'a f64)>) -> Vec<Run> {
-    let mut runs: Vec<Run> = Vec::new();
-    for (at, value) in measured {
-        match runs.last_mut() {
-            Some(run) if run.value == *value => run.until = *at,
-            last => {
-                if let Some(run) = last {
-                    run.next = Some(*value);
-                }
-                runs.push(Run { from: *at, until: *at, value: *value, next: None });
-            }
-        }
-    }
-    runs
 }
 
 #[cfg(test)]
