@@ -24,7 +24,7 @@ use crate::{
 };
 
 /// An accelerometer alone, done at 1 %; its raw values are nominal m/s².
-fn task() -> CaptureTask {
+pub(super) fn task() -> CaptureTask {
     let absent = CaptureSensor {
         target: 0.0,
         full_scale: f32::INFINITY,
@@ -44,7 +44,7 @@ fn task() -> CaptureTask {
 
 /// Three seconds of rest in each of some directions, and a second of motion from one to the next; 50 samples a second of an
 /// accelerometer whose scale is 2 % off and whose bias is 0.1 m/s².
-fn tumble(poses: usize) -> Vec<RawSample> {
+pub(super) fn tumble(poses: usize) -> Vec<RawSample> {
     let mut noise = Noise(7);
     let mut samples = Vec::new();
     let (mut row, mut last) = (0u64, spiral(0, poses));
@@ -75,7 +75,7 @@ fn state(reply: &Reply<'_>) -> CaptureState {
     }
 }
 
-fn fault(reply: &Reply<'_>) -> Option<Fault> {
+pub(super) fn fault(reply: &Reply<'_>) -> Option<Fault> {
     match reply {
         Reply::Fault(fault) => Some(*fault),
         _ => None,
@@ -87,7 +87,7 @@ fn batch(index: u16, samples: &[RawSample]) -> Request<'static> {
 }
 
 /// Sends them all; the last state.
-fn send(bench: &mut Bench<'_>, samples: &[RawSample]) -> CaptureState {
+pub(super) fn send(bench: &mut Bench<'_>, samples: &[RawSample]) -> CaptureState {
     let mut last = None;
     for (batch_of, index) in samples.chunks(SAMPLES).zip((0..).step_by(SAMPLES)) {
         last = Some(bench.ask(&batch(index, batch_of), state));
@@ -95,11 +95,11 @@ fn send(bench: &mut Bench<'_>, samples: &[RawSample]) -> CaptureState {
     last.expect("samples")
 }
 
-fn finish() -> Request<'static> {
+pub(super) fn finish() -> Request<'static> {
     Request::FinishCapture { date: Date::from_days(20_000) }
 }
 
-fn outcomes(reply: &Reply<'_>) -> [CaptureOutcome; 3] {
+pub(super) fn outcomes(reply: &Reply<'_>) -> [CaptureOutcome; 3] {
     match reply {
         Reply::Captured(outcomes) => *outcomes,
         other => panic!("{other:?}"),
@@ -140,7 +140,7 @@ fn raw_samples_end_in_the_record_that_the_same_session_gives_elsewhere() {
     assert_eq!(there.acc, Some(here));
 }
 
-fn state_of(bench: &mut Bench<'_>, request: &Request<'_>) -> CaptureState {
+pub(super) fn state_of(bench: &mut Bench<'_>, request: &Request<'_>) -> CaptureState {
     bench.ask(request, state)
 }
 
@@ -389,41 +389,6 @@ fn time_stamps_that_jitter_and_a_thermometer_that_jumps_leave_a_session_its_resu
     let last = send(&mut bench, &samples);
     assert!(last.guide.accepted[0] && last.guide.rests > 11, "{last:?}");
     assert_eq!(bench.ask(&finish(), outcomes)[0], CaptureOutcome::Adopted);
-}
-
-#[test]
-fn a_session_that_warms_and_cools_ends_in_the_terms_that_it_gives_elsewhere() {
-    let mut memory = BenchMemory::new();
-    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
-    let mut samples = tumble(36);
-    let rows = samples.len();
-    for (row, sample) in samples.iter_mut().enumerate() {
-        // Warm and cold three times, so that each direction is seen at several temperatures.
-        let warmer = 18.0 * (3.0 * std::f32::consts::PI * row as f32 / rows as f32).sin().abs();
-        sample.temperature = 20.0 + warmer;
-        sample.raw[0] = sample.raw[0].map(|[x, y, z]| [x + 4e-3 * warmer, y - 3e-3 * warmer, z]);
-    }
-    state_of(&mut bench, &Request::StartCapture(task()));
-    send(&mut bench, &samples);
-    assert_eq!(bench.ask(&finish(), outcomes)[0], CaptureOutcome::Adopted);
-    let store = Request::Store { replace: false };
-    assert_eq!(bench.ask(&store, fault), None);
-    let there = bench.ask(&Request::GetRecord, |reply| match reply {
-        Reply::Record(bytes) => record::decode(bytes).expect("whole"),
-        other => panic!("{other:?}"),
-    });
-    let mut session = Session::<38, 4, 64>::new(task().settings().expect("possible"));
-    for sample in &samples {
-        task().push(&mut session, sample);
-        session.work();
-    }
-    session.finish();
-    while session.work() {}
-    let units = task().sensors[0].units(record::Sensor::Accelerometer);
-    let here = session.better_at_temperatures(record::Sensor::Accelerometer, &units, None);
-    assert_eq!(there.acc, Some(here.expect("accepted")));
-    let [x, y, z] = there.acc.and_then(|acc| acc.temperature).expect("terms").bias_slope;
-    assert!((x - 4e-3).abs() < 1e-3 && (y + 3e-3).abs() < 1e-3 && z.abs() < 1e-3, "{x} {y} {z}");
 }
 
 #[test]

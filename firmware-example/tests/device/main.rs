@@ -10,3 +10,4 @@ mod rate;
 mod session;
 mod storage;
 mod uart_ring;
+mod warmth;

@@ -105,14 +105,14 @@ impl<const N: usize, const B: usize> Poses<N, B> {
         self.last = None;
     }
 
-    /// Of the two rests whose directions are nearest to one another, the one without a turn goes, or else the older.
+    /// Of the two rests that are nearest to one another, the one without a turn goes, or else the older.
     fn forget(&mut self) {
         let mut nearest = (0, 0, f32::NEG_INFINITY);
         for (i, a) in self.list.iter().enumerate() {
             for (j, b) in self.list.iter().enumerate().take(i) {
-                let cosine = a.direction().dot(&b.direction());
-                if cosine > nearest.2 {
-                    nearest = (j, i, cosine);
+                let alike = a.likeness(b);
+                if alike > nearest.2 {
+                    nearest = (j, i, alike);
                 }
             }
         }
@@ -153,6 +153,13 @@ impl<const B: usize> Pose<B> {
     /// Nominal direction of the specific force, unit vector.
     pub(super) fn direction(&self) -> Vector3<f32> {
         self.acc / libm::sqrtf(self.acc.norm_squared())
+    }
+
+    /// How near two rests are: the cosine between their directions, less 1 − cos 30° for 10 K between them, as its square.
+    fn likeness(&self, other: &Self) -> f32 {
+        let apart = self.temperature - other.temperature;
+        let warmth = if apart.is_finite() { 1.34e-3 * apart * apart } else { 0.0 };
+        self.direction().dot(&other.direction()) - warmth
     }
 
     /// A turn led to it.

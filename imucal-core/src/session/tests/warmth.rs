@@ -146,8 +146,7 @@ fn a_record_of_a_warm_session_corrects_at_every_temperature_and_one_without_does
 #[test]
 fn a_later_session_of_one_temperature_keeps_the_terms_of_the_record() {
     let warm = record(&session(5, hill, true).1, None).expect("accepted");
-    let vague =
-        TriadRecord { quality: FitQuality { bias_std: [1e3; 3], ..warm.quality.clone() }, ..warm.clone() };
+    let vague = TriadRecord { quality: FitQuality { bias_std: [1e3; 3], ..warm.quality }, ..warm.clone() };
     let (_, later) = session(6, |_| 30.0, false);
     let new = later.better(Sensor::Accelerometer, &UNITS, Some(&vague)).expect("surer");
     let (terms, before) = (new.temperature.expect("terms"), warm.temperature.expect("terms"));

@@ -138,15 +138,17 @@ fn end(
     Ok(if done { Ending::Done } else { Ending::Refused })
 }
 
-/// Gain and bias that the device has stored are those of the session here, to the bit.
+/// Gain, bias and terms of temperature that the device has stored are those of the session here, to the bit. Without terms here
+/// the device may have kept those of an earlier record.
 fn is_equal(here: &Capture, task: &CaptureTask, record: &CalibrationRecord, kind: SensorKind) -> bool {
     let sensor = kind.into();
-    let own = here.better(sensor, &task.sensors[kind as usize].units(sensor), None);
+    let own = here.better_at_temperatures(sensor, &task.sensors[kind as usize].units(sensor), None);
     let (Ok(own), Some(there)) = (own, record.triad(sensor)) else { return false };
     let bits = |gain: &[[f32; 3]; 3], bias: &[f32; 3]| -> Vec<u32> {
         gain.as_flattened().iter().chain(bias).map(|value| value.to_bits()).collect()
     };
-    bits(&own.gain, &own.bias) == bits(&there.gain, &there.bias)
+    let warmth = own.temperature.is_none() || own.temperature == there.temperature;
+    warmth && bits(&own.gain, &own.bias) == bits(&there.gain, &there.bias)
 }
 
 fn reason(outcome: &CaptureOutcome) -> String {
