@@ -59,32 +59,37 @@ impl<T: Scalar, const B: usize> InertialObserver<T, B> {
     /// Takes a sample in.
     #[inline]
     pub fn push(&mut self, sample: &Sample<T>) -> Seen<T, B> {
-        if self.rests.goes_on(sample) {
+        if self.goes_on(sample) { Seen::Nothing } else { self.turn_over(sample) }
+    }
+
+    /// Takes in a sample that shows nothing new; false where it may, and is to be taken by [`Self::turn_over`].
+    #[inline]
+    pub(crate) fn goes_on(&mut self, sample: &Sample<T>) -> bool {
+        let goes_on = self.rests.goes_on(sample);
+        if goes_on {
             self.follow(sample);
-            Seen::Nothing
-        } else {
-            self.turn_over(sample)
         }
+        goes_on
     }
 
     /// A quarter of a second has ended before a sample.
     #[inline(never)]
-    fn turn_over(&mut self, sample: &Sample<T>) -> Seen<T, B> {
+    pub(crate) fn turn_over(&mut self, sample: &Sample<T>) -> Seen<T, B> {
         let (stage, quarters) = (self.rests.stage(), self.rests.quarters());
         let ended = self.rests.turn_over(sample);
-        let mut seen = match ended {
+        let best =
+            (self.rests.quarters() != quarters).then(|| Triad { gain: self.gain, bias: self.rests.rate() });
+        let turn = best.and_then(|best| self.turns.quarter(self.rests.stage(), &best));
+        self.follow(sample);
+        // What is seen is large: it is made where it is returned, and nothing of it where there is nothing.
+        if let Some(turn) = turn {
+            return Seen::Turn(turn);
+        }
+        match ended {
             Some(rest) => Seen::Rest(rest),
             None if stage != Stage::Moving && self.rests.stage() == Stage::Moving => Seen::NoRest,
             None => Seen::Nothing,
-        };
-        if self.rests.quarters() != quarters {
-            let best = Triad { gain: self.gain, bias: self.rests.rate() };
-            if let Some(turn) = self.turns.quarter(self.rests.stage(), &best) {
-                seen = Seen::Turn(turn);
-            }
         }
-        self.follow(sample);
-        seen
     }
 
     /// The rest that goes on, when no more samples come.

@@ -243,7 +243,8 @@ impl<T: Scalar> RestObserver<T> {
         };
         now.broken |= self.interval > 0 && since > self.gap;
         let last = core::mem::replace(&mut self.last, sample.time);
-        let mut whole = core::mem::replace(now, Stretch::new(sample.time));
+        let mut whole = *now;
+        *now = Stretch::new(sample.time);
         now.push(sample);
         whole.end = sample.time;
         // A gap before this sample is none of the intervals of the quarter.
@@ -255,7 +256,9 @@ impl<T: Scalar> RestObserver<T> {
         }
         let ended = self.quarter(&whole);
         let [oldest, inner, newest] = &mut self.before;
-        *oldest = core::mem::replace(inner, newest.replace(whole));
+        *oldest = *inner;
+        *inner = *newest;
+        *newest = Some(whole);
         ended
     }
 

@@ -231,9 +231,11 @@ impl<T: Scalar, const B: usize> TurnObserver<T, B> {
             }
             (Way::Lost, _) => None,
             (Way::Resting(kept, now), Stage::Resting) => {
-                kept.rotate_left(1);
-                let [.., newest] = kept;
-                *newest = Some(core::mem::replace(now, Quarter::new()));
+                let [oldest, inner, newest] = kept;
+                *oldest = *inner;
+                *inner = *newest;
+                *newest = Some(*now);
+                *now = Quarter::new();
                 None
             }
             (Way::Resting(kept, now), _) => {

@@ -137,12 +137,20 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
 
     /// Takes a sample in: nominal SI, sensor axes.
     pub fn push(&mut self, sample: &Sample<f32>) {
-        let [acc, gyr, _] = self.settings.full_scale;
-        let clips = beyond(&sample.acc, acc) || sample.gyr.as_ref().is_some_and(|rate| beyond(rate, gyr));
-        let seen = if clips { self.clipped(sample) } else { self.observer.push(sample) };
         if let Some(temperature) = sample.temperature.filter(|value| value.is_finite()) {
             self.thermometer.push(sample.time, temperature);
         }
+        let [acc, gyr, _] = self.settings.full_scale;
+        let clips = beyond(&sample.acc, acc) || sample.gyr.as_ref().is_some_and(|rate| beyond(rate, gyr));
+        if clips || !self.observer.goes_on(sample) {
+            self.look(sample, clips);
+        }
+    }
+
+    /// A sample that may show something new.
+    #[inline(never)]
+    fn look(&mut self, sample: &Sample<f32>, clips: bool) {
+        let seen = if clips { self.clipped(sample) } else { self.observer.turn_over(sample) };
         if !matches!(seen, Seen::Nothing) {
             self.take(&seen);
         }
@@ -256,7 +264,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
 /// Any component reaches the end of the range.
 #[inline]
 fn beyond(value: &Vector3<f32>, full_scale: f32) -> bool {
-    let reaches = |component: f32| component >= full_scale || component <= -full_scale;
+    let reaches = |component: f32| libm::fabsf(component) >= full_scale;
     reaches(value.x) || reaches(value.y) || reaches(value.z)
 }
 
