@@ -31,6 +31,12 @@ impl<T: Scalar> Default for Moments<T> {
 impl<T: Scalar> Moments<T> {
     /// Takes one sample in; its unit is that of the mean.
     pub fn push(&mut self, sample: &Vector3<T>) {
+        self.take(sample);
+    }
+
+    /// [`Self::push`] where every sample of a device passes: the call alone would be a sixth of it.
+    #[inline(always)]
+    pub(crate) fn take(&mut self, sample: &Vector3<T>) {
         self.count = self.count.saturating_add(1);
         // By components, as in `rotation::image`: at a device's `opt-level = "s"` nalgebra's own are loops.
         let count = T::whole(self.count);
@@ -122,10 +128,20 @@ pub struct Block<T: Scalar> {
 impl<T: Scalar> Block<T> {
     /// This block, of a duration in s, and the next one, as one: the block of their samples, to rounding.
     pub fn join(&self, duration: T, next: &Self, next_duration: T) -> Self {
+        // By components, for the same reason as in `Moments::push`.
+        let sum = |a: &Vector3<T>, b: &Vector3<T>| Vector3::new(a.x + b.x, a.y + b.y, a.z + b.z);
+        let (a, b) = (&self.s0, &next.s0);
+        let cross = Vector3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+        let later =
+            |s1: T, s0: T, next_s1: T, next_s0: T| s1 + s0 * next_duration + next_s1 - next_s0 * duration;
         Self {
-            s0: self.s0 + next.s0,
-            s1: self.s1 + self.s0 * next_duration + next.s1 - next.s0 * duration,
-            c: self.c + next.c + self.s0.cross(&next.s0),
+            s0: sum(a, b),
+            s1: Vector3::new(
+                later(self.s1.x, a.x, next.s1.x, b.x),
+                later(self.s1.y, a.y, next.s1.y, b.y),
+                later(self.s1.z, a.z, next.s1.z, b.z),
+            ),
+            c: sum(&sum(&self.c, &next.c), &cross),
         }
     }
 

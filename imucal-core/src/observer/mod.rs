@@ -13,6 +13,7 @@
 pub mod cloud;
 pub mod inertial;
 pub mod rest;
+mod ring;
 pub mod thermometer;
 pub mod turn;
 
@@ -35,6 +36,7 @@ pub struct Sample<T: Scalar> {
 
 impl<T: Scalar> Sample<T> {
     /// Every sensor has a value.
+    #[inline]
     pub fn is_whole(&self) -> bool {
         is_finite(&self.acc) && self.gyr.as_ref().is_none_or(is_finite)
     }

@@ -28,7 +28,7 @@ use nalgebra::Vector3;
 
 mod window;
 
-use super::Sample;
+use super::{Sample, ring::Ring};
 use crate::{
     observation::{Moments, Rest},
     scalar::Scalar,
@@ -121,9 +121,9 @@ impl<T: Scalar> Stretch<T> {
     fn push(&mut self, sample: &Sample<T>) {
         self.rows = self.rows.saturating_add(1);
         if sample.is_whole() {
-            self.acc.push(&sample.acc);
+            self.acc.take(&sample.acc);
             if let Some(rate) = &sample.gyr {
-                self.gyr.push(rate);
+                self.gyr.take(rate);
             }
         }
         if let Some(temperature) = sample.temperature.filter(|value| value.finite()) {
@@ -169,9 +169,10 @@ struct Lasting<T: Scalar> {
 #[derive(Clone, Copy, Debug)]
 pub struct RestObserver<T: Scalar> {
     settings: RestSettings<T>,
-    /// The last three whole quarters, the oldest first; `None` before there were so many.
-    before: [Option<Stretch<T>>; 3],
-    now: Option<Stretch<T>>,
+    /// The quarter that goes on, and the last three whole ones.
+    stretches: Ring<Stretch<T>>,
+    /// A quarter goes on.
+    begun: bool,
     /// Time of the last sample and usual time between two, µs.
     last: u64,
     interval: u64,
@@ -194,11 +195,10 @@ impl<T: Scalar> Default for RestObserver<T> {
 impl<T: Scalar> RestObserver<T> {
     /// Before the first sample.
     pub fn new(settings: RestSettings<T>) -> Self {
-        let before = [None; 3];
         Self {
             settings,
-            before,
-            now: None,
+            stretches: Ring::new(Stretch::new(0)),
+            begun: false,
             last: 0,
             interval: 0,
             gap: 0,
@@ -217,9 +217,9 @@ impl<T: Scalar> RestObserver<T> {
     /// Takes in a sample of the quarter that goes on; false where it is of none. It is short, since it is for nearly all samples.
     #[inline]
     pub(super) fn goes_on(&mut self, sample: &Sample<T>) -> bool {
-        let Some(now) = &mut self.now else { return false };
+        let now = self.stretches.now();
         let since = sample.time.wrapping_sub(self.last);
-        if sample.time < self.last || sample.time.wrapping_sub(now.start) >= QUARTER {
+        if !self.begun || sample.time < self.last || sample.time.wrapping_sub(now.start) >= QUARTER {
             return false;
         }
         now.broken |= self.interval > 0 && since > self.gap;
@@ -231,41 +231,36 @@ impl<T: Scalar> RestObserver<T> {
     /// Ends the quarter before a sample, and begins the next.
     #[inline(never)]
     pub(super) fn turn_over(&mut self, sample: &Sample<T>) -> Option<ObservedRest<T>> {
-        let Some(now) = &mut self.now else {
+        if !self.begun {
             self.begin(sample);
             return None;
-        };
+        }
         let Some(since) = sample.time.checked_sub(self.last) else {
             // The clock was set back: nothing goes on over it.
             let ended = self.finish();
             self.begin(sample);
             return ended;
         };
-        now.broken |= self.interval > 0 && since > self.gap;
-        let last = core::mem::replace(&mut self.last, sample.time);
-        let mut whole = *now;
-        *now = Stretch::new(sample.time);
-        now.push(sample);
+        let whole = self.stretches.now();
+        whole.broken |= self.interval > 0 && since > self.gap;
         whole.end = sample.time;
-        // A gap before this sample is none of the intervals of the quarter.
-        if let Some(interval) =
-            last.saturating_sub(whole.start).checked_div(u64::from(whole.rows).saturating_sub(1))
-        {
-            self.interval = interval;
-            self.gap = GAP.saturating_mul(interval);
+        let last = core::mem::replace(&mut self.last, sample.time);
+        // A gap before this sample is none of the intervals of the quarter. A quarter of microseconds has less than 32 bits, of which
+        // a device divides faster.
+        let lasted = u32::try_from(last.saturating_sub(whole.start)).unwrap_or(u32::MAX);
+        if let Some(interval) = lasted.checked_div(whole.rows.saturating_sub(1)) {
+            self.interval = interval.into();
+            self.gap = GAP.saturating_mul(self.interval);
         }
-        let ended = self.quarter(&whole);
-        let [oldest, inner, newest] = &mut self.before;
-        *oldest = *inner;
-        *inner = *newest;
-        *newest = Some(whole);
+        let ended = self.quarter();
+        self.stretches.turn(Stretch::new(sample.time)).push(sample);
         ended
     }
 
     /// The rest that goes on, when no more samples come; what was gathered is forgotten, but not the quietest window.
     pub fn finish(&mut self) -> Option<ObservedRest<T>> {
-        self.before = [None; 3];
-        self.now = None;
+        self.stretches.forget();
+        self.begun = false;
         self.interval = 0;
         self.ended()
     }
@@ -287,8 +282,7 @@ impl<T: Scalar> RestObserver<T> {
 
     /// Mean specific force `f_s` of the last quarter while the sensor is still, m/s².
     pub fn direction(&self) -> Option<Vector3<T>> {
-        let [.., newest] = &self.before;
-        self.lasting.as_ref().and(newest.as_ref()).map(|quarter| quarter.acc.mean())
+        self.lasting.as_ref().and(self.stretches.before(1)).map(|quarter| quarter.acc.mean())
     }
 
     /// Quarters of a second that have ended since the start; comes round after 34 years.
@@ -316,24 +310,24 @@ impl<T: Scalar> RestObserver<T> {
     }
 
     fn begin(&mut self, sample: &Sample<T>) {
-        let mut first = Stretch::new(sample.time);
+        let first = self.stretches.now();
+        *first = Stretch::new(sample.time);
         first.push(sample);
-        self.now = Some(first);
-        self.last = sample.time;
+        (self.begun, self.last) = (true, sample.time);
     }
 
-    /// Takes a whole quarter in.
-    fn quarter(&mut self, whole: &Stretch<T>) -> Option<ObservedRest<T>> {
+    /// The quarter that went on is whole.
+    fn quarter(&mut self) -> Option<ObservedRest<T>> {
         self.quarters = self.quarters.wrapping_add(1);
-        let [Some(oldest), Some(inner), Some(newest)] = &self.before else { return None };
-        let inner = *inner;
-        let window = window([oldest, &inner, newest, whole]);
+        let before = |back| self.stretches.before(back);
+        let window = window([before(3)?, before(2)?, before(1)?, before(0)?]);
         let Some(variance) = window.and_then(|window| self.still(&window)) else { return self.ended() };
         let lasting = self.lasting.get_or_insert(Lasting { held: None, quarters: 0, noise: variance });
         lasting.noise = if variance > lasting.noise { variance } else { lasting.noise };
         // From the middle of the window before to that of this one.
+        let inner = self.stretches.before(2)?;
         if let Some(held) = &mut lasting.held {
-            held.join(&inner);
+            held.join(inner);
         } else {
             lasting.held = Some(Stretch::new(inner.end));
             return None;

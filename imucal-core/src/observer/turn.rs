@@ -28,7 +28,7 @@
 use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
 
-use super::rest::Stage;
+use super::{rest::Stage, ring::Ring};
 use crate::{
     model::turn::Carrier,
     observation::{Block, BlockBuilder, Durations, Turn},
@@ -39,8 +39,6 @@ use crate::{
 
 /// How long a block lasts before blocks are joined, s: a third of a quarter of the rest's window.
 pub const FINE: f64 = 1.0 / 12.0;
-/// Quarters of a second that are kept while a rest lasts.
-const KEPT: usize = 3;
 
 /// A turn that has ended in a rest.
 #[derive(Clone, Debug)]
@@ -164,8 +162,8 @@ impl<T: Scalar> Quarter<T> {
 enum Way<T: Scalar, const B: usize> {
     /// Nowhere: since the last rest something is missing, or there was none.
     Lost,
-    /// At rest: the last quarters, the oldest first, and the one that goes on.
-    Resting([Option<Quarter<T>>; KEPT], Quarter<T>),
+    /// At rest: the quarter that goes on, and the last three.
+    Resting(Ring<Quarter<T>>),
     /// From a rest; with the turn up to where the sensor was first seen to be still again.
     Turning(Path<T, B>, Option<ObservedTurn<T, B>>),
 }
@@ -230,17 +228,13 @@ impl<T: Scalar, const B: usize> TurnObserver<T, B> {
                 None
             }
             (Way::Lost, _) => None,
-            (Way::Resting(kept, now), Stage::Resting) => {
-                let [oldest, inner, newest] = kept;
-                *oldest = *inner;
-                *inner = *newest;
-                *newest = Some(*now);
-                *now = Quarter::new();
+            (Way::Resting(quarters), Stage::Resting) => {
+                quarters.turn(Quarter::new());
                 None
             }
-            (Way::Resting(kept, now), _) => {
+            (Way::Resting(quarters), _) => {
                 let mut path = Path::new();
-                for quarter in kept.iter().flatten().chain([&*now]) {
+                for quarter in [3, 2, 1, 0].into_iter().filter_map(|back| quarters.before(back)) {
                     path.attitude *= quarter.attitude;
                     path.push(&quarter.block, quarter.duration);
                 }
@@ -265,7 +259,7 @@ impl<T: Scalar, const B: usize> TurnObserver<T, B> {
 
     fn rest(&mut self, best: &Triad<T>) {
         self.reference = Carrier::new(best);
-        self.way = Way::Resting([None; KEPT], Quarter::new());
+        self.way = Way::Resting(Ring::new(Quarter::new()));
     }
 
     /// Ends a block.
@@ -273,7 +267,8 @@ impl<T: Scalar, const B: usize> TurnObserver<T, B> {
         let (block, duration) = self.builder.finish();
         match &mut self.way {
             Way::Lost => {}
-            Way::Resting(_, now) => {
+            Way::Resting(quarters) => {
+                let now = quarters.now();
                 self.reference.carry(&mut now.attitude, &block, duration);
                 now.push(&block, duration);
             }
