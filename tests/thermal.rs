@@ -71,6 +71,15 @@ fn scores(calibration: &Calibration) -> [Vec<f64>; 2] {
     all
 }
 
+/// Errors of one part of the scores are one standard error rms, and there are as many as are needed.
+fn assert_as_stated(of: &str, all: &[[Vec<f64>; 2]], part: usize, need: usize) {
+    let scores: Vec<f64> = all.iter().flat_map(|of| of[part].iter().copied()).collect();
+    let rms = (scores.iter().map(|score| score * score).sum::<f64>() / scores.len() as f64).sqrt();
+    println!("{of} off by {rms:.3} standard errors rms, {} terms", scores.len());
+    assert!(scores.len() >= need, "{of}: {}", scores.len());
+    assert!((0.8..=1.1).contains(&rms), "{of}: {rms}");
+}
+
 #[test]
 fn terms_are_off_by_what_their_standard_errors_say() {
     for (place, programme, on_rig) in PLACES {
@@ -79,11 +88,7 @@ fn terms_are_off_by_what_their_standard_errors_say() {
             .map(|seed| scores(&calibrated(&recording(seed, programme, true), on_rig)))
             .collect();
         for (part, name) in ["biases", "scales"].into_iter().enumerate() {
-            let scores: Vec<f64> = all.iter().flat_map(|of| of[part].iter().copied()).collect();
-            let rms = (scores.iter().map(|score| score * score).sum::<f64>() / scores.len() as f64).sqrt();
-            println!("{place}: {name} off by {rms:.3} standard errors rms, {} terms", scores.len());
-            assert!(scores.len() >= 60, "{place}: {} of {name}", scores.len());
-            assert!((0.8..=1.1).contains(&rms), "{place}, {name}: {rms}");
+            assert_as_stated(&format!("{place}: {name}"), &all, part, 60);
         }
     }
 }
@@ -205,11 +210,7 @@ fn a_session_of_a_device_finds_terms_of_temperature_within_its_own_errors() {
         .map(|seed| scores_of_session(&recording(seed, Programme::Full, true)))
         .collect();
     for (part, name) in ["biases", "scales"].into_iter().enumerate() {
-        let scores: Vec<f64> = all.iter().flat_map(|of| of[part].iter().copied()).collect();
-        let rms = (scores.iter().map(|score| score * score).sum::<f64>() / scores.len() as f64).sqrt();
-        println!("on a device: {name} off by {rms:.3} standard errors rms, {} terms", scores.len());
-        assert!(scores.len() >= 30, "{} of {name}", scores.len());
-        assert!((0.8..=1.1).contains(&rms), "{name}: {rms}");
+        assert_as_stated(&format!("on a device: {name}"), &all, part, 30);
     }
 }
 

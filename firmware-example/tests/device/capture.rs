@@ -106,6 +106,18 @@ pub(super) fn outcomes(reply: &Reply<'_>) -> [CaptureOutcome; 3] {
     }
 }
 
+/// The same session without a device.
+pub(super) fn session_of(samples: &[RawSample]) -> Session<38, 4, 64> {
+    let mut session = Session::new(task().settings().expect("possible"));
+    for sample in samples {
+        task().push(&mut session, sample);
+        session.work();
+    }
+    session.finish();
+    while session.work() {}
+    session
+}
+
 #[test]
 fn raw_samples_end_in_the_record_that_the_same_session_gives_elsewhere() {
     let mut memory = BenchMemory::new();
@@ -124,13 +136,7 @@ fn raw_samples_end_in_the_record_that_the_same_session_gives_elsewhere() {
     let store = Request::Store { replace: false };
     assert_eq!(bench.ask(&store, |reply| format!("{reply:?}")), "Stored { sequence: 1 }");
 
-    let mut session = Session::<38, 4, 64>::new(task().settings().expect("possible"));
-    for sample in &samples {
-        task().push(&mut session, sample);
-        session.work();
-    }
-    session.finish();
-    while session.work() {}
+    let session = session_of(&samples);
     let units = task().sensors[0].units(record::Sensor::Accelerometer);
     let here = session.better(record::Sensor::Accelerometer, &units, None).expect("accepted");
     let there = bench.ask(&Request::GetRecord, |reply| match reply {

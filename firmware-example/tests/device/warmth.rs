@@ -3,12 +3,11 @@
 use imucal_core::{
     link::{CaptureOutcome, Reply, Request},
     record,
-    session::Session,
 };
 
 use crate::{
     bench::{Bench, BenchMemory, Counting, SERIAL},
-    capture::{fault, finish, outcomes, send, state_of, task, tumble},
+    capture::{fault, finish, outcomes, send, session_of, state_of, task, tumble},
     nor::Nor,
 };
 
@@ -33,13 +32,7 @@ fn a_session_that_warms_and_cools_ends_in_the_terms_that_it_gives_elsewhere() {
         Reply::Record(bytes) => record::decode(bytes).expect("whole"),
         other => panic!("{other:?}"),
     });
-    let mut session = Session::<38, 4, 64>::new(task().settings().expect("possible"));
-    for sample in &samples {
-        task().push(&mut session, sample);
-        session.work();
-    }
-    session.finish();
-    while session.work() {}
+    let session = session_of(&samples);
     let units = task().sensors[0].units(record::Sensor::Accelerometer);
     let here = session.better_at_temperatures(record::Sensor::Accelerometer, &units, None);
     assert_eq!(there.acc, Some(here.expect("accepted")));

@@ -26,6 +26,8 @@ use crate::{scalar::Scalar, solver::gauge::bit, temperature::TemperatureTerms};
 
 /// The unit of δ, K.
 pub const UNIT: f64 = 10.0;
+/// Width of a block of temperatures that is held out to see whether terms predict it, K.
+pub const BLOCK: f64 = 5.0;
 /// Terms of temperature: three each of β, s, β₂ and s₂.
 pub const THERMAL: usize = 12;
 

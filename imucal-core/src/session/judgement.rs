@@ -182,8 +182,7 @@ fn list<V, const R: usize>(values: impl Iterator<Item = V>) -> Vec<V, R> {
 }
 
 /// The covariance that is stated: of the residuals' variance, with that of white noise counted as [`PRIOR`] more of them where it
-/// is known, and wider by what few residuals leave open: 1.96 standard errors are the 95 % of Student's t (to its second order in
-/// 1/ν, Fisher and Cornish 1960).
+/// is known, and wider by what few residuals leave open.
 #[inline]
 fn stated(fit: &Fit, white: Option<f32>) -> Option<SMatrix<f32, 9, 9>> {
     let variance = fit.solver.variance()?;
@@ -191,8 +190,15 @@ fn stated(fit: &Fit, white: Option<f32>) -> Option<SMatrix<f32, 9, 9>> {
     let (known, weight) = white.map_or((0.0, 0.0), |white| (white, PRIOR));
     let freedom = own + weight;
     let pooled = (variance * own + known * weight) / freedom;
-    let wider = 1.0 + 1.21 / freedom + 1.44 / (freedom * freedom);
+    let wider = wider(freedom);
     fit.solver.factor().covariance(pooled * wider * wider)
+}
+
+/// By how much standard errors of so many degrees of freedom are wider, so that 1.96 of them are the 95 % of Student's t (to its second
+/// order in 1/ν, Fisher and Cornish 1960).
+#[inline]
+pub(super) fn wider(freedom: f32) -> f32 {
+    1.0 + 1.21 / freedom + 1.44 / (freedom * freedom)
 }
 
 /// Raw length of a vector of some norm: that of a gain of the same size in all directions.

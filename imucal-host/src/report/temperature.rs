@@ -2,16 +2,12 @@
 
 use std::fmt::{self, Write};
 
+use imucal_core::model::thermal::BLOCK;
+
 use super::measure::{measure, plain};
 use crate::calibrate::{
     FitSummary,
-    temperature::{
-        TemperatureFinding, Terms,
-        evidence::CHANCE,
-        finding::Part,
-        groups::Group,
-        ladder::{BLOCK, Tried},
-    },
+    temperature::{TemperatureFinding, Terms, evidence::CHANCE, finding::Part, groups::Group, ladder::Tried},
 };
 
 /// Writes what was found of a sensor's temperature; nothing where it was not looked for.

@@ -8,7 +8,7 @@ use crate::{
         Model, RowSink,
         norm::NormModel,
         parameterisation::{ENTRIES, FULL},
-        thermal::{ThermalForm, ThermalModel, UNIT, UPPER_TRIANGULAR_LINEAR},
+        thermal::{BLOCK, ThermalForm, ThermalModel, UNIT, UPPER_TRIANGULAR_LINEAR},
     },
     observation::ShellPoint,
     record::Sensor,
@@ -25,8 +25,6 @@ pub(super) type Theta = SVector<f32, P>;
 const GAIN: u32 = 0b11_1111;
 const BIAS_TERMS: u32 = 0b111 << 9;
 const SCALE_TERMS: u32 = 0b111 << 12;
-/// Width of a block of temperatures that is held out, K.
-const BLOCK: f32 = 5.0;
 
 /// Terms that are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -141,7 +139,7 @@ impl<const N: usize> Evidence<N> {
 
     fn block(&self, at: usize) -> u8 {
         let change = self.changes.get(at).copied().unwrap_or(0.0);
-        ((change * UNIT as f32 + self.reference - self.least) / BLOCK) as u8
+        ((change * UNIT as f32 + self.reference - self.least) / BLOCK as f32) as u8
     }
 
     /// Blocks of temperatures, up to the last.

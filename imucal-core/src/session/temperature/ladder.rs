@@ -7,7 +7,7 @@ use super::evidence::{Evidence, FORM, Groups, P, Part, Theta};
 use crate::{
     accept::{f_score::f_score, outlier},
     model::{Model, SquaredSum},
-    session::evidence::Used,
+    session::{evidence::Used, judgement::wider},
     solver::{LevenbergMarquardt, lm::Settings},
     temperature::TemperatureTerms,
 };
@@ -234,7 +234,7 @@ impl<const N: usize> Ladder<N> {
     pub(super) fn covariance(&self) -> Option<SMatrix<f32, P, P>> {
         let parameters = self.evidence.parameters(self.trial.groups);
         let freedom = self.evidence.rows().checked_sub(parameters).filter(|left| *left > 0)? as f32;
-        let wider = 1.0 + 1.21 / freedom + 1.44 / (freedom * freedom);
+        let wider = wider(freedom);
         self.solver.factor().covariance(self.solver.factor().squared_sum() / freedom * wider * wider)
     }
 }

@@ -18,10 +18,7 @@ use crate::calibrate::fit::{
     report::FitReport,
     rows::influence,
 };
-use imucal_core::model::thermal::UNIT;
-
-/// Width of a block of temperatures that is held out, K.
-pub const BLOCK: f64 = 5.0;
+use imucal_core::model::thermal::{BLOCK, UNIT};
 
 /// What became of a group.
 #[derive(Clone, Copy, Debug, PartialEq)]
