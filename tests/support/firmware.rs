@@ -180,7 +180,9 @@ fn cargo(verb: &str, board: Board, image: &str, features: &[&str]) -> Command {
         .args(["--features", &features.join(",")])
         .arg("--target-dir")
         .arg(target_directory())
-        .env_remove("RUSTFLAGS");
+        .env_remove("RUSTFLAGS")
+        // Built by parts, an image has other sizes and other names at its addresses.
+        .env("CARGO_INCREMENTAL", "0");
     toolchain(&mut command);
     command
 }
