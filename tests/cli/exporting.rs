@@ -56,13 +56,13 @@ fn a_target_without_what_it_needs_is_a_refusal() {
         .telling(&["imucal-diagnosis/1"]);
 }
 
-/// Draws units and prints mean and covariance of the entries that were estimated.
+/// Draws units and prints the standard deviations of all entries, and the covariance of those that were estimated together.
 const DRAW: &str = "import json, sys, numpy as np, unit
 kind, count = sys.argv[1], int(sys.argv[2])
 rng = np.random.default_rng(1)
 drawn = [unit.sample_unit(rng)[kind] for _ in range(count)]
-all = np.array([np.concatenate([np.ravel(t['gain']), t['bias']]) for t in drawn])[:, unit.UNIT[kind]['entries']]
-print(json.dumps([all.mean(axis=0).tolist(), np.cov(all.T).tolist()]))";
+all = np.array([np.concatenate([np.ravel(t['gain']), t['bias']]) for t in drawn])
+print(json.dumps([all.std(axis=0).tolist(), np.cov(all[:, unit.UNIT[kind]['entries']].T).tolist()]))";
 
 #[test]
 fn units_that_are_drawn_vary_together_as_the_errors_do() {
@@ -81,7 +81,14 @@ fn units_that_are_drawn_vary_together_as_the_errors_do() {
             .output()
             .expect("it runs");
         assert!(drawn.status.success(), "{}", String::from_utf8_lossy(&drawn.stderr));
-        let [_, drawn]: [Value; 2] = serde_json::from_slice(&drawn.stdout).expect("JSON");
+        let [stds, drawn]: [Value; 2] = serde_json::from_slice(&drawn.stdout).expect("JSON");
+        // A gyroscope's bias is of its rests, and not among the entries of its covariance.
+        let (gain, bias) = (&found["sensors"][kind]["gain_std"], &found["sensors"][kind]["bias_std"]);
+        for entry in 0..12 {
+            let std = if entry < 9 { &gain[entry / 3][entry % 3] } else { &bias[entry - 9] };
+            let (drawn, stated) = (stds[entry].as_f64().expect("a number"), std.as_f64().expect("a number"));
+            assert!((drawn - stated).abs() <= 0.05 * stated, "{kind} {entry}: {drawn} of {stated}");
+        }
         let stated = &found["sensors"][kind]["covariance"];
         let entry = |of: &Value, i: usize, j: usize| of[i][j].as_f64().expect("a number");
         let count = stated.as_array().expect("rows").len();

@@ -103,6 +103,10 @@ impl Sensor {
         let entries: Vec<u8> = self.covariance_of?.iter().map(place).collect::<Option<_>>()?;
         let rows: Vec<Vec<f64>> =
             self.covariance?.into_iter().map(|row| row.into_iter().collect()).collect::<Option<_>>()?;
+        let repeated = entries.iter().enumerate().any(|(at, entry)| entries[..at].contains(entry));
+        if repeated {
+            return None;
+        }
         let square = rows.len() == entries.len() && rows.iter().all(|row| row.len() == entries.len());
         let covariance = square.then(|| DMatrix::from_fn(entries.len(), entries.len(), |i, j| rows[i][j]))?;
         Some(EntryCovariance { entries, covariance, gain: self.gain?, bias: self.bias? })
