@@ -34,7 +34,7 @@ impl<T: Scalar> Moments<T> {
         self.take(sample);
     }
 
-    /// [`Self::push`] where every sample of a device passes: the call alone would be a sixth of it.
+    /// [`Self::push`] where every sample of a device passes, without the cost of a call.
     #[inline(always)]
     pub(crate) fn take(&mut self, sample: &Vector3<T>) {
         self.count = self.count.saturating_add(1);

@@ -14,6 +14,9 @@ use crate::{
     triad::Triad,
 };
 
+/// What a difference of temperature takes off the likeness of two rests, per K²: for 10 K as much as 30° between their directions.
+const BY_WARMTH: f32 = 1.34e-3;
+
 /// A turn, as it is kept.
 #[derive(Clone, Copy, Debug)]
 struct KeptTurn<const B: usize> {
@@ -155,10 +158,10 @@ impl<const B: usize> Pose<B> {
         self.acc / libm::sqrtf(self.acc.norm_squared())
     }
 
-    /// How near two rests are: the cosine between their directions, less 1 − cos 30° for 10 K between them, as its square.
+    /// How near two rests are: the cosine between their directions, less what temperatures apart take off it.
     fn likeness(&self, other: &Self) -> f32 {
         let apart = self.temperature - other.temperature;
-        let warmth = if apart.is_finite() { 1.34e-3 * apart * apart } else { 0.0 };
+        let warmth = if apart.is_finite() { BY_WARMTH * apart * apart } else { 0.0 };
         self.direction().dot(&other.direction()) - warmth
     }
 

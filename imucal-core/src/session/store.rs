@@ -13,6 +13,7 @@ use crate::{
     accept::{Refusal, relative_error},
     fit::Units,
     record::{Sensor, TriadRecord},
+    temperature::TemperatureTerms,
     triad::Triad,
 };
 
@@ -49,9 +50,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         estimate.verdict.map_err(NotStored::Refused)?;
         let mut new = estimate.record(model_of(sensor), units);
         // What warmth does is not seen here, and stays as it is known.
-        let known =
-            stored.filter(|stored| stored.unit_in == new.unit_in).and_then(|stored| stored.temperature);
-        new.temperature = known.map(|terms| terms.from_reference(self.poses.temperature()));
+        new.temperature = known_terms(&new, stored, self.poses.temperature());
         self.surer(sensor, new, stored)
     }
 
@@ -85,6 +84,16 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             }
         }
     }
+}
+
+/// Terms of temperature of the `stored` calibration, from a reference temperature, °C, on; `None` without any, or in another raw unit.
+pub(super) fn known_terms(
+    new: &TriadRecord,
+    stored: Option<&TriadRecord>,
+    reference: f32,
+) -> Option<TemperatureTerms<f32>> {
+    let known = stored.filter(|stored| stored.unit_in == new.unit_in)?.temperature?;
+    Some(known.from_reference(reference))
 }
 
 /// Name of the model that a session fits.

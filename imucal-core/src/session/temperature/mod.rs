@@ -27,7 +27,7 @@ use super::{
     Session,
     evidence::Used,
     fitting::acc_limits,
-    store::{NotStored, model_of},
+    store::{NotStored, known_terms, model_of},
 };
 use crate::{
     accept::Limits,
@@ -159,7 +159,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     }
 
     /// A sensor's calibration with the terms of temperature that a fit has kept, for the record, if it is accepted and surer than the
-    /// one `stored`; without such terms that of [`Self::better`].
+    /// one `stored`; without such terms that of [`Self::better`]. Terms that the rests do not show are those of the stored one.
     ///
     /// # Errors
     ///
@@ -186,7 +186,18 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
                 estimate.summary.record(&triad, &std, model_of(sensor), units)
             }
         };
-        new.temperature = Some(warm.terms.in_unit(units.per_unit));
+        let mut terms = warm.terms.in_unit(units.per_unit);
+        // Those that the rests do not show stay as they are known.
+        if let Some(known) = known_terms(&new, stored, terms.reference) {
+            let groups = fit.ladder.kept().unwrap_or(Groups::NONE);
+            if !groups.has(Groups::BIAS) {
+                terms.bias_slope = known.bias_slope;
+            }
+            if !groups.has(Groups::SCALE) {
+                terms.scale_slope = known.scale_slope;
+            }
+        }
+        new.temperature = Some(terms);
         self.surer(sensor, new, stored)
     }
 }

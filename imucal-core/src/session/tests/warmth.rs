@@ -154,3 +154,23 @@ fn a_later_session_of_one_temperature_keeps_the_terms_of_the_record() {
     let other = Units { raw: RawUnit::MetrePerSecondSquared, ..UNITS };
     assert_eq!(later.better(Sensor::Accelerometer, &other, Some(&vague)).expect("surer").temperature, None);
 }
+
+#[test]
+fn a_warm_session_keeps_the_terms_of_the_record_that_rests_do_not_show() {
+    let (_, session) = session(5, hill, true);
+    let mut fit = session.warmth(Sensor::Gyroscope).expect("temperatures");
+    while fit.work() {}
+    let units = Units { calibrated: RawUnit::RadianPerSecond, ..UNITS };
+    let alone = session.better_warm(Sensor::Gyroscope, &fit, &units, None).expect("accepted");
+    assert_eq!(alone.temperature.expect("terms").scale_slope, [0.0; 3]);
+    let known = TemperatureTerms { reference: 27.0, bias_slope: [9.0; 3], scale_slope: [1e-4; 3] };
+    let vague = TriadRecord {
+        temperature: Some(known),
+        quality: FitQuality { bias_std: [1e3; 3], ..alone.quality },
+        ..alone.clone()
+    };
+    let new = session.better_warm(Sensor::Gyroscope, &fit, &units, Some(&vague)).expect("surer");
+    let (terms, own) = (new.temperature.expect("terms"), alone.temperature.expect("terms"));
+    assert_eq!((terms.reference, terms.bias_slope), (own.reference, own.bias_slope));
+    assert_eq!(terms.scale_slope, known.from_reference(own.reference).scale_slope);
+}
