@@ -1,13 +1,15 @@
 //! Recordings by an independent simulator whose effects are known: the ladders climb where there is something to
 //! climb for, and nowhere else.
 
+use imucal_core::record::Date;
 use imucal_host::{
     calibrate::{
         Calibration, Options, calibrate,
         fit::compare::{Comparison, SIGNIFICANT, Step},
-        outcome::RigFindings,
+        outcome::{RigFindings, SensorOutcome},
     },
     recording::{Recording, SensorKind},
+    store::StoredCalibration,
 };
 use imucal_tests::data;
 use nalgebra::Vector3;
@@ -122,7 +124,7 @@ fn a_cubic_term_is_found_and_chosen() {
 }
 
 #[test]
-fn a_cubic_term_is_reported_with_what_a_record_leaves_of_it() {
+fn a_cubic_term_is_reported_and_stored() {
     let Some(folder) = data::folder() else { return };
     let recording = Recording::read(&folder.join("blind/open-04.csv.gz")).expect("a good recording");
     let options = Options {
@@ -132,15 +134,20 @@ fn a_cubic_term_is_reported_with_what_a_record_leaves_of_it() {
         ..Options::default()
     };
     let calibration = calibrate(&recording, &options, &|_| {});
-    let higher = findings(&calibration, SensorKind::Acc).higher_order.as_ref().expect("estimated");
-    let names: Vec<_> = higher.terms.iter().map(|(name, ..)| *name).collect();
+    let fit = calibration.sensor(SensorKind::Acc).and_then(SensorOutcome::accepted).expect("accepted");
+    let found = fit.nonlinear.as_ref().expect("estimated");
+    let names: Vec<_> = found.by_kind().map(|(name, ..)| name).collect();
     assert_eq!(names, ["quadratic", "cubic"]);
-    let (_, cubic, std) = &higher.terms[1];
-    assert!(cubic.z > 20.0 * std.z && cubic.x < 4.0 * std.x && cubic.y < 4.0 * std.y, "{cubic} ± {std}");
+    let ([x, y, z], std) = (found.terms.cubic, found.std.cubic);
+    assert!(z > 20.0 * std[2] && x < 4.0 * std[0] && y < 4.0 * std[1], "{found:?}");
     // The cube of gravity at a face, and the gain.
-    assert!((higher.uncorrected / (cubic.z * 9.8f64.powi(3)) - 1.0).abs() < 0.1, "{}", higher.uncorrected);
+    assert!((found.largest / (z * 9.8f64.powi(3)) - 1.0).abs() < 0.1, "{}", found.largest);
+    let raw = fit.raw_nonlinear().expect("estimated");
+    let stored = StoredCalibration::of(&calibration, Date::from_days(20_000));
+    let held = stored.acc.as_ref().and_then(|acc| acc.nonlinearity).expect("stored");
+    assert_eq!((held.cubic, held.cubic_std, held.range), (raw.terms.cubic, raw.std.cubic, raw.range));
     let table = imucal_host::report::table::table(&calibration);
-    assert!(table.contains("NOT stored") && table.contains("for a device use acc=I14"), "{table}");
+    assert!(table.contains("nonlinear terms up to") && table.contains("    cubic ["), "{table}");
 }
 
 #[test]

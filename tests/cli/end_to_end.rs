@@ -3,7 +3,7 @@
 use imucal_host::calibrate::{Options, calibrate};
 use imucal_host::recording::{Recording, SensorKind};
 
-use super::{Folder, names};
+use super::{Folder, imucal, names};
 
 #[test]
 fn the_demo_names_every_file_it_writes_and_all_commands_take_them() {
@@ -46,6 +46,31 @@ fn the_same_recording_calibrates_to_what_the_demo_wrote() {
     ] {
         assert!(folder.bytes(again) == folder.bytes(demo), "{again} is not {demo}");
     }
+}
+
+#[test]
+fn nonlinear_terms_of_a_rig_s_fit_are_written_shown_applied_and_verified() {
+    let folder = Folder::new();
+    let bent = folder.path("bent.csv");
+    let bent = bent.to_str().expect("a path in UTF-8");
+    imucal(&["simulate", "--out", bent, "--effect", "acc.scale_cubic", "--seed", "5"]).with(0);
+    let plain = folder.run("calibrate bent.csv").with(0);
+    plain.printing(&["acc: the poses contradict I14: I20 adds cubic terms", "use --model acc=I20"]);
+    folder
+        .run("calibrate bent.csv --model acc=I20 --out terms.toml --record cal.bin --json cal.json")
+        .with(0)
+        .printing(&["nonlinear terms up to", "cubic [1/counts²]: x"]);
+    for name in ["cal.bin", "terms.toml"] {
+        folder
+            .run(&format!("inspect {name}"))
+            .with(0)
+            .printing(&["nonlinear terms up to", "cubic [1/counts²]: x"]);
+        folder.run(&format!("verify bent.csv --calibration {name}")).with(0).printing(&["equivalent"]);
+    }
+    let json: serde_json::Value = serde_json::from_str(&folder.text("cal.json")).expect("JSON");
+    let acc = &json["sensors"]["acc"];
+    assert!(acc["nonlinear"]["range"].as_f64().is_some_and(|range| range > 1000.0), "{acc}");
+    assert_eq!(acc["rig"]["higher_order"]["stored"], true);
 }
 
 #[test]

@@ -95,6 +95,8 @@ pub enum Quantity {
     Residual,
     /// Order and sign of the axes, as the code of a signed permutation: 8 · order + signs; 0 is as it ought to be.
     Axes,
+    /// Slope of the nonlinear terms over the range that they were found in.
+    Slope,
 }
 
 impl Refusal {
@@ -167,6 +169,9 @@ impl fmt::Display for Refusal {
             ),
             Self::Implausible { what: Quantity::Axes, value, .. } => {
                 write!(f, "the axes are in another order or of another sign (code {value:.0}, 0 expected)")
+            }
+            Self::Implausible { what: Quantity::Slope, value, limit } => {
+                write!(f, "the nonlinear terms reach a slope of {value:.3}, the limit is {limit}")
             }
             Self::NotFinite => write!(f, "a figure is infinite or NaN"),
         }

@@ -19,6 +19,7 @@ pub mod handedness;
 pub(crate) mod inertial;
 pub mod known_attitudes;
 pub mod mag;
+pub mod nonlinear_terms;
 pub mod outcome;
 pub mod request;
 pub mod residuals;

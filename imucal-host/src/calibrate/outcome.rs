@@ -15,6 +15,7 @@ use super::{
         alignment::Alignment, compare::Comparison, gyr_rig_fit::MotionFit, least_squares::dynamic,
         report::FitReport, rig_fit::RigFit, search::Search,
     },
+    nonlinear_terms::NonlinearFinding,
     suspicion::{Status, Suspicion},
     temperature::{TemperatureFinding, Terms, WarmTriad},
     thresholds::SegmentationReport,
@@ -173,6 +174,8 @@ pub struct FitSummary {
     pub search: Option<Search>,
     /// How bias and scale follow the temperature; `None` where the recording has none, or it was not asked for.
     pub temperature: Option<TemperatureFinding>,
+    /// Quadratic, cubic and cross terms, where the model has them.
+    pub nonlinear: Option<NonlinearFinding>,
 }
 
 /// What a fit on a rig found of the machine: reported, and never stored in a sensor's record.
@@ -188,19 +191,8 @@ pub struct RigFindings {
     pub not_told: Vec<String>,
     /// How a fit against attitudes was made, in words.
     pub notes: Vec<String>,
-    /// Terms beyond gain and bias, where they were estimated.
-    pub higher_order: Option<HigherOrder>,
     /// The gyroscope's g-sensitivity, table axes in, raw rad/s per m/s², with standard errors, where it was estimated.
     pub g_sensitivity: Option<(Matrix3<f64>, Matrix3<f64>)>,
-}
-
-/// Terms that a record has no room for.
-#[derive(Clone, Debug)]
-pub struct HigherOrder {
-    /// Name, value on each axis and standard errors; 1/SI, cubic ones 1/SI².
-    pub terms: Vec<(&'static str, Vector3<f64>, Vector3<f64>)>,
-    /// Most that gain and bias alone leave of them at a pose, calibrated unit.
-    pub uncorrected: f64,
 }
 
 /// How a bias moved from rest to rest.
@@ -279,6 +271,7 @@ impl FitSummary {
             alignment: None,
             search: None,
             temperature: None,
+            nonlinear: None,
         }
     }
 
@@ -310,6 +303,11 @@ impl FitSummary {
             ..terms
         };
         self.terms().map(|(terms, std)| (scaled(terms, per), scaled(std, per.abs())))
+    }
+
+    /// Nonlinear terms of raw values in the recording's own unit, and their standard errors.
+    pub fn raw_nonlinear(&self) -> Option<NonlinearFinding> {
+        self.nonlinear.as_ref().map(|found| found.in_unit(self.nominal.per_unit))
     }
 
     /// The calibration of raw values in the recording's own unit.

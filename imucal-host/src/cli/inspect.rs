@@ -17,6 +17,7 @@ use crate::{
     report::{
         measure::{percent, plain, rounded},
         table::{parameters, words},
+        terms::{write_nonlinearity, write_temperature},
         watch,
     },
     store::{StoredTriad, watch_file},
@@ -94,6 +95,16 @@ fn print_triad(kind: SensorKind, triad: &StoredTriad) -> anyhow::Result<()> {
         rounded(triad.condition, 1),
         percent(triad.coverage)
     );
+    let mut terms = String::new();
+    if let Some(warm) = &triad.temperature {
+        write_temperature(&mut terms, warm, triad.unit_in)?;
+    }
+    if let Some(bent) = &triad.nonlinearity {
+        write_nonlinearity(&mut terms, bent, triad.unit_in)?;
+    }
+    if !terms.is_empty() {
+        output::text(&terms)?;
+    }
     if let Some(own) = &triad.provenance {
         say!("  made on {}, serial {}", own.date, or_unknown(&own.serial));
     }

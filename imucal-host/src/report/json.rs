@@ -7,7 +7,8 @@ use crate::{
     calibrate::{
         Calibration, FitSummary, SegmentationReport, SensorOutcome,
         fit::{alignment::Alignment, compare::Comparison, search::Search},
-        outcome::{HigherOrder, RigFindings, entry_name},
+        nonlinear_terms::NonlinearFinding,
+        outcome::entry_name,
         temperature::{TemperatureFinding, Terms, finding::Part},
     },
     recording::SensorKind,
@@ -80,7 +81,7 @@ fn fit_value(kind: SensorKind, fit: &FitSummary) -> Value {
         SensorKind::Gyr => "rad".into(),
         _ => fit.unit_out.to_string(),
     };
-    let rig = rig(kind, fit.rig.as_ref());
+    let rig = rig(kind, fit);
     json!({
         "gain": rows(&triad.gain),
         "bias": vector(&triad.bias),
@@ -108,6 +109,7 @@ fn fit_value(kind: SensorKind, fit: &FitSummary) -> Value {
         "alignment": fit.alignment.as_ref().map(alignment),
         "search": fit.search.as_ref().map(search),
         "temperature": fit.temperature.as_ref().map(|found| temperature(found, fit.raw_terms())),
+        "nonlinear": fit.raw_nonlinear().as_ref().map(nonlinear),
         "rig": rig,
     })
 }
@@ -198,7 +200,8 @@ fn search(found: &Search) -> Value {
 }
 
 /// What belongs to the machine; null where it was not estimated.
-fn rig(kind: SensorKind, found: Option<&RigFindings>) -> Value {
+fn rig(kind: SensorKind, fit: &FitSummary) -> Value {
+    let found = fit.rig.as_ref();
     let not_told = found.map(|rig| &rig.not_told);
     match kind {
         SensorKind::Acc => {
@@ -208,7 +211,7 @@ fn rig(kind: SensorKind, found: Option<&RigFindings>) -> Value {
                 "tilt_y": tilt.map(|(tilt, _)| tilt[1]),
                 "tilt_std": tilt.map(|(_, std)| std),
                 "not_told": not_told,
-                "higher_order": found.and_then(|rig| rig.higher_order.as_ref()).map(higher_order),
+                "higher_order": fit.nonlinear.as_ref().map(higher_order),
             })
         }
         SensorKind::Gyr => found.map_or(Value::Null, |rig| {
@@ -234,14 +237,28 @@ fn rig(kind: SensorKind, found: Option<&RigFindings>) -> Value {
     }
 }
 
-/// Terms that are estimated and not stored.
-fn higher_order(found: &HigherOrder) -> Value {
+/// Nonlinear terms in nominal SI by kind, and what a reader of gain and bias alone leaves of them, calibrated unit.
+fn higher_order(found: &NonlinearFinding) -> Value {
     let terms: serde_json::Map<String, Value> = found
-        .terms
-        .iter()
-        .map(|(name, value, std)| ((*name).to_owned(), json!({"value": vector(value), "std": vector(std)})))
+        .by_kind()
+        .map(|(name, value, std)| (name.to_owned(), json!({"value": vector(&value), "std": vector(&std)})))
         .collect();
-    json!({"terms": terms, "stored": false, "uncorrected": found.uncorrected})
+    json!({"terms": terms, "stored": true, "uncorrected": found.largest})
+}
+
+/// Quadratic, cubic and cross terms of raw values, as TOML and record have them.
+fn nonlinear(found: &NonlinearFinding) -> Value {
+    let (terms, std) = (&found.terms, &found.std);
+    json!({
+        "range": found.range,
+        "quadratic": terms.quadratic,
+        "cubic": terms.cubic,
+        "cross": terms.cross,
+        "quadratic_std": std.quadratic,
+        "cubic_std": std.cubic,
+        "cross_std": std.cross,
+        "largest": found.largest,
+    })
 }
 
 fn comparison(comparison: &Comparison) -> Value {

@@ -12,4 +12,5 @@ pub mod noise;
 pub mod prose;
 pub mod table;
 pub mod temperature;
+pub mod terms;
 pub mod watch;

@@ -9,6 +9,7 @@ use super::{
     model,
     prose::hanging,
     temperature,
+    terms::write_nonlinearity,
 };
 use crate::{
     calibrate::{
@@ -16,6 +17,7 @@ use crate::{
         outcome::RigFindings,
     },
     recording::{SensorKind, unit::STANDARD_GRAVITY},
+    store::StoredNonlinearity,
 };
 
 /// Sensor's name in words.
@@ -230,6 +232,15 @@ fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {
         )?;
     }
     temperature::write(text, fit)?;
+    if let Some(found) = fit.raw_nonlinear() {
+        write_nonlinearity(text, &StoredNonlinearity::from(&found), fit.unit_in)?;
+        writeln!(
+            text,
+            "    they change a calibrated pose by up to {} {}",
+            plain(found.largest),
+            fit.unit_out
+        )?;
+    }
     if let Some(rig) = &fit.rig {
         write_rig(text, rig)?;
     }
@@ -259,18 +270,6 @@ fn write_rig(text: &mut String, rig: &RigFindings) -> fmt::Result {
                 (0..3).map(|k| measure(value[(row, k)] * per_g, std[(row, k)] * per_g)).collect();
             writeln!(text, "     {}", parts.join(", "))?;
         }
-    }
-    if let Some(higher) = &rig.higher_order {
-        for (name, value, std) in &higher.terms {
-            let parts: Vec<String> = (0..3).map(|k| measure(value[k], std[k])).collect();
-            writeln!(text, "  {name} terms of x, y, z in SI: {}", parts.join(", "))?;
-        }
-        writeln!(
-            text,
-            "  NOT stored, since TOML and record hold gain and bias alone: a device leaves errors of up to {} uncorrected; for \
-             a device use acc=I14, whose gain and bias absorb a part of these terms",
-            plain(higher.uncorrected)
-        )?;
     }
     for note in &rig.notes {
         writeln!(text, "  {note}")?;

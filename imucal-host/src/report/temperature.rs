@@ -4,10 +4,13 @@ use std::fmt::{self, Write};
 
 use imucal_core::model::thermal::BLOCK;
 
-use super::measure::{measure, plain};
-use crate::calibrate::{
-    FitSummary,
-    temperature::{TemperatureFinding, Terms, evidence::CHANCE, finding::Part, groups::Group, ladder::Tried},
+use super::{measure::plain, terms::write_temperature};
+use crate::{
+    calibrate::{
+        FitSummary,
+        temperature::{evidence::CHANCE, finding::Part, groups::Group, ladder::Tried},
+    },
+    store::StoredTemperature,
 };
 
 /// Writes what was found of a sensor's temperature; nothing where it was not looked for.
@@ -18,59 +21,11 @@ pub fn write(text: &mut String, fit: &FitSummary) -> fmt::Result {
         return writeln!(text, "    to do: {}", refusal.advice());
     }
     let (low, high) = found.span;
-    match fit.raw_terms() {
+    match StoredTemperature::of(fit) {
         None => writeln!(text, "  temperature: no terms are borne out from {low:.1} to {high:.1} °C")?,
-        Some((value, std)) => write_terms(text, fit, found, &value, &std)?,
+        Some(terms) => write_temperature(text, &terms, fit.unit_in)?,
     }
     found.parts.iter().try_for_each(|part| write_part(text, part))
-}
-
-fn write_terms(
-    text: &mut String,
-    fit: &FitSummary,
-    found: &TemperatureFinding,
-    value: &Terms,
-    std: &Terms,
-) -> fmt::Result {
-    let (low, high) = found.span;
-    let unit = fit.unit_in;
-    writeln!(
-        text,
-        "  temperature: gain and bias hold at {:.1} °C; from {low:.1} to {high:.1} °C",
-        found.reference
-    )?;
-    let span = high - low;
-    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        let (slope, error) = (value.linear.bias_slope[axis], std.linear.bias_slope[axis]);
-        if error > 0.0 {
-            let moved = plain((slope * span).abs());
-            let slope = measure(slope, error);
-            write!(text, "    bias of {name} moves {moved} {unit} over {span:.0} K ({slope} {unit}/K)")?;
-            write_quadratic(
-                text,
-                value.bias_quadratic[axis],
-                std.bias_quadratic[axis],
-                &format!("{unit}/K²"),
-            )?;
-            writeln!(text)?;
-        }
-        let (slope, error) = (value.linear.scale_slope[axis], std.linear.scale_slope[axis]);
-        if error > 0.0 {
-            let moved = plain((100.0 * slope * span).abs());
-            write!(
-                text,
-                "    scale of {name} moves {moved} % over {span:.0} K ({} 1/K)",
-                measure(slope, error)
-            )?;
-            write_quadratic(text, value.scale_quadratic[axis], std.scale_quadratic[axis], "1/K²")?;
-            writeln!(text)?;
-        }
-    }
-    Ok(())
-}
-
-fn write_quadratic(text: &mut String, value: f64, std: f64, unit: &str) -> fmt::Result {
-    if std > 0.0 { write!(text, ", and {} {unit}", measure(value, std)) } else { Ok(()) }
 }
 
 fn write_part(text: &mut String, part: &Part) -> fmt::Result {

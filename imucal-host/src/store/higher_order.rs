@@ -11,6 +11,7 @@ use super::{
     StoredTriad,
     record_form::{narrow, widen},
 };
+use crate::calibrate::nonlinear_terms::NonlinearFinding;
 
 /// What temperature terms were found from, and how well; see [`TemperatureQuality`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -56,6 +57,20 @@ pub struct StoredNonlinearity {
     pub cubic_std: [f64; 3],
     /// Standard errors of `cross`.
     pub cross_std: [[f64; 3]; 3],
+}
+
+impl From<&NonlinearFinding> for StoredNonlinearity {
+    fn from(found: &NonlinearFinding) -> Self {
+        Self {
+            range: found.range,
+            quadratic: found.terms.quadratic,
+            cubic: found.terms.cubic,
+            cross: found.terms.cross,
+            quadratic_std: found.std.quadratic,
+            cubic_std: found.std.cubic,
+            cross_std: found.std.cross,
+        }
+    }
 }
 
 impl StoredNonlinearity {

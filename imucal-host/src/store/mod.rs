@@ -346,14 +346,14 @@ impl StoredTriad {
             field_norm: fit.field_norm,
             provenance: None,
             temperature: StoredTemperature::of(fit),
-            nonlinearity: None,
+            nonlinearity: fit.raw_nonlinear().as_ref().map(StoredNonlinearity::from),
         }
     }
 }
 
 impl StoredTemperature {
     /// What a fit found of raw values' dependence on temperature; `None` where nothing is kept.
-    fn of(fit: &FitSummary) -> Option<Self> {
+    pub(crate) fn of(fit: &FitSummary) -> Option<Self> {
         let (terms, std) = fit.raw_terms()?;
         let (low, high) = fit.temperature.as_ref()?.span;
         let bent = std.bias_quadratic.iter().chain(&std.scale_quadratic).any(|error| *error > 0.0);

@@ -3,7 +3,7 @@
 use imucal_core::{
     accept::{self, Limits, Refusal},
     coverage::Coverage,
-    model::{rig::Pose, unified::UnifiedParameters},
+    model::unified::UnifiedParameters,
     triad::Triad,
 };
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -13,9 +13,9 @@ use crate::{
     calibrate::{
         Options,
         fit::{compare, rig_fit::RigFit},
+        nonlinear_terms::NonlinearFinding,
         outcome::{
-            Calibration, Estimates, Evidence, FitSummary, HigherOrder, Refused, RigFindings, SensorOutcome,
-            entry_name,
+            Calibration, Estimates, Evidence, FitSummary, Refused, RigFindings, SensorOutcome, entry_name,
         },
         temperature::{TemperatureFinding, Thermometry, poses as warm_poses},
     },
@@ -52,9 +52,8 @@ pub fn accelerometer(
     let Some(mut rung) = ladder::rung(name, &poses, down) else {
         return Some(too_few(SensorKind::Acc, name, &poses));
     };
-    if !tells_tilt(&rung.fit)
-        && let Some(lower) = ladder::rung("T12", &poses, down)
-    {
+    let level = tells_tilt(&rung.fit);
+    if !level && let Some(lower) = ladder::rung("T12", &poses, down) {
         calibration.warnings.push(format!(
             "acc: the poses do not distinguish the base's tilt from K; T12 is used instead of {name}, with the base taken as level"
         ));
@@ -63,11 +62,29 @@ pub fn accelerometer(
     let found = thermometry.map(|thermometry| warm(&mut rung, &poses, thermometry, down));
     let (finding, reduced) = found.unzip();
     let poses = reduced.flatten().unwrap_or(poses);
+    if level && !options.compare {
+        calibration.warnings.extend(contradicted(&rung, &poses, down));
+    }
     let mut outcome = outcome(SensorKind::Acc, &rung, &poses, sensor, gravity);
     if let Some(fit) = &mut outcome.fit {
         fit.temperature = finding;
     }
     Some(outcome)
+}
+
+/// A warning where a larger model of the ladder is borne out: terms that are there and are not estimated are in gain and
+/// bias, and the residual of a linear model does not show them where it is small.
+fn contradicted(rung: &Rung, poses: &Poses, down: Vector3<f64>) -> Option<String> {
+    let larger = ladder::ACCELEROMETER.iter().skip_while(|(name, _)| *name != rung.name).skip(1);
+    let larger = larger.filter_map(|(name, _)| ladder::rung(name, poses, down));
+    let own = ladder::rung(rung.name, poses, down)?;
+    let steps = std::iter::once(own.step()).chain(larger.map(|rung| rung.step())).collect();
+    let found = compare::climb(SensorKind::Acc, steps).filter(|found| found.chosen != rung.name)?;
+    let (name, better, why) = (rung.name, found.chosen, found.why);
+    Some(format!(
+        "acc: the poses contradict {name}: {why}; use --model acc={better}, which TOML and record store whole, or \
+         `imucal diagnose` where the rig itself may be the cause"
+    ))
 }
 
 /// What the poses say of temperature. Where terms are kept, the poses as they would be at the reference temperature, and
@@ -225,9 +242,7 @@ fn outcome(kind: SensorKind, rung: &Rung, poses: &Poses, sensor: &Triple, norm: 
         let coverage = Coverage::of(directions);
         let unit_out = Unit::of(kind)[0];
         let mut summary = summarise(&rung.fit, sensor, unit_out, triad, covariance, coverage.share);
-        if let Some(rig) = &mut summary.rig {
-            rig.higher_order = higher_order(&rung.fit, poses);
-        }
+        summary.nonlinear = NonlinearFinding::of(&rung.fit, poses);
         (summary, coverage)
     });
     let Some((summary, coverage)) = summary else {
@@ -285,7 +300,8 @@ fn judge(fit: &RigFit, summary: &FitSummary, coverage: &Coverage<f64>, norm: f64
     }
     accept::check_report(&fit.report.solver)?;
     accept::check_precision(summary.relative_error(norm), &limits)?;
-    accept::check_plausibility(&summary.triad, true, fit.report.rms / norm, &limits)
+    accept::check_plausibility(&summary.triad, true, fit.report.rms / norm, &limits)?;
+    summary.nonlinear.as_ref().map_or(Ok(()), |found| found.check(&limits))
 }
 
 /// The figures of a fit; `triad` and `covariance` are [`RigFit::triad`]'s.
@@ -327,24 +343,6 @@ fn findings(fit: &RigFit) -> RigFindings {
             .collect(),
         ..RigFindings::default()
     }
-}
-
-/// Quadratic, cubic and cross terms, and what a device leaves of them; `None` where none is estimated.
-fn higher_order(fit: &RigFit, poses: &Poses) -> Option<HigherOrder> {
-    let now = &fit.parameters;
-    let all =
-        [("quadratic", 23, now.quadratic), ("cubic", 26, now.cubic), ("cross-axis", 29, now.cross_product)];
-    let std = |from: u8| Vector3::from_fn(|k, _| fit.std(from + k as u8).unwrap_or(0.0));
-    let estimated = all.into_iter().filter(|(_, from, _)| fit.entries.contains(from));
-    let terms: Vec<_> = estimated.map(|(name, from, value)| (name, value, std(from))).collect();
-    let gain = now.sensitivity.try_inverse().filter(|_| !terms.is_empty())?;
-    let none = Vector3::zeros();
-    let affine = UnifiedParameters { quadratic: none, cubic: none, cross_product: none, ..*now };
-    let left = poses.poses.iter().map(|pose| {
-        let at = pose.rotations(&poses.axes);
-        (gain * (now.predict(&at) - affine.predict(&at))).norm()
-    });
-    Some(HigherOrder { terms, uncorrected: left.fold(0.0, f64::max) })
 }
 
 /// Name of an entry of the unified model.
