@@ -58,12 +58,17 @@ impl<T: Scalar> Moments<T> {
             return *self;
         }
         let (own, others, all) = (T::whole(self.count), T::whole(other.count), T::whole(count));
-        let apart = other.mean - self.mean;
-        Self {
-            count,
-            mean: self.mean + apart * (others / all),
-            squares: self.squares + other.squares + apart.component_mul(&apart) * (own * others / all),
-        }
+        let (share, spread) = (others / all, own * others / all);
+        // By components, as in `take`.
+        let axis = |mean: T, its: T, squares: T, its_squares: T| {
+            let apart = its - mean;
+            (mean + apart * share, squares + its_squares + apart * apart * spread)
+        };
+        let (m, n, q, r) = (&self.mean, &other.mean, &self.squares, &other.squares);
+        let (x, u) = axis(m.x, n.x, q.x, r.x);
+        let (y, v) = axis(m.y, n.y, q.y, r.y);
+        let (z, w) = axis(m.z, n.z, q.z, r.z);
+        Self { count, mean: Vector3::new(x, y, z), squares: Vector3::new(u, v, w) }
     }
 
     /// Samples taken in.

@@ -1,8 +1,15 @@
 //! What a session's samples and slices cost, at rest and in a turn.
 
-use core::{fmt::Write, mem::MaybeUninit};
+use core::{fmt::Write, hint::black_box, mem::MaybeUninit};
 
-use imucal_core::{observer::Sample, record::Sensor, rotation::exp};
+use imucal_core::{
+    observer::{
+        Sample,
+        inertial::{InertialObserver, Seen},
+    },
+    record::Sensor,
+    rotation::exp,
+};
 use nalgebra::{Matrix3, Vector3};
 
 use super::measured;
@@ -48,10 +55,22 @@ fn place() -> &'static mut Standalone {
     session.write(Standalone::new(Default::default()))
 }
 
+/// What finds a session's rests and turns, by itself.
+type Observers = InertialObserver<f32, 4>;
+
+#[inline(never)]
+fn observers() -> &'static mut Observers {
+    static mut OBSERVERS: MaybeUninit<Observers> = MaybeUninit::uninit();
+    #[expect(unsafe_code, reason = "memory of the observers, which stays off the stack")]
+    // SAFETY: this is called once, and nothing else knows the variable.
+    let observers = unsafe { &mut *(&raw mut OBSERVERS) };
+    observers.write(Observers::default())
+}
+
 /// Samples of a whole session in turn, each kind by itself; and the largest slice.
 #[inline(never)]
 pub(super) fn write(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
-    let session = place();
+    let (session, observers) = (place(), observers());
     let mut hand = Hand { noise: Noise(7), attitude: Matrix3::identity(), time: 0, temperature: 25.0 };
     let mut slice = 0;
     for pose in 0..POSES as u32 {
@@ -59,7 +78,7 @@ pub(super) fn write(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Resul
         hand.temperature = 25.0 + 2.5 * (pose % 12).min(12 - pose % 12) as f32;
         let turned = Vector3::new(0.9 - 0.1 * pose as f32, 0.5, 0.3 * (pose % 3) as f32);
         for (kind, count, rate) in [("rest", RESTING, Vector3::zeros()), ("turn", TURNING, turned)] {
-            let (mut inertial, mut field) = (0u32, 0u32);
+            let (mut inertial, mut field, mut observed) = (0u32, 0u32, 0u32);
             for _ in 0..count {
                 let (sample, measured) = hand.sample(&rate);
                 let before = watch.ticks();
@@ -71,9 +90,13 @@ pub(super) fn write(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Resul
                 slice = watch.ticks().wrapping_sub(after).max(slice);
                 inertial = inertial.wrapping_add(between.wrapping_sub(before));
                 field = field.wrapping_add(after.wrapping_sub(between));
+                let before = watch.ticks();
+                black_box(matches!(observers.push(&sample), Seen::Nothing));
+                observed = observed.wrapping_add(watch.ticks().wrapping_sub(before));
             }
             if pose == 15 {
                 writeln!(out, "session_{kind} ticks {inertial} for {count} stack 0")?;
+                writeln!(out, "observers_{kind} ticks {observed} for {count} stack 0")?;
                 writeln!(out, "session_field_{kind} ticks {field} for {count} stack 0")?;
             }
         }

@@ -139,20 +139,25 @@ impl<T: Scalar, const N: usize> CloudObserver<T, N> {
             }
             return Chosen::Near;
         }
-        let at = self.slots.iter().position(|slot| near(&slot.mean));
+        // What is near is not far enough apart either: one pass over the slots answers both.
+        let apart = self.apart * self.apart;
+        let first = self.slots.iter().position(|slot| squared_distance(&slot.mean, point) < apart);
+        let at = first.and_then(|first| {
+            let later = self.slots.get(first..)?.iter().position(|slot| near(&slot.mean))?;
+            first.checked_add(later)
+        });
         self.compared = Some((*point, at.and_then(|at| u8::try_from(at).ok())));
+        if first.is_none() {
+            return self.begin(point);
+        }
         if let Some(slot) = at.and_then(|at| self.slots.get_mut(at)) {
             slot.push(point);
-            return Chosen::Near;
         }
-        self.begin(point)
+        Chosen::Near
     }
 
-    /// A slot for a point, if it is far enough from all.
+    /// A slot for a point that is far enough from all.
     fn begin(&mut self, point: &Vector3<T>) -> Chosen {
-        if is_near(&self.slots, point, self.apart) {
-            return Chosen::Near;
-        }
         // Each time fewer slots stay, until there is one for this, or no distance is left that is finite.
         while self.slots.is_full() && self.apart.finite() {
             self.apart *= T::of(WIDER);

@@ -128,7 +128,7 @@ impl<T: Scalar, const B: usize> InertialObserver<T, B> {
             return self.turns.push(rate, T::zero());
         };
         let since = sample.time.wrapping_sub(last);
-        if sample.time < last || self.rests.gap().is_some_and(|gap| since > gap) {
+        if sample.time < last || since > self.rests.gap() {
             return self.interrupt();
         }
         let seconds = T::whole(u32::try_from(since).unwrap_or(u32::MAX)) * T::of(1e-6);

@@ -171,12 +171,10 @@ pub struct RestObserver<T: Scalar> {
     settings: RestSettings<T>,
     /// The quarter that goes on, and the last three whole ones.
     stretches: Ring<Stretch<T>>,
-    /// A quarter goes on.
-    begun: bool,
-    /// Time of the last sample and usual time between two, µs.
+    /// Time of the last sample, µs, and that at which the quarter ends; 0 where none goes on.
     last: u64,
-    interval: u64,
-    /// Time between two from which there is a gap, µs.
+    until: u64,
+    /// Time between two samples beyond which there is a gap, µs; the largest there is before the usual one is known.
     gap: u64,
     quarters: u32,
     /// Variance of the quietest window so far, (m/s²)².
@@ -198,10 +196,9 @@ impl<T: Scalar> RestObserver<T> {
         Self {
             settings,
             stretches: Ring::new(Stretch::new(0)),
-            begun: false,
             last: 0,
-            interval: 0,
-            gap: 0,
+            until: 0,
+            gap: u64::MAX,
             quarters: 0,
             quietest: None,
             rate: None,
@@ -217,12 +214,11 @@ impl<T: Scalar> RestObserver<T> {
     /// Takes in a sample of the quarter that goes on; false where it is of none. It is short, since it is for nearly all samples.
     #[inline]
     pub(super) fn goes_on(&mut self, sample: &Sample<T>) -> bool {
-        let now = self.stretches.now();
-        let since = sample.time.wrapping_sub(self.last);
-        if !self.begun || sample.time < self.last || sample.time.wrapping_sub(now.start) >= QUARTER {
+        if sample.time < self.last || sample.time >= self.until {
             return false;
         }
-        now.broken |= self.interval > 0 && since > self.gap;
+        let now = self.stretches.now();
+        now.broken |= sample.time.wrapping_sub(self.last) > self.gap;
         self.last = sample.time;
         now.push(sample);
         true
@@ -231,7 +227,7 @@ impl<T: Scalar> RestObserver<T> {
     /// Ends the quarter before a sample, and begins the next.
     #[inline(never)]
     pub(super) fn turn_over(&mut self, sample: &Sample<T>) -> Option<ObservedRest<T>> {
-        if !self.begun {
+        if self.until == 0 {
             self.begin(sample);
             return None;
         }
@@ -242,17 +238,17 @@ impl<T: Scalar> RestObserver<T> {
             return ended;
         };
         let whole = self.stretches.now();
-        whole.broken |= self.interval > 0 && since > self.gap;
+        whole.broken |= since > self.gap;
         whole.end = sample.time;
         let last = core::mem::replace(&mut self.last, sample.time);
         // A gap before this sample is none of the intervals of the quarter. A quarter of microseconds has less than 32 bits, of which
         // a device divides faster.
         let lasted = u32::try_from(last.saturating_sub(whole.start)).unwrap_or(u32::MAX);
         if let Some(interval) = lasted.checked_div(whole.rows.saturating_sub(1)) {
-            self.interval = interval.into();
-            self.gap = GAP.saturating_mul(self.interval);
+            self.gap = if interval > 0 { GAP.saturating_mul(interval.into()) } else { u64::MAX };
         }
         let ended = self.quarter();
+        self.until = sample.time.saturating_add(QUARTER);
         self.stretches.turn(Stretch::new(sample.time)).push(sample);
         ended
     }
@@ -260,8 +256,7 @@ impl<T: Scalar> RestObserver<T> {
     /// The rest that goes on, when no more samples come; what was gathered is forgotten, but not the quietest window.
     pub fn finish(&mut self) -> Option<ObservedRest<T>> {
         self.stretches.forget();
-        self.begun = false;
-        self.interval = 0;
+        (self.until, self.gap) = (0, u64::MAX);
         self.ended()
     }
 
@@ -290,9 +285,9 @@ impl<T: Scalar> RestObserver<T> {
         self.quarters
     }
 
-    /// Time between two samples beyond which there is a gap, µs; `None` before the usual one is known.
-    pub(super) fn gap(&self) -> Option<u64> {
-        (self.interval > 0).then_some(self.gap)
+    /// Time between two samples beyond which there is a gap, µs; the largest there is before the usual one is known.
+    pub(super) fn gap(&self) -> u64 {
+        self.gap
     }
 
     /// Usual rate at rest, rad/s; zero before the first rest.
@@ -313,7 +308,7 @@ impl<T: Scalar> RestObserver<T> {
         let first = self.stretches.now();
         *first = Stretch::new(sample.time);
         first.push(sample);
-        (self.begun, self.last) = (true, sample.time);
+        (self.last, self.until) = (sample.time, sample.time.saturating_add(QUARTER));
     }
 
     /// The quarter that went on is whole.

@@ -76,7 +76,7 @@ impl<T: Scalar> Default for ThermometerObserver<T> {
 }
 
 impl<T: Scalar> ThermometerObserver<T> {
-    /// Takes a reading, °C, of a time, µs. One that is not finite is to be left out.
+    /// Takes a reading, °C, of a time, µs; one that is not finite is left out.
     #[inline]
     pub fn push(&mut self, time: u64, reading: T) {
         match &mut self.last {
@@ -88,6 +88,9 @@ impl<T: Scalar> ThermometerObserver<T> {
     /// Another reading than before.
     #[inline(never)]
     fn change(&mut self, time: u64, reading: T) {
+        if !reading.finite() {
+            return;
+        }
         if let Some((last, value)) = self.last {
             let by = reading - value;
             let size = if by < T::zero() { -by } else { by };
@@ -174,6 +177,12 @@ mod tests {
     #[test]
     fn a_soak_that_a_coarse_thermometer_leaves_by_single_steps_is_not_stuck() {
         assert_eq!(ramp(|_, value| (value.min(40.0) / 0.5).round() * 0.5), None);
+    }
+
+    #[test]
+    fn a_reading_that_is_no_number_is_left_out() {
+        assert_eq!(ramp(|at, value| if at % 7 == 0 { f32::NAN } else { value }), None);
+        assert_eq!(ramp(|at, value| if at % 7 == 0 { f32::INFINITY } else { value }), None);
     }
 
     #[test]

@@ -137,7 +137,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
 
     /// Takes a sample in: nominal SI, sensor axes.
     pub fn push(&mut self, sample: &Sample<f32>) {
-        if let Some(temperature) = sample.temperature.filter(|value| value.is_finite()) {
+        if let Some(temperature) = sample.temperature {
             self.thermometer.push(sample.time, temperature);
         }
         let [acc, gyr, _] = self.settings.full_scale;
