@@ -25,11 +25,25 @@ pub fn quantum(values: &[Vector3<f64>], usable: &[bool]) -> Vector3<f64> {
 
 /// Each value once, ascending: a converter puts out few of them, so that they are found before they are sorted.
 fn distinct(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let all: HashSet<u64, BuildHasherDefault<BitHash>> = values.map(f64::to_bits).collect();
+    let mut all: HashSet<u64, BuildHasherDefault<BitHash>> = HashSet::default();
+    // Most samples repeat one of the last values, which a table with one place for each hash knows. No finite value has these bits.
+    let mut recent = vec![u64::MAX; 1 << RECENT];
+    for bits in values.map(f64::to_bits) {
+        let place = &mut recent[(bits.wrapping_mul(MIX) >> (64 - RECENT)) as usize];
+        if *place != bits {
+            *place = bits;
+            all.insert(bits);
+        }
+    }
     let mut sorted: Vec<f64> = all.into_iter().map(f64::from_bits).collect();
     sorted.sort_unstable_by(f64::total_cmp);
     sorted
 }
+
+/// Bits of a place among the last values.
+const RECENT: u32 = 12;
+/// See [`BitHash`].
+const MIX: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// A hash of a number's bits, by multiplication (Knuth, *The Art of Computer Programming* 3, 6.4).
 #[derive(Default)]
@@ -41,7 +55,7 @@ impl Hasher for BitHash {
     }
 
     fn write_u64(&mut self, bits: u64) {
-        let mixed = (self.0 ^ bits).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mixed = (self.0 ^ bits).wrapping_mul(MIX);
         // Both ends are looked at, and a product's lower bits know nothing of the upper ones.
         self.0 = mixed ^ (mixed >> 32);
     }

@@ -183,12 +183,13 @@ impl Scene<'_> {
             .filter_map(|make| {
                 let columns = make();
                 let score = match kind {
-                    SensorKind::Mag => test.test_in_blocks(&columns.values, &BLOCKS),
+                    SensorKind::Mag => {
+                        test.test_in_blocks(&columns.values, &BLOCKS, least_explained(columns.follows))
+                    }
                     _ => test.test(&columns.values, columns.values.ncols()),
                 };
                 Some(Tested::of(&columns, score?))
             })
-            .filter(|test| kind != SensorKind::Mag || test.score.explained > least_explained(test.follows))
             .collect();
         let (mut excess, mut turning) = (None, None);
         if kind == SensorKind::Acc {

@@ -93,9 +93,10 @@ impl ScoreTest {
     }
 
     /// Tests columns of residuals that are alike in time, by what is left over in blocks of neighbours, as many as
-    /// each of `blocks` says: the largest probability counts.
-    pub fn test_in_blocks(&self, columns: &DMatrix<f64>, blocks: &[usize]) -> Option<Score> {
-        let found = self.regress(&self.products(columns))?;
+    /// each of `blocks` says: the largest probability counts. `None` as well where they explain no more than `least` of the
+    /// squared residual: of long recordings the blocks take most of the time.
+    pub fn test_in_blocks(&self, columns: &DMatrix<f64>, blocks: &[usize], least: f64) -> Option<Score> {
+        let found = self.regress(&self.products(columns)).filter(|found| found.explained > least)?;
         let left = self.left(columns, &found);
         let chances: Option<Vec<f64>> =
             blocks.iter().map(|blocks| self.chance_in_blocks((columns, &left), &found, *blocks)).collect();
@@ -257,7 +258,7 @@ mod tests {
                     let (test, _) = parabola(0.0, 0.8, *seed);
                     let columns = DMatrix::from_fn(ROWS, 1, |row, _| libm::cos(row as f64 / 40.0));
                     let score =
-                        if blocks { test.test_in_blocks(&columns, &[20]) } else { test.test(&columns, 1) };
+                        if blocks { test.test_in_blocks(&columns, &[20], 0.0) } else { test.test(&columns, 1) };
                     score.unwrap().p < 0.01
                 })
                 .count()
