@@ -5,14 +5,20 @@ use std::{
     time::{Duration, Instant},
 };
 
-use imucal_core::{link::FitModel, record::Date};
-use imucal_host::recording::Recording;
+use firmware_example::RECORD_2;
+use imucal_core::{
+    corrector::FullCorrector,
+    link::FitModel,
+    record::{self, Date, HigherOrder},
+};
+use imucal_host::recording::{Recording, SensorKind};
 use imucal_tests::{
     coprocessor::{address, drilled, session},
     data,
     firmware::{BOARDS, ready},
     program, simulated,
 };
+use nalgebra::Vector3;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_imucal-under-test");
 #[test]
@@ -33,8 +39,34 @@ fn both_boards_fit_store_and_correct_as_this_machine_does() {
         assert_eq!(report.unwrap_or_else(|error| panic!("{error}")).refusal, None, "{}", board.core);
         assert_eq!(session.store_record(false).unwrap_or_else(|error| panic!("{error}")), 1);
         let stored = session.record().unwrap_or_else(|error| panic!("{error}")).expect("stored");
-        assert!(imucal_core::record::decode(&stored).is_ok_and(|record| record.acc.is_some()));
+        assert!(record::decode(&stored).is_ok_and(|record| record.acc.is_some()));
     }
+}
+
+#[test]
+fn a_record_of_higher_order_is_used_to_the_bit_and_refused_by_the_board_with_little_memory() {
+    if !ready() {
+        return;
+    }
+    let record = record::decode_as::<HigherOrder>(RECORD_2).expect("it is golden");
+    let corrector =
+        FullCorrector::<f32>::try_from(record.acc.as_ref().expect("it has one")).expect("gentle terms");
+    let raw: Vec<Vector3<f32>> = (0..60)
+        .map(|k| k as f32)
+        .map(|k| Vector3::new(27e3 + 180.0 * k, 38e3 - 170.0 * k, 31e3 + 9.0 * k))
+        .collect();
+    let temperature: Vec<f32> = (0..60).map(|k| 20.0 + 0.25 * k as f32).collect();
+    let [large, small, _] = BOARDS;
+    let mut board = session(large, None);
+    board.put_record(RECORD_2, false).unwrap_or_else(|error| panic!("{error}"));
+    let answers =
+        board.correct_at(SensorKind::Acc, &raw, &temperature).unwrap_or_else(|error| panic!("{error}"));
+    for ((raw, temperature), answer) in raw.iter().zip(&temperature).zip(&answers) {
+        let here = corrector.apply_at(raw, *temperature);
+        assert_eq!(answer.map(f32::to_bits), here.map(f32::to_bits), "{raw} at {temperature} °C");
+    }
+    let refused = session(small, None).put_record(RECORD_2, false).expect_err("a record of higher order");
+    assert!(refused.to_string().contains("newer"), "{refused}");
 }
 
 #[test]
@@ -140,7 +172,7 @@ fn a_session_on_board_stores_what_this_machine_finds_and_gives_up_what_is_less_s
         "stored as record 1",
         "equal bit for bit",
     ]);
-    assert!(std::fs::read(&out).is_ok_and(|bytes| imucal_core::record::decode(&bytes).is_ok()));
+    assert!(std::fs::read(&out).is_ok_and(|bytes| record::decode(&bytes).is_ok()));
     // It starts again with that record: the same data are no surer.
     let again = run(&["capture", &recording, "--target", "1,1,1"]);
     again.with(1).printing(&["accelerometer is not calibrated: the one in use is surer"]);

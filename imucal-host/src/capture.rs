@@ -5,7 +5,7 @@
 
 use imucal_core::{
     link::{CaptureSensor, CaptureTask, RawSample},
-    record::{Date, HigherOrder, Sensor},
+    record::{Date, HigherOrder, Sensor, TriadRecord},
     session::{Session, SessionSettings, guide::Guide, store::NotStored},
 };
 
@@ -115,7 +115,7 @@ pub fn calibration(
     let mut triad = |kind: SensorKind, sensor: Sensor| {
         recording.sensor(kind)?;
         let units = task.sensors[kind as usize].units(sensor);
-        match session.better_at_temperatures(sensor, &units, None) {
+        match session.better_at_temperatures(sensor, &units, None::<&TriadRecord>) {
             Ok(record) => Some(StoredTriad::from_record(&record.with_order(HigherOrder::default()))),
             Err(why) => {
                 refused.push((kind, why));

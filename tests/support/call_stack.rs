@@ -68,7 +68,9 @@ impl CallGraph {
     ///
     /// Without such a function, or where functions call each other in a circle: then there is no bound.
     pub fn depth(&self, root: &str) -> Depth {
-        let start = self.functions.iter().find(|(_, f)| f.name.contains(root)).expect("the root").0;
+        let named = |of: &dyn Fn(&str) -> bool| self.functions.iter().find(|(_, f)| of(&f.name));
+        let start = named(&|name| name == root).or_else(|| named(&|name| name.contains(root)));
+        let start = start.expect("the root").0;
         self.deepest(*start, &mut Vec::new(), &mut HashMap::new())
     }
 

@@ -9,7 +9,7 @@ use imucal_core::{
         self,
         rest::{RestObserver, RestSettings, Stage},
     },
-    record::{CalibrationRecord, RawUnit, Sensor, TriadRecord},
+    record::{RawUnit, Sensor, TriadRecord},
     session::{
         bias::MeanRate,
         store::{NotStored, bias_of_the_day},
@@ -19,6 +19,7 @@ use imucal_core::{
 };
 use nalgebra::Vector3;
 
+use super::calibration::{HeldRecord, HeldTriad};
 use crate::standalone::{POSES, Standalone};
 
 /// A gyroscope's bias moves less than this from day to day, rad/s.
@@ -157,7 +158,7 @@ impl<const N: usize> Alone<N> {
     #[inline(never)]
     pub(super) fn watch(
         &mut self,
-        record: &CalibrationRecord,
+        record: &HeldRecord,
         time: u64,
         values: &[Option<[f32; 3]>; 3],
         temperature: f32,
@@ -181,7 +182,7 @@ impl<const N: usize> Alone<N> {
 
     /// Out of line: a watch is larger than a stack's frame should be.
     #[inline(never)]
-    fn start_watch(&mut self, record: &CalibrationRecord) {
+    fn start_watch(&mut self, record: &HeldRecord) {
         if !is_si(record) {
             return;
         }
@@ -194,8 +195,8 @@ impl<const N: usize> Alone<N> {
 }
 
 /// What the watch expects is in m/s², rad/s and µT.
-fn is_si(record: &CalibrationRecord) -> bool {
-    let units = |(sensor, triad): (Sensor, &TriadRecord)| match sensor {
+fn is_si(record: &HeldRecord) -> bool {
+    let units = |(sensor, triad): (Sensor, &HeldTriad)| match sensor {
         Sensor::Accelerometer => triad.unit_out == RawUnit::MetrePerSecondSquared,
         Sensor::Gyroscope => triad.unit_out == RawUnit::RadianPerSecond,
         Sensor::Magnetometer => matches!(triad.unit_out, RawUnit::MicroTesla | RawUnit::Arbitrary),
@@ -203,7 +204,7 @@ fn is_si(record: &CalibrationRecord) -> bool {
     record.triads().all(units)
 }
 
-fn of_the_day(look: &Look, stored: &TriadRecord) -> Option<Vector3<f32>> {
+fn of_the_day(look: &Look, stored: &HeldTriad) -> Option<Vector3<f32>> {
     let mean = look.gyr?;
     let rate = MeanRate { mean: mean.value, variance: mean.variance, count: 1 };
     bias_of_the_day(&rate, stored, MOST)
@@ -238,7 +239,7 @@ impl Capture {
         &self,
         sensor: Sensor,
         units: &Units,
-        stored: Option<&TriadRecord>,
+        stored: Option<&HeldTriad>,
     ) -> Result<TriadRecord, NotStored> {
         match self.warmth.first() {
             Some(fit) => self.session.better_warm(sensor, fit, units, stored),

@@ -1,13 +1,36 @@
 //! The calibration in use, and what of it is in flash.
+//!
+//! Records of every order are used, in as many bytes as one of the first order may have; on the micro:bit, whose memory is small,
+//! only those of the first order.
 
 use imucal_core::{
-    corrector::{Compensator, Corrector},
+    corrector::Compensator,
     link::{Fault, RecordState},
     record::{
-        self, CalibrationRecord, Date, DecodeError, Match, RawUnit, Sensor, SensorIdentity, TriadRecord,
+        self, CalibrationRecord, Date, DecodeError, Match, Order, RawUnit, Sensor, SensorIdentity,
+        TriadRecord,
     },
 };
+#[cfg(microbit)]
+use imucal_core::{corrector::Corrector as OfOrder, record::FirstOrder as Held};
+#[cfg(not(microbit))]
+use imucal_core::{corrector::FullCorrector as OfOrder, record::HigherOrder as Held};
 use nalgebra::Vector3;
+
+/// A record as this board holds it.
+pub(super) type HeldRecord = CalibrationRecord<Held>;
+/// A triad of it.
+pub(super) type HeldTriad = TriadRecord<Held>;
+type Compensating = Compensator<f32, OfOrder<f32>>;
+
+/// The newest version that this board uses.
+pub(super) const VERSION: (u8, u8) = Held::VERSION;
+
+/// What corrects by a triad; `None` for terms that cannot be undone, which no record that was read holds.
+#[cfg_attr(microbit, expect(clippy::unnecessary_fallible_conversions, reason = "other boards' can fail"))]
+fn compensating(triad: &HeldTriad) -> Option<Compensating> {
+    OfOrder::try_from(triad).ok().map(Compensator::new)
+}
 
 #[derive(Clone, Debug)]
 pub(super) struct Calibration {
@@ -15,8 +38,8 @@ pub(super) struct Calibration {
     pub(super) unit: SensorIdentity,
     /// Of the board's own samples.
     units: [Option<RawUnit>; 3],
-    record: CalibrationRecord,
-    correctors: [Option<Compensator<f32>>; 3],
+    record: HeldRecord,
+    correctors: [Option<Compensating>; 3],
     /// What is in flash.
     pub(super) state: RecordState,
     /// What is in use is not what is in flash.
@@ -33,10 +56,10 @@ impl Calibration {
     /// Uses a record, if it is this unit's; says what it is.
     #[inline(never)]
     pub(super) fn load(&mut self, bytes: &[u8]) -> RecordState {
-        // By reference: each copy of a record takes 0.7 KiB of stack.
-        let decoded = record::decode(bytes);
-        let record = match &decoded {
-            Ok(record) => record,
+        let mut record = HeldRecord::empty(SensorIdentity::default(), Date::from_days(0));
+        // By reference: each copy of a record takes 0.7 to 1.4 KiB of stack.
+        let record = match record::decode_into(bytes, &mut record) {
+            Ok(()) => &record,
             Err(DecodeError::UnsupportedVersion { .. }) => return RecordState::NewerFormat,
             Err(_) => return RecordState::Unusable,
         };
@@ -52,11 +75,11 @@ impl Calibration {
         state
     }
 
-    /// By reference, and out of line: a record takes 0.7 KiB of stack wherever it is passed by value.
+    /// By reference, and out of line: a record takes 0.7 to 1.4 KiB of stack wherever it is passed by value.
     #[inline(never)]
-    fn put_in_use(&mut self, record: &CalibrationRecord) {
+    fn put_in_use(&mut self, record: &HeldRecord) {
         for (corrector, sensor) in self.correctors.iter_mut().zip(Sensor::ALL) {
-            *corrector = record.triad(sensor).map(|triad| Compensator::new(Corrector::from(triad)));
+            *corrector = record.triad(sensor).and_then(compensating);
         }
         self.record.clone_from(record);
     }
@@ -64,18 +87,18 @@ impl Calibration {
     /// Why a record is not this unit's to use, if it is not.
     #[inline(never)]
     pub(super) fn refusal(&self, bytes: &[u8]) -> Option<Fault> {
-        let decoded = record::decode(bytes);
-        match &decoded {
-            Ok(record) if record.made_for(&self.unit.serial).is_err() => Some(Fault::OtherSensor),
-            Ok(record) => self.other_unit(record),
+        let mut record = HeldRecord::empty(SensorIdentity::default(), Date::from_days(0));
+        match record::decode_into(bytes, &mut record) {
+            Ok(()) if record.made_for(&self.unit.serial).is_err() => Some(Fault::OtherSensor),
+            Ok(()) => self.other_unit(&record),
             Err(DecodeError::UnsupportedVersion { .. }) => Some(Fault::NewerFormat),
-            Err(DecodeError::Unusable(defect)) => Some(Fault::Implausible(*defect)),
+            Err(DecodeError::Unusable(defect)) => Some(Fault::Implausible(defect)),
             Err(_) => Some(Fault::BadRecord),
         }
     }
 
     /// The first triad of a record for another unit than the board puts out.
-    fn other_unit(&self, record: &CalibrationRecord) -> Option<Fault> {
+    fn other_unit(&self, record: &HeldRecord) -> Option<Fault> {
         record.triads().find_map(|(sensor, triad)| self.check_unit(sensor, triad.unit_in).err())
     }
 
@@ -111,9 +134,11 @@ impl Calibration {
     #[inline(never)]
     pub(super) fn adopt(&mut self, sensor: Sensor, triad: &TriadRecord, date: Date) -> Result<(), Fault> {
         triad.check(sensor).map_err(Fault::Implausible)?;
+        #[cfg(not(microbit))]
+        let triad = &triad.clone().with_order(Held::default());
         self.record.adopt(sensor, triad, &self.unit, date);
         if let Some(place) = self.correctors.get_mut(sensor as usize) {
-            *place = Some(Compensator::new(Corrector::from(triad)));
+            *place = compensating(triad);
         }
         self.unsaved = true;
         Ok(())
@@ -146,7 +171,7 @@ impl Calibration {
     }
 
     /// The record in use.
-    pub(super) fn record(&self) -> &CalibrationRecord {
+    pub(super) fn record(&self) -> &HeldRecord {
         &self.record
     }
 }

@@ -6,7 +6,7 @@ use imucal_core::{
     record::{self, Date, Sensor},
 };
 
-use super::{Device, Due, Job, Stream};
+use super::{Device, Due, Job, Stream, calibration};
 use crate::{
     board::{Clock, SampleSource},
     fitting::Fitting,
@@ -88,7 +88,7 @@ impl<
         let identity = Identity {
             unit: self.calibration.unit.clone(),
             firmware: FIRMWARE,
-            record_version: record::VERSION,
+            record_version: calibration::VERSION,
             nonce: self.guard.nonce(),
             keyed: self.guard.is_keyed(),
             capacity: Fitting::<POINTS, POSES, TURNS, BLOCKS, PARTICLES>::CAPACITY,

@@ -194,6 +194,7 @@ impl<
             Err(NotStored::NoEstimate) => CaptureOutcome::TooLittle,
             Err(NotStored::Refused(refusal)) => CaptureOutcome::Refused(refusal),
             Err(NotStored::Surer { stored, new }) => CaptureOutcome::Surer { stored, new },
+            Err(NotStored::HigherOrder) => CaptureOutcome::HigherOrder,
             Ok(triad) => match self.calibration.adopt(sensor, &triad, date) {
                 Ok(()) => CaptureOutcome::Adopted,
                 Err(Fault::Implausible(defect)) => CaptureOutcome::Implausible(defect),

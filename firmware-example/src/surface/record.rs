@@ -24,6 +24,13 @@ pub(super) fn reach_all() {
 #[inline(never)]
 pub(super) fn reach_higher_order() {
     reach!(record::decode_as(RECORD_2), decoded);
+    into();
+}
+
+#[inline(never)]
+fn into() {
+    let mut record = CalibrationRecord::<HigherOrder>::empty(Default::default(), record::Date::from_days(0));
+    let _whole = reach!(record::decode_into(RECORD_2, &mut record));
 }
 
 #[inline(never)]

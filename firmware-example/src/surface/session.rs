@@ -4,7 +4,7 @@ use imucal_core::{
     accept,
     fit::Units,
     observer::Sample,
-    record::{RawUnit, Sensor},
+    record::{RawUnit, Sensor, TriadRecord},
     session::{
         self, Session, SessionSettings,
         bias::{MeanRate, RestBias},
@@ -49,7 +49,8 @@ pub(super) fn reach_all() {
 fn kept(session: &Session<8, 2, 16>) {
     let units =
         Units { raw: RawUnit::Counts, calibrated: RawUnit::RadianPerSecond, offset: 0.0, per_unit: 100.0 };
-    let record = reach!(session::Session::better(session, Sensor::Accelerometer, &units, None));
+    let record =
+        reach!(session::Session::better(session, Sensor::Accelerometer, &units, None::<&TriadRecord>));
     if let Some(estimate) = reach!(session::Session::estimate(session, Sensor::Accelerometer)) {
         let record = reach!(session::estimate::Estimate::record(estimate, "T9", &units));
         reach!(session::store::stated_error(&record, 9.8));
@@ -69,11 +70,21 @@ fn warm(session: &Session<8, 2, 16>) {
     if let Ok(mut fit) = reach!(session::Session::warmth(session, Sensor::Gyroscope)) {
         while reach!(session::temperature::WarmthFit::work(&mut fit)) {}
         reach!(session::temperature::WarmthFit::found(&fit));
-        let record = reach!(session::Session::better_warm(session, Sensor::Gyroscope, &fit, &units, None));
+        let record = reach!(session::Session::better_warm(
+            session,
+            Sensor::Gyroscope,
+            &fit,
+            &units,
+            None::<&TriadRecord>
+        ));
         core::hint::black_box(&record);
     }
-    let record =
-        reach!(session::Session::better_at_temperatures(session, Sensor::Accelerometer, &units, None));
+    let record = reach!(session::Session::better_at_temperatures(
+        session,
+        Sensor::Accelerometer,
+        &units,
+        None::<&TriadRecord>
+    ));
     core::hint::black_box(&record);
     let temperatures = [20.0f32, 35.0, 22.0];
     reach!(temperature::course::span(&temperatures));

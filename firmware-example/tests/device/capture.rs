@@ -138,7 +138,9 @@ fn raw_samples_end_in_the_record_that_the_same_session_gives_elsewhere() {
 
     let session = session_of(&samples);
     let units = task().sensors[0].units(record::Sensor::Accelerometer);
-    let here = session.better(record::Sensor::Accelerometer, &units, None).expect("accepted");
+    let here = session
+        .better(record::Sensor::Accelerometer, &units, None::<&record::TriadRecord>)
+        .expect("accepted");
     let there = bench.ask(&Request::GetRecord, |reply| match reply {
         Reply::Record(bytes) => record::decode(bytes).expect("whole"),
         other => panic!("{other:?}"),
@@ -161,6 +163,17 @@ fn a_session_that_is_less_sure_than_the_record_in_use_changes_nothing() {
     send(&mut bench, &tumble(11));
     let second = bench.ask(&finish(), outcomes)[0];
     assert!(matches!(second, CaptureOutcome::Surer { stored, new } if new > stored), "{second:?}");
+}
+
+#[test]
+fn a_session_leaves_a_record_whose_terms_it_does_not_fit() {
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    let put = Request::PutRecord { record: firmware_example::RECORD_2, replace: false };
+    assert_eq!(bench.ask(&put, fault), None);
+    state_of(&mut bench, &Request::StartCapture(task()));
+    send(&mut bench, &tumble(20));
+    assert_eq!(bench.ask(&finish(), outcomes)[0], CaptureOutcome::HigherOrder);
 }
 
 #[test]

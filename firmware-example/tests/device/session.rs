@@ -1,12 +1,12 @@
 //! What a host may do with a co-processor, in peace.
 
-use firmware_example::{RECORD, drill, scene::Noise, storage::layout::SLOT};
+use firmware_example::{RECORD, RECORD_2, drill, scene::Noise, storage::layout::SLOT};
 use imucal_core::{
-    corrector::Corrector,
+    corrector::{Corrector, FullCorrector},
     link::{BATCH, Fault, FitModel, FitTask, Observation, RecordState, Reply, Request, Values},
     model::{norm::NormModel, parameterisation::UPPER_TRIANGULAR},
     observation::ShellPoint,
-    record::{self, CalibrationRecord, Date, Defect, Figures, RawUnit, Sensor},
+    record::{self, CalibrationRecord, Date, Defect, Figures, FirstOrder, HigherOrder, RawUnit, Sensor},
     solver::LevenbergMarquardt,
     triad::Triad,
 };
@@ -46,7 +46,7 @@ fn altered(change: impl Fn(&mut Vec<u8>)) -> Vec<u8> {
 }
 
 fn newer() -> Vec<u8> {
-    altered(|bytes| bytes[4] += 1)
+    altered(|bytes| bytes[4] = record::VERSION.0 + 1)
 }
 
 fn of_another() -> Vec<u8> {
@@ -76,6 +76,29 @@ fn a_record_is_stored_used_given_back_and_there_after_a_power_cycle() {
     let corrector = Corrector::<f32>::from(record.acc.as_ref().expect("it has one"));
     let expected =
         Values::from_slice(&[corrector.apply_at(&Vector3::from(raw[0]), 31.0).into()]).expect("room");
+    assert!(bench.ask(&correct, |reply| *reply == Reply::Corrected(expected.clone())));
+}
+
+#[test]
+fn a_record_of_higher_order_is_used_with_all_its_terms() {
+    let mut memory = BenchMemory::new();
+    let mut bench = Bench::new(Nor::new(2), SERIAL, Counting::default(), &mut memory);
+    assert_eq!(bench.ask(&put(RECORD_2), |reply| format!("{reply:?}")), "Stored { sequence: 1 }");
+    let nor = bench.off();
+    let mut bench = Bench::new(nor, SERIAL, Counting::default(), &mut memory);
+    // It names no serial, so that it is used and nobody can know whose it is.
+    assert_eq!(state(&mut bench), RecordState::Unconfirmed);
+    assert_eq!(get(&mut bench), RECORD_2);
+    let record = record::decode_as::<HigherOrder>(RECORD_2).expect("it is golden");
+    let triad = record.acc.as_ref().expect("it has one");
+    assert!(triad.order.nonlinearity.is_some() && triad.order.curvature.is_some());
+    let raw = Values::from_slice(&[[36_000.0, 30_000.0, 31_000.0]]).expect("room");
+    let all = FullCorrector::<f32>::try_from(triad).expect("gentle terms");
+    let value = all.apply_at(&Vector3::from(raw[0]), 31.0);
+    let linear = Corrector::<f32>::from(&triad.clone().with_order(FirstOrder));
+    assert_ne!(value, linear.apply_at(&Vector3::from(raw[0]), 31.0), "the terms make a difference");
+    let expected = Values::from_slice(&[value.into()]).expect("room");
+    let correct = Request::Correct { sensor: Sensor::Accelerometer, temperature: 31.0, raw };
     assert!(bench.ask(&correct, |reply| *reply == Reply::Corrected(expected.clone())));
 }
 

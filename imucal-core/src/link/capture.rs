@@ -145,6 +145,8 @@ pub enum CaptureOutcome {
     },
     /// No sensor can be like that.
     Implausible(Defect),
+    /// The one in use has terms that a session does not fit: nonlinear ones, or of temperature to second order.
+    HigherOrder,
 }
 
 /// Samples of a message.

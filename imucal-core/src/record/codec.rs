@@ -7,7 +7,9 @@ use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use serde::Deserialize;
 
 use super::payload::serialize;
-use super::{CalibrationRecord, Defect, FirstOrder, HigherOrder, Order, Provenance};
+use super::{
+    CalibrationRecord, Date, Defect, FirstOrder, HigherOrder, Order, Provenance, SensorIdentity, TriadRecord,
+};
 
 /// Major version of the format, and the newest minor, that this library reads and writes: those of [`HigherOrder`].
 pub const VERSION: (u8, u8) = HigherOrder::VERSION;
@@ -193,6 +195,19 @@ pub fn decode(bytes: &[u8]) -> Result<CalibrationRecord, DecodeError> {
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
 pub fn decode_as<O: Order>(bytes: &[u8]) -> Result<CalibrationRecord<O>, DecodeError> {
+    let mut record = CalibrationRecord::empty(SensorIdentity::default(), Date::from_days(0));
+    decode_into(bytes, &mut record)?;
+    Ok(record)
+}
+
+/// The same into a record that is there: a stack holds no copy of it, nor of more than one triad. After an error what it holds
+/// is not to be used.
+///
+/// # Errors
+///
+/// As [`decode`].
+#[inline(never)]
+pub fn decode_into<O: Order>(bytes: &[u8], record: &mut CalibrationRecord<O>) -> Result<(), DecodeError> {
     let have = bytes.len();
     let truncated = |need| DecodeError::Truncated { have, need };
 
@@ -216,16 +231,41 @@ pub fn decode_as<O: Order>(bytes: &[u8]) -> Result<CalibrationRecord<O>, DecodeE
     }
 
     let payload = checked.get(HEADER..).ok_or(truncated(need))?;
-    let (mut record, mut appended) = taken::<CalibrationRecord<O>>(payload)?;
+    let mut appended = take_unit(record, payload)?;
+    // Part by part, as the record's own implementation would.
+    for triad in [&mut record.acc, &mut record.gyr, &mut record.mag] {
+        appended = take_triad(triad, appended)?;
+    }
+    record.provenance = [const { None }; 3];
     if version >= Version::WITH_PROVENANCE {
         appended = take_provenance(&mut record.provenance, appended)?;
     }
-    appended = O::read(&mut record, version, appended)?;
+    appended = O::read(record, version, appended)?;
     if version.is_known::<O>() && !appended.is_empty() {
         return Err(DecodeError::Malformed);
     }
-    record.check().map_err(DecodeError::Unusable)?;
-    Ok(record)
+    record.check().map_err(DecodeError::Unusable)
+}
+
+/// Reads whose record it is, and of which day; gives what follows.
+#[inline(never)]
+fn take_unit<'a, O>(record: &mut CalibrationRecord<O>, bytes: &'a [u8]) -> Result<&'a [u8], DecodeError> {
+    let (sensor, rest) = taken(bytes)?;
+    record.sensor = sensor;
+    let (date, rest) = taken(rest)?;
+    record.date = date;
+    Ok(rest)
+}
+
+/// Reads what is of the first order in a triad; gives what follows.
+#[inline(never)]
+fn take_triad<'a, O: Order>(
+    triad: &mut Option<TriadRecord<O>>,
+    bytes: &'a [u8],
+) -> Result<&'a [u8], DecodeError> {
+    let (found, rest) = taken(bytes)?;
+    *triad = found;
+    Ok(rest)
 }
 
 /// Reads what minor 1 appended; gives what follows.

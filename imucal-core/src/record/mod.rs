@@ -55,7 +55,7 @@ mod plausibility;
 mod provenance;
 mod validity;
 
-pub use codec::{DecodeError, EncodeError, MAX_LEN, VERSION, decode, decode_as, encode};
+pub use codec::{DecodeError, EncodeError, MAX_LEN, VERSION, decode, decode_as, decode_into, encode};
 pub use date::Date;
 pub use identity::{Match, SensorIdentity, WrongSensor};
 pub use order::{CurvatureRecord, FirstOrder, HigherOrder, NonlinearRecord, Order, TemperatureQuality};

@@ -114,6 +114,8 @@ pub trait Parts: Sized {
         version: Version,
         appended: &'a [u8],
     ) -> Result<&'a [u8], DecodeError>;
+    /// A triad has no terms that change a value besides gain, bias and the slopes of temperature.
+    fn is_first_order(&self) -> bool;
     /// Checks a triad's parts; `bias` is the most that its bias may be, `warm` whether it has temperature terms.
     fn check(&self, check: &mut Check, bias: f32, warm: bool);
 }
@@ -152,6 +154,10 @@ impl Parts for FirstOrder {
         Ok(appended)
     }
     #[inline]
+    fn is_first_order(&self) -> bool {
+        true
+    }
+    #[inline]
     fn check(&self, _: &mut Check, _: f32, _: bool) {}
 }
 
@@ -168,7 +174,7 @@ impl Order for HigherOrder {
 impl Parts for HigherOrder {
     fn version(record: &CalibrationRecord<Self>) -> Option<Version> {
         let any = |has: fn(&Self) -> bool| record.triads().any(|(_, triad)| has(&triad.order));
-        if any(|order| order.curvature.is_some() || order.nonlinearity.is_some()) {
+        if any(|order| !order.is_first_order()) {
             return Some(Version::HIGHER_ORDER);
         }
         any(|order| order.warmth.is_some()).then_some(Version::WITH_TEMPERATURE_QUALITY)
@@ -209,6 +215,11 @@ impl Parts for HigherOrder {
         Ok(appended)
     }
 
+    #[inline]
+    fn is_first_order(&self) -> bool {
+        self.curvature.is_none() && self.nonlinearity.is_none()
+    }
+
     #[inline(never)]
     fn check(&self, check: &mut Check, bias: f32, warm: bool) {
         if let Some(warmth) = &self.warmth {
@@ -231,13 +242,15 @@ fn each<'a, P: Deserialize<'a>>(
     appended: &'a [u8],
     put: impl Fn(&mut HigherOrder, Option<P>),
 ) -> Result<&'a [u8], DecodeError> {
-    let ([acc, gyr, mag], rest) = taken::<[Option<P>; 3]>(appended)?;
-    for (triad, part) in [(&mut record.acc, acc), (&mut record.gyr, gyr), (&mut record.mag, mag)] {
+    let mut left = appended;
+    for triad in [&mut record.acc, &mut record.gyr, &mut record.mag] {
+        let (part, rest) = taken::<Option<P>>(left)?;
+        left = rest;
         match triad {
             Some(triad) => put(&mut triad.order, part),
             None if part.is_none() => {}
             None => return Err(DecodeError::Malformed),
         }
     }
-    Ok(rest)
+    Ok(left)
 }

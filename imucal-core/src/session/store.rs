@@ -12,7 +12,7 @@ use super::{
 use crate::{
     accept::{Refusal, relative_error},
     fit::Units,
-    record::{Sensor, TriadRecord},
+    record::{Order, Sensor, TriadRecord},
     temperature::TemperatureTerms,
     triad::Triad,
 };
@@ -31,20 +31,23 @@ pub enum NotStored {
         /// Of the new one.
         new: f32,
     },
+    /// The stored one has terms that a session does not fit: nonlinear ones, or of temperature to second order.
+    HigherOrder,
 }
 
 impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     /// A sensor's calibration for the record, if it is accepted and surer than the one `stored`. Terms of temperature are those of the
-    /// stored one, from the mean temperature of the session's rests on.
+    /// stored one, from the mean temperature of the session's rests on. One with terms beyond the first order stays, since gain and
+    /// bias were fitted with them, and a session fits none.
     ///
     /// # Errors
     ///
     /// [`NotStored`]; then the stored one is to be kept.
-    pub fn better(
+    pub fn better<O: Order>(
         &self,
         sensor: Sensor,
         units: &Units,
-        stored: Option<&TriadRecord>,
+        stored: Option<&TriadRecord<O>>,
     ) -> Result<TriadRecord, NotStored> {
         let estimate = self.estimate(sensor).ok_or(NotStored::NoEstimate)?;
         estimate.verdict.map_err(NotStored::Refused)?;
@@ -56,13 +59,16 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
 
     /// A new calibration, if it is surer than the one `stored`.
     #[inline(never)]
-    pub(super) fn surer(
+    pub(super) fn surer<O: Order>(
         &self,
         sensor: Sensor,
         new: TriadRecord,
-        stored: Option<&TriadRecord>,
+        stored: Option<&TriadRecord<O>>,
     ) -> Result<TriadRecord, NotStored> {
         if let Some(stored) = stored {
+            if !stored.order.is_first_order() {
+                return Err(NotStored::HigherOrder);
+            }
             let length = self.length(sensor);
             let (old, now) = (stated_error(stored, length), stated_error(&new, length));
             let surer = now < old;
@@ -87,9 +93,9 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
 }
 
 /// Terms of temperature of the `stored` calibration, from a reference temperature, °C, on; `None` without any, or in another raw unit.
-pub(super) fn known_terms(
+pub(super) fn known_terms<O>(
     new: &TriadRecord,
-    stored: Option<&TriadRecord>,
+    stored: Option<&TriadRecord<O>>,
     reference: f32,
 ) -> Option<TemperatureTerms<f32>> {
     let known = stored.filter(|stored| stored.unit_in == new.unit_in)?.temperature?;
@@ -107,7 +113,7 @@ pub fn model_of(sensor: Sensor) -> &'static str {
 
 /// Error of a calibrated vector of that length to be expected from what a record states, as a share of it.
 #[inline]
-pub fn stated_error(record: &TriadRecord, length: f32) -> f32 {
+pub fn stated_error<O>(record: &TriadRecord<O>, length: f32) -> f32 {
     let rows = |rows: &[[f32; 3]; 3]| Matrix3::from(*rows).transpose();
     let gain = rows(&record.gain);
     let std = Triad { gain: rows(&record.quality.gain_std), bias: Vector3::from(record.quality.bias_std) };
@@ -120,7 +126,7 @@ pub fn stated_error(record: &TriadRecord, length: f32) -> f32 {
 /// A rate that is further off than a bias moves from day to day is none: the sensor is turned steadily, or is another one.
 /// Earth's rate is part of what is taken off. `still`: calibrated by `stored`.
 #[inline]
-pub fn bias_of_the_day(still: &MeanRate<f32>, stored: &TriadRecord, most: f32) -> Option<Vector3<f32>> {
+pub fn bias_of_the_day<O>(still: &MeanRate<f32>, stored: &TriadRecord<O>, most: f32) -> Option<Vector3<f32>> {
     let bias = RestBias::of(core::iter::once(*still))?;
     let gain = stored.triad::<f32>().gain;
     let stated = Vector3::from(stored.quality.bias_std);

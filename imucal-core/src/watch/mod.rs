@@ -137,7 +137,7 @@ struct Seen {
 impl Watch {
     /// Of a unit with its record, before the first look. A triad that the record lacks is not watched.
     #[inline]
-    pub fn new(record: &CalibrationRecord, settings: WatchSettings) -> Self {
+    pub fn new<O>(record: &CalibrationRecord<O>, settings: WatchSettings) -> Self {
         let reference = Reference::of(record, &settings);
         Self {
             sensor: record.sensor.clone(),

@@ -55,7 +55,7 @@ struct Errors {
 
 impl Errors {
     #[inline]
-    fn of(record: &TriadRecord) -> Option<Self> {
+    fn of<O>(record: &TriadRecord<O>) -> Option<Self> {
         let Triad { gain, .. } = record.triad::<f32>();
         let quality = &record.quality;
         let [[a, b, c], [d, e, f], [g, h, i]] = quality.gain_std;
@@ -95,13 +95,13 @@ pub(super) struct Reference {
 
 impl Reference {
     #[inline]
-    pub(super) fn of(record: &CalibrationRecord, settings: &WatchSettings) -> Self {
+    pub(super) fn of<O>(record: &CalibrationRecord<O>, settings: &WatchSettings) -> Self {
         let acc = record.acc.as_ref().and_then(Errors::of);
         let gyr = record.gyr.as_ref().and_then(Errors::of);
         let mag = record.mag.as_ref().and_then(Errors::of);
         let own = record.mag.as_ref().and_then(own_field);
         // Alone, a magnetometer's gain has no rotation to the accelerometer.
-        let is_rotated = |triad: &TriadRecord| {
+        let is_rotated = |triad: &TriadRecord<O>| {
             let [_, [yx, _, _], [zx, zy, _]] = triad.gain;
             [yx, zx, zy].iter().any(|entry| *entry != 0.0)
         };
@@ -191,7 +191,7 @@ impl Reference {
 
 /// The field's length, where the fit found it and calibrated values have its unit.
 #[inline]
-fn own_field(mag: &TriadRecord) -> Option<f32> {
+fn own_field<O>(mag: &TriadRecord<O>) -> Option<f32> {
     let alike = mag.unit_out == mag.unit_in || mag.unit_out == RawUnit::Arbitrary;
     mag.quality.field_norm.filter(|_| alike)
 }

@@ -38,7 +38,7 @@ use crate::{
     },
     observation::ShellPoint,
     observer::thermometer::ThermometerFault,
-    record::{Sensor, TriadRecord},
+    record::{Order, Sensor, TriadRecord},
     temperature::{
         TemperatureTerms,
         course::{self, LEAST_APART, LEAST_SPAN},
@@ -147,11 +147,11 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     /// # Errors
     ///
     /// [`NotStored`]; then the stored one is to be kept.
-    pub fn better_at_temperatures(
+    pub fn better_at_temperatures<O: Order>(
         &self,
         sensor: Sensor,
         units: &Units,
-        stored: Option<&TriadRecord>,
+        stored: Option<&TriadRecord<O>>,
     ) -> Result<TriadRecord, NotStored> {
         let Ok(mut fit) = self.warmth(sensor) else { return self.better(sensor, units, stored) };
         while fit.work() {}
@@ -165,12 +165,12 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     ///
     /// [`NotStored`]; then the stored one is to be kept.
     #[inline(never)]
-    pub fn better_warm(
+    pub fn better_warm<O: Order>(
         &self,
         sensor: Sensor,
         fit: &WarmthFit<N>,
         units: &Units,
-        stored: Option<&TriadRecord>,
+        stored: Option<&TriadRecord<O>>,
     ) -> Result<TriadRecord, NotStored> {
         let Some(warm) = fit.found() else { return self.better(sensor, units, stored) };
         let mut new = match sensor {

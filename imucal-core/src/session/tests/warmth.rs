@@ -125,7 +125,7 @@ fn record(session: &Held, stored: Option<&TriadRecord>) -> Result<TriadRecord, N
 fn a_record_of_a_warm_session_corrects_at_every_temperature_and_one_without_does_not() {
     let (hand, session) = session(5, hill, true);
     let warm = record(&session, None).expect("accepted");
-    let cold = session.better(Sensor::Accelerometer, &UNITS, None).expect("accepted");
+    let cold = session.better(Sensor::Accelerometer, &UNITS, None::<&TriadRecord>).expect("accepted");
     let off = |record: &TriadRecord, temperature: f64| {
         let truth = Vector3::new(3.0, -4.0, 8.0);
         let raw = hand.warmth[0].predict(&hand.truth[0], &truth, temperature).expect("regular") * 1000.0;
@@ -161,7 +161,7 @@ fn a_warm_session_keeps_the_terms_of_the_record_that_rests_do_not_show() {
     let mut fit = session.warmth(Sensor::Gyroscope).expect("temperatures");
     while fit.work() {}
     let units = Units { calibrated: RawUnit::RadianPerSecond, ..UNITS };
-    let alone = session.better_warm(Sensor::Gyroscope, &fit, &units, None).expect("accepted");
+    let alone = session.better_warm(Sensor::Gyroscope, &fit, &units, None::<&TriadRecord>).expect("accepted");
     assert_eq!(alone.temperature.expect("terms").scale_slope, [0.0; 3]);
     let known = TemperatureTerms { reference: 27.0, bias_slope: [9.0; 3], scale_slope: [1e-4; 3] };
     let vague = TriadRecord {

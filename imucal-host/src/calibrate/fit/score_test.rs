@@ -257,8 +257,11 @@ mod tests {
                 .filter(|seed| {
                     let (test, _) = parabola(0.0, 0.8, *seed);
                     let columns = DMatrix::from_fn(ROWS, 1, |row, _| libm::cos(row as f64 / 40.0));
-                    let score =
-                        if blocks { test.test_in_blocks(&columns, &[20], 0.0) } else { test.test(&columns, 1) };
+                    let score = if blocks {
+                        test.test_in_blocks(&columns, &[20], 0.0)
+                    } else {
+                        test.test(&columns, 1)
+                    };
                     score.unwrap().p < 0.01
                 })
                 .count()

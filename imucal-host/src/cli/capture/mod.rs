@@ -221,9 +221,11 @@ fn reason(why: &NotStored) -> String {
         NotStored::NoEstimate => TOO_LITTLE.into(),
         NotStored::Refused(refusal) => refusal.to_string(),
         NotStored::Surer { stored, new } => surer(*stored, *new),
+        NotStored::HigherOrder => HIGHER_ORDER.into(),
     }
 }
 
+const HIGHER_ORDER: &str = "the one in use has nonlinear terms, or terms of temperature to second order, which a session does not fit";
 const TOO_LITTLE: &str = "too few rests, turns or places of the field for a fit";
 
 fn surer(stored: f32, new: f32) -> String {

@@ -8,12 +8,13 @@ use std::{
 
 use imucal_core::{
     link::{CaptureOutcome, CaptureTask, SAMPLES},
-    record::{self, CalibrationRecord},
+    record::{self, CalibrationRecord, TriadRecord},
     session::guide::{Advice, Guide},
 };
 
 use super::{
-    Arguments, Lines, TOO_LITTLE, recorded, settings_of, shares, surer, task_of, warn_of_nothing, write,
+    Arguments, HIGHER_ORDER, Lines, TOO_LITTLE, recorded, settings_of, shares, surer, task_of,
+    warn_of_nothing, write,
 };
 use crate::{
     capture::{self, Capture},
@@ -142,7 +143,8 @@ fn end(
 /// the device may have kept those of an earlier record.
 fn is_equal(here: &Capture, task: &CaptureTask, record: &CalibrationRecord, kind: SensorKind) -> bool {
     let sensor = kind.into();
-    let own = here.better_at_temperatures(sensor, &task.sensors[kind as usize].units(sensor), None);
+    let own =
+        here.better_at_temperatures(sensor, &task.sensors[kind as usize].units(sensor), None::<&TriadRecord>);
     let (Ok(own), Some(there)) = (own, record.triad(sensor)) else { return false };
     let bits = |gain: &[[f32; 3]; 3], bias: &[f32; 3]| -> Vec<u32> {
         gain.as_flattened().iter().chain(bias).map(|value| value.to_bits()).collect()
@@ -156,6 +158,7 @@ fn reason(outcome: &CaptureOutcome) -> String {
         CaptureOutcome::Refused(refusal) => refusal.to_string(),
         CaptureOutcome::Surer { stored, new } => surer(*stored, *new),
         CaptureOutcome::Implausible(defect) => defect.to_string(),
+        CaptureOutcome::HigherOrder => HIGHER_ORDER.into(),
         _ => TOO_LITTLE.into(),
     }
 }

@@ -304,6 +304,15 @@ fn put(arguments: &Put) -> anyhow::Result<Ending> {
     let record = stored.to_record(&arguments.calibration)?;
     let mut page = [0; HigherOrder::MAX_LEN];
     let bytes = record::encode(&record, &mut page)?;
+    if bytes.len() > record::MAX_LEN {
+        return Ok(refuse(&format!(
+            "{}: the record has {} bytes, and a message to a device holds {}; put a calibration with terms beyond the \
+             first order for fewer sensors",
+            arguments.calibration.display(),
+            bytes.len(),
+            record::MAX_LEN
+        )));
+    }
     let sequence = arguments.place.open()?.put_record(bytes, arguments.replace)?;
     say!("stored as record {sequence}");
     Ok(Ending::Done)
