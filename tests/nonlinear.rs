@@ -6,6 +6,7 @@ use imucal_core::record::{CalibrationRecord, Date, HigherOrder, Order, decode_as
 use imucal_host::{
     apply, calibrate,
     calibrate::{Calibration, FitSummary, Options, Status},
+    compare::{CompareFault, compare},
     effect,
     observe::pose,
     recording::{Recording, SensorKind},
@@ -138,4 +139,21 @@ fn a_linear_model_of_a_sensor_that_is_not_is_not_accepted_in_silence() {
     assert_eq!(bent, SEEDS.count());
     // At 1 in 1000 for each of three kinds of terms, two of forty come once in 200.
     assert!(straight <= 1, "{straight}");
+}
+
+#[test]
+fn calibrations_are_compared_only_where_they_estimate_the_same_terms() {
+    let recording = recording(1, true);
+    let (linear, (bent, _)) =
+        (stored(&calibrated(&recording, "I14")).0, stored(&calibrated(&recording, "I23")));
+    assert_eq!(compare(&linear, &bent, false), Err(CompareFault::Nothing));
+    let mut moved = bent.clone();
+    let terms = moved.acc.as_mut().and_then(|acc| acc.nonlinearity.as_mut()).expect("stored");
+    terms.cubic[2] += 20.0 * terms.cubic_std[2];
+    terms.cross[0][1] += 20.0 * terms.cross_std[0][1];
+    let comparison = compare(&bent, &moved, false).expect("the same terms");
+    let parameters = &comparison.sensors[0].parameters;
+    let names: Vec<&str> = parameters.iter().filter(|p| p.moved).map(|p| p.name.as_str()).collect();
+    assert_eq!(names, ["cubic_z", "cross_x_yz"]);
+    assert_eq!(parameters.len(), 12 + 9);
 }

@@ -18,8 +18,10 @@
 //! accelerometer, a rig a full one in its own axes, and a magnetometer in an unknown field has determinant 1. Elsewhere M would say
 //! nothing of the unit, and the biases alone, in raw units, are compared.
 //!
-//! The biases are compared at B's reference temperature. Not looked at: correlations between parameters, slopes of temperature
-//! and nonlinear terms.
+//! Gain and bias are fitted together with nonlinear terms, so that calibrations which estimate other such terms are not compared.
+//!
+//! The biases are compared at B's reference temperature. Not looked at: correlations between parameters, and slopes of
+//! temperature.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
@@ -34,6 +36,7 @@ use crate::{
 pub const FORMAT: &str = "imucal-compare/1";
 /// How often the largest of the parameters of two calibrations of an unchanged unit is taken for moved.
 const FALSE_ALARMS: f64 = 0.01;
+const AXES: [char; 3] = ['x', 'y', 'z'];
 
 /// Why two calibrations are not compared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -67,8 +70,8 @@ pub enum CompareFault {
         /// Which.
         sensor: SensorKind,
     },
-    /// They have no sensor in common.
-    #[error("no sensor is calibrated in both")]
+    /// They have no sensor in common that can be compared.
+    #[error("no sensor is calibrated in both by models with the same nonlinear terms")]
     Nothing,
 }
 
@@ -136,6 +139,8 @@ pub struct Comparison {
     pub sensors: Vec<SensorComparison>,
     /// Sensors that one of them has not.
     pub only_one: Vec<SensorKind>,
+    /// Sensors of which one of them estimates nonlinear terms that the other does not: their gains and biases differ by that alone.
+    pub other_terms: Vec<SensorKind>,
 }
 
 /// Compares an earlier calibration with a later one.
@@ -152,11 +157,14 @@ pub fn compare(
     if !other_serial && serials.iter().all(|serial| !serial.is_empty()) && serials[0] != serials[1] {
         return Err(CompareFault::Serials { a: serials[0].clone(), b: serials[1].clone() });
     }
-    let (mut sensors, mut only_one) = (Vec::new(), Vec::new());
+    let (mut sensors, mut only_one, mut other_terms) = (Vec::new(), Vec::new(), Vec::new());
     // The other sensors are in the axes of the accelerometer.
     let acc = a.acc.as_ref().zip(b.acc.as_ref());
     for kind in SensorKind::ALL {
         match (a.triad(kind), b.triad(kind)) {
+            (Some(a), Some(b)) if bent(a).map(|term| term.known()) != bent(b).map(|term| term.known()) => {
+                other_terms.push(kind);
+            }
             (Some(a), Some(b)) => {
                 let axes = acc.unwrap_or((a, b));
                 let alike = [(a, b), axes].iter().all(|(a, b)| estimated(a) == estimated(b));
@@ -171,12 +179,42 @@ pub fn compare(
         return Err(CompareFault::Nothing);
     }
     let days = i64::from(b.date.days()) - i64::from(a.date.days());
-    Ok(Comparison { format: FORMAT, days, sensors, only_one })
+    Ok(Comparison { format: FORMAT, days, sensors, only_one, other_terms })
 }
 
 /// Which entries of the gain are estimated: what its axes are.
 fn estimated(triad: &StoredTriad) -> [[bool; 3]; 3] {
     triad.gain_std.map(|row| row.map(|std| std > 0.0))
+}
+
+/// A coefficient and its standard error, 0 where it is not estimated.
+#[derive(Clone, Copy)]
+struct Estimate(f64, f64);
+
+impl Estimate {
+    fn known(self) -> bool {
+        self.1 > 0.0
+    }
+}
+
+/// Nonlinear terms: quadratic, cubic, and the products in each axis.
+fn bent(triad: &StoredTriad) -> [Estimate; 15] {
+    let Some(found) = &triad.nonlinearity else { return [Estimate(0.0, 0.0); 15] };
+    let all = |axial: [[f64; 3]; 2], cross: [[f64; 3]; 3]| axial.into_iter().chain(cross).flatten();
+    let value = all([found.quadratic, found.cubic], found.cross);
+    let std = all([found.quadratic_std, found.cubic_std], found.cross_std);
+    let mut pairs = value.zip(std).map(|(value, std)| Estimate(value, std));
+    std::array::from_fn(|_| pairs.next().unwrap_or(Estimate(0.0, 0.0)))
+}
+
+/// Name of each of [`bent`].
+fn bent_name(at: usize) -> String {
+    let (row, column) = (at / 3, at % 3);
+    match row {
+        0 => format!("quadratic_{}", AXES[column]),
+        1 => format!("cubic_{}", AXES[column]),
+        _ => format!("cross_{}_{}", AXES[row - 2], ["xy", "yz", "zx"][column]),
+    }
 }
 
 fn of_sensor(
@@ -230,7 +268,6 @@ fn at_reference(a: &StoredTriad, b: &StoredTriad) -> Vector3<f64> {
 
 /// The parameters that both have estimated; without a verdict.
 fn parameters(a: &StoredTriad, b: &StoredTriad, bias_a: &Vector3<f64>, with_gains: bool) -> Vec<Moved> {
-    const AXES: [char; 3] = ['x', 'y', 'z'];
     let of = |name: String, (a, a_std): (f64, f64), (b, b_std): (f64, f64)| {
         let std_error = a_std.hypot(b_std);
         (a_std > 0.0 && b_std > 0.0).then(|| Moved {
@@ -251,7 +288,10 @@ fn parameters(a: &StoredTriad, b: &StoredTriad, bias_a: &Vector3<f64>, with_gain
         let name = format!("bias_{}", AXES[axis]);
         of(name, (bias_a[axis], a.bias_std[axis]), (b.bias[axis], b.bias_std[axis]))
     });
-    gains.filter(|_| with_gains).chain(biases).collect()
+    let (bent_a, bent_b) = (bent(a), bent(b));
+    let terms = bent_a.into_iter().zip(bent_b).enumerate();
+    let terms = terms.filter_map(|(at, (a, b))| of(bent_name(at), (a.0, a.1), (b.0, b.1)));
+    gains.filter(|_| with_gains).chain(biases).chain(terms).collect()
 }
 
 #[cfg(test)]

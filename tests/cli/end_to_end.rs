@@ -67,6 +67,15 @@ fn nonlinear_terms_of_a_rig_s_fit_are_written_shown_applied_and_verified() {
             .printing(&["nonlinear terms up to", "cubic [1/counts²]: x"]);
         folder.run(&format!("verify bent.csv --calibration {name}")).with(0).printing(&["equivalent"]);
     }
+    folder
+        .run("check bent.csv --calibration terms.toml")
+        .with(0)
+        .printing(&["accelerometer: the calibration still fits", "cubic_x"]);
+    folder.run("calibrate bent.csv --out linear.toml").with(0);
+    folder.run("compare linear.toml terms.toml").printing(&[
+        "accelerometer: not compared; one calibration has nonlinear terms",
+        "gyroscope: no parameter",
+    ]);
     let json: serde_json::Value = serde_json::from_str(&folder.text("cal.json")).expect("JSON");
     let acc = &json["sensors"]["acc"];
     assert!(acc["nonlinear"]["range"].as_f64().is_some_and(|range| range > 1000.0), "{acc}");

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     apply,
-    calibrate::{Calibration, Options, calibrate},
+    calibrate::{Calibration, Options, calibrate, known_attitudes::ladder},
     compare::{CompareFault, Comparison, compare},
     recording::SensorKind,
     report::{self, table::words},
@@ -60,18 +60,18 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Ok(warning) => warning.iter().for_each(|warning| warn(warning)),
         Err(refusal) => return Ok(refuse(&refusal)),
     }
-    let calibration = calibrate(&recording, &Options::default(), &|_| {});
+    let calibration = calibrate(&recording, &options(&stored), &|_| {});
     calibration.warnings.iter().for_each(|warning| warn(warning));
     let now = StoredCalibration::of(&calibration, today());
     let comparison = match compare(&stored, &now, arguments.other_serial) {
         Ok(comparison) => comparison,
         Err(CompareFault::Nothing) => {
-            output::text(&unchecked(&stored, &calibration))?;
+            output::text(&unchecked(&stored, &calibration, &SensorKind::ALL))?;
             return Ok(refuse(&"this recording calibrates none of the sensors, so that nothing is checked"));
         }
         Err(fault) => return Ok(refuse(&fault)),
     };
-    output::text(&(verdicts(&comparison) + &unchecked(&stored, &calibration)))?;
+    output::text(&(verdicts(&comparison) + &unchecked(&stored, &calibration, &comparison.other_terms)))?;
     output::text(&report::compare::compared(&comparison))?;
     if let Some(path) = &arguments.json {
         let json =
@@ -83,6 +83,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     Ok(if fits { Ending::Done } else { Ending::Refused })
 }
 
+/// On a rig, the model of an accelerometer's nonlinear terms where the calibration has some: a linear gain would differ from its own.
+fn options(stored: &StoredCalibration) -> Options {
+    let bent = stored.acc.as_ref().filter(|acc| acc.nonlinearity.is_some());
+    let model = bent.and_then(|acc| ladder::ACCELEROMETER.iter().find(|(name, _)| *name == acc.model));
+    let usual = Options::default();
+    Options { rig_acc: model.map_or(usual.rig_acc, |(name, _)| Some(name)), ..usual }
+}
+
 /// A line for each sensor that was compared; ends its lines.
 fn verdicts(comparison: &Comparison) -> String {
     let line = |kind: SensorKind, moved: bool| {
@@ -92,13 +100,16 @@ fn verdicts(comparison: &Comparison) -> String {
     comparison.sensors.iter().map(|sensor| line(sensor.sensor, sensor.has_moved())).collect()
 }
 
-/// A line for each calibrated sensor that this recording does not calibrate, with the reason.
-fn unchecked(stored: &StoredCalibration, calibration: &Calibration) -> String {
+/// A line for each calibrated sensor that this recording does not calibrate, or by other terms, with the reason.
+fn unchecked(stored: &StoredCalibration, calibration: &Calibration, other_terms: &[SensorKind]) -> String {
     let mut text = String::new();
     for kind in SensorKind::ALL.into_iter().filter(|kind| stored.triad(*kind).is_some()) {
         let outcome = calibration.sensors.iter().find(|outcome| outcome.kind == kind);
         let why = match outcome {
             None => "it is not in this recording".to_owned(),
+            Some(outcome) if outcome.accepted().is_some() && other_terms.contains(&kind) => {
+                report::compare::OTHER_TERMS.to_owned()
+            }
             Some(outcome) if outcome.accepted().is_some() => continue,
             Some(outcome) => match &outcome.verdict {
                 Err(refused) => format!("this recording does not calibrate it: {}", refused.refusal),

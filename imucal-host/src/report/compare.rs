@@ -9,11 +9,18 @@ use crate::{
     recording::{SensorKind, unit::STANDARD_GRAVITY},
 };
 
+/// Why a sensor is not compared.
+pub const OTHER_TERMS: &str =
+    "one calibration has nonlinear terms that the other has not, and gain and bias are fitted with them";
+
 /// All sensors; ends its lines.
 pub fn compared(comparison: &Comparison) -> String {
     let mut text = format!("{} days from the first to the second\n", comparison.days);
     for sensor in &comparison.sensors {
         text += &of_sensor(sensor);
+    }
+    for kind in &comparison.other_terms {
+        text += &format!("{}: not compared; {OTHER_TERMS}\n", words(*kind));
     }
     for kind in &comparison.only_one {
         text += &format!("{}: calibrated in one of them only\n", words(*kind));
@@ -34,7 +41,7 @@ fn of_sensor(sensor: &SensorComparison) -> String {
     text += "                     first        second   std error   drift in std errors\n";
     for parameter in &sensor.parameters {
         text += &format!(
-            "  {:<8} {:>15} {:>13} {:>11} {:>12}{}\n",
+            "  {:<11} {:>12} {:>13} {:>11} {:>12}{}\n",
             parameter.name,
             plain(parameter.a),
             plain(parameter.b),
