@@ -20,7 +20,7 @@ pub struct Model {
     /// Standard errors of its gain and, nominal SI, of its bias, by [`SensorKind::ALL`]; zero where it has none.
     pub errors: [(Matrix3<f64>, Vector3<f64>); 3],
     /// What a reader ought to know of it.
-    pub remark: Option<String>,
+    pub remarks: Vec<String>,
 }
 
 impl Default for Model {
@@ -30,7 +30,7 @@ impl Default for Model {
             triads: [Triad::identity(); 3],
             calibrated: Vec::new(),
             errors: Default::default(),
-            remark: None,
+            remarks: Vec::new(),
         }
     }
 }
@@ -44,16 +44,30 @@ impl Model {
     pub fn new(recording: &Recording, stored: &StoredCalibration) -> Result<Self, String> {
         let record = stored.to_record(&recording.path).map_err(|error| error.to_string())?;
         let remark = apply::check(recording, stored, &record, false).map_err(because)?;
-        let mut model = Self { remark, ..Self::default() };
+        let mut model = Self { remarks: remark.into_iter().collect(), ..Self::default() };
         for kind in SensorKind::ALL {
             if let (Some(triple), Some(triad)) = (recording.sensor(kind), stored.triad(kind)) {
                 model.triads[kind as usize] = si(triad, triple.nominal);
                 model.errors[kind as usize] = errors(kind, triad, triple.nominal);
                 model.calibrated.push(kind);
+                model.remarks.extend(left_out(kind, triad));
             }
         }
         Ok(model)
     }
+}
+
+/// Says which terms of a calibration the simulation does without.
+fn left_out(kind: SensorKind, stored: &StoredTriad) -> Option<String> {
+    let warm = stored.temperature.is_some().then_some("terms of temperature");
+    let bent = stored.nonlinearity.is_some().then_some("nonlinear terms");
+    let terms: Vec<&str> = warm.into_iter().chain(bent).collect();
+    (!terms.is_empty()).then(|| {
+        format!(
+            "{kind}: the simulation starts from gain and bias of the model alone; what its {} describe counts as a gap",
+            terms.join(" and ")
+        )
+    })
 }
 
 /// Why a calibration is no model of a recording's unit: a simulation of another unit is not to be forced.
@@ -97,7 +111,10 @@ fn si(stored: &StoredTriad, nominal: Nominal) -> Triad<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::Unit;
+    use crate::{
+        recording::Unit,
+        store::{StoredNonlinearity, StoredTemperature},
+    };
 
     fn stored() -> StoredTriad {
         StoredTriad {
@@ -134,6 +151,34 @@ mod tests {
         assert_eq!(of(11, SensorKind::Acc), Vector3::new(f64::INFINITY, 0.0, f64::INFINITY));
         // A motion gives three numbers.
         assert!(of(11, SensorKind::Gyr).x < 0.53);
+    }
+
+    #[test]
+    fn terms_that_the_simulation_does_without_are_named() {
+        assert_eq!(left_out(SensorKind::Acc, &stored()), None);
+        let none = [0.0; 3];
+        let temperature = StoredTemperature {
+            reference: 25.0,
+            bias_slope: none,
+            scale_slope: none,
+            quality: None,
+            curvature: None,
+        };
+        let bent = StoredNonlinearity {
+            range: 9.8,
+            quadratic: none,
+            cubic: none,
+            cross: [none; 3],
+            quadratic_std: none,
+            cubic_std: none,
+            cross_std: [none; 3],
+        };
+        let stored = StoredTriad { temperature: Some(temperature), nonlinearity: Some(bent), ..stored() };
+        let remark = left_out(SensorKind::Acc, &stored).expect("two kinds of terms");
+        assert!(
+            remark.starts_with("acc: ") && remark.contains("terms of temperature and nonlinear terms"),
+            "{remark}"
+        );
     }
 
     #[test]

@@ -164,7 +164,7 @@ impl Preparation {
         remarks.extend(of_pose.remarks);
         remarks.extend(of_stream.remarks.iter().cloned());
         remarks.extend(of_reference);
-        remarks.extend(model.remark.clone());
+        remarks.extend(model.remarks.iter().cloned());
         // A machine's attitudes are no rests of a table, whose pointing errors repeat.
         remarks.extend(revisits::remark(&*movement).filter(|_| settings.noise.scatters));
         remarks.extend(shortcomings(recording));
