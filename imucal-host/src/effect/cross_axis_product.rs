@@ -13,7 +13,15 @@ const NAMES: [&str; 9] = ["x_xy", "x_yz", "x_zx", "y_xy", "y_yz", "y_zx", "z_xy"
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
         cause: "An axis' sensitivity depends on the input across it: asymmetric proof mass, cross-field of a magnetometer.",
-        remedy: "Add the product terms to the calibration; flip the magnetometer by set and reset.",
+        remedy: match kind {
+            SensorKind::Acc => {
+                "Add the product terms to the calibration: on a rig, `imucal calibrate --model acc=I23` has one an axis."
+            }
+            SensorKind::Gyr => "Add the product terms to the calibration.",
+            SensorKind::Mag => {
+                "Add the product terms to the calibration; flip the magnetometer by set and reset."
+            }
+        },
         needs: "Attitudes with input along two axes at once, of all signs.",
     };
     let unit = format!("1/({})", si(kind));

@@ -9,7 +9,12 @@ use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, XYZ, member_id
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
         cause: "The sensitivity falls off or grows towards both ends of the range.",
-        remedy: "Add a cubic term per axis to the calibration.",
+        remedy: match kind {
+            SensorKind::Acc => {
+                "Add a cubic term per axis to the calibration: on a rig, `imucal calibrate --model acc=I20`."
+            }
+            _ => "Add a cubic term per axis to the calibration.",
+        },
         needs: "Each axis at levels between zero and the largest, of both signs.",
     };
     let unit = format!("1/({})^2", si(kind));

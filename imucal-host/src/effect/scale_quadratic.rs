@@ -9,7 +9,12 @@ use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, XYZ, member_id
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
         cause: "The sensitivity grows along an axis from one end of the range to the other.",
-        remedy: "Add a quadratic term per axis to the calibration.",
+        remedy: match kind {
+            SensorKind::Acc => {
+                "Add a quadratic term per axis to the calibration: on a rig, `imucal calibrate --model acc=I17`."
+            }
+            _ => "Add a quadratic term per axis to the calibration.",
+        },
         needs: "Each axis at three or more levels of input.",
     };
     let unit = format!("1/({})", si(kind));
