@@ -1,7 +1,9 @@
 //! From a recording to corrected samples and back.
 
+use imucal_core::record::MAX_LEN;
 use imucal_host::calibrate::{Options, calibrate};
 use imucal_host::recording::{Recording, SensorKind};
+use imucal_host::store::StoredCalibration;
 
 use super::{Folder, imucal, names};
 
@@ -72,10 +74,24 @@ fn nonlinear_terms_of_a_rig_s_fit_are_written_shown_applied_and_verified() {
         .with(0)
         .printing(&["accelerometer: the calibration still fits", "cubic_x"]);
     folder.run("calibrate bent.csv --out linear.toml").with(0);
-    folder.run("compare linear.toml terms.toml").printing(&[
-        "accelerometer: not compared; one calibration has nonlinear terms",
-        "gyroscope: no parameter",
-    ]);
+    let left_out = "accelerometer: not compared; one calibration has nonlinear terms";
+    folder
+        .run("compare linear.toml terms.toml --html drift.html")
+        .printing(&[left_out, "gyroscope: no parameter"]);
+    assert!(folder.text("drift.html").contains(left_out));
+    assert!(folder.bytes("cal.bin").len() <= MAX_LEN, "a message to a device holds it");
+    // Terms of the other two sensors as well are more than it holds, which is said before a device is asked.
+    let mut stored = StoredCalibration::load(&folder.path("terms.toml")).expect("just written");
+    let terms = stored.acc.as_ref().and_then(|acc| acc.nonlinearity);
+    for triad in [&mut stored.gyr, &mut stored.mag].into_iter().flatten() {
+        triad.nonlinearity = terms;
+    }
+    let long = folder.path("long.toml");
+    std::fs::write(&long, stored.toml(&long).expect("a calibration")).expect("room");
+    folder
+        .run("device put long.toml --device tcp:localhost:9")
+        .with(1)
+        .telling(&["long.toml: the record has", &format!("a message to a device holds {MAX_LEN}")]);
     let json: serde_json::Value = serde_json::from_str(&folder.text("cal.json")).expect("JSON");
     let acc = &json["sensors"]["acc"];
     assert!(acc["nonlinear"]["range"].as_f64().is_some_and(|range| range > 1000.0), "{acc}");

@@ -14,7 +14,7 @@ use golden::{
 use imucal_core::record::{
     CalibrationRecord, Date, DecodeError, Defect, EncodeError, Figures, FirstOrder, FitQuality, HigherOrder,
     MAX_LEN, Match, Order, Provenance, RawUnit, Sensor, SensorIdentity, TriadRecord, VERSION, decode,
-    decode_as, encode,
+    decode_as, decode_into, encode,
 };
 
 #[test]
@@ -57,6 +57,19 @@ fn a_reader_of_higher_order_reads_every_version_and_writes_each_unchanged() {
         assert_eq!(decode_as::<HigherOrder>(bytes).as_ref(), Ok(&record));
         assert_eq!(encode(&record, &mut [0; HigherOrder::MAX_LEN]), Ok(bytes));
     }
+}
+
+#[test]
+fn a_record_is_read_over_another_and_keeps_nothing_of_it() {
+    let mut record = golden_record_2_0();
+    for (bytes, expected) in [(GOLDEN, raised(golden_record())), (GOLDEN_2_0, golden_record_2_0())] {
+        assert_eq!(decode_into(bytes, &mut record), Ok(()));
+        assert_eq!(record, expected);
+    }
+    let bare = CalibrationRecord::<HigherOrder>::empty(SensorIdentity::default(), Date::from_days(3));
+    let mut page = [0; HigherOrder::MAX_LEN];
+    assert_eq!(decode_into(encode(&bare, &mut page).unwrap(), &mut record), Ok(()));
+    assert_eq!(record, bare);
 }
 
 /// Without its higher terms a record would correct otherwise, so a reader of first order takes none of it.

@@ -6,7 +6,7 @@ use super::{Answer, Part, Tone, drift::drift};
 use crate::{
     compare::{Comparison, SensorComparison},
     report::{
-        compare::meaning,
+        compare::{meaning, not_compared},
         measure::{plain, rounded},
         prose::listed,
         table::words,
@@ -16,7 +16,10 @@ use crate::{
 /// What a page says of two calibrations.
 #[must_use]
 pub fn comparison(comparison: &Comparison) -> Part {
-    let body = html! { @for sensor in &comparison.sensors { (of_sensor(sensor)) } };
+    let body = html! {
+        @for line in not_compared(comparison) { p class="note" { (line) } }
+        @for sensor in &comparison.sensors { (of_sensor(sensor)) }
+    };
     Part { answer: answer(comparison), body }
 }
 

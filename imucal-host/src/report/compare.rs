@@ -19,13 +19,19 @@ pub fn compared(comparison: &Comparison) -> String {
     for sensor in &comparison.sensors {
         text += &of_sensor(sensor);
     }
-    for kind in &comparison.other_terms {
-        text += &format!("{}: not compared; {OTHER_TERMS}\n", words(*kind));
-    }
-    for kind in &comparison.only_one {
-        text += &format!("{}: calibrated in one of them only\n", words(*kind));
+    for line in not_compared(comparison) {
+        text += &format!("{line}\n");
     }
     text
+}
+
+/// A sentence for each sensor that is not compared.
+pub fn not_compared(comparison: &Comparison) -> Vec<String> {
+    let other_terms =
+        comparison.other_terms.iter().map(|kind| format!("{}: not compared; {OTHER_TERMS}", words(*kind)));
+    let only_one =
+        comparison.only_one.iter().map(|kind| format!("{}: calibrated in one of them only", words(*kind)));
+    other_terms.chain(only_one).collect()
 }
 
 fn of_sensor(sensor: &SensorComparison) -> String {

@@ -82,8 +82,8 @@ fn contradicted(rung: &Rung, poses: &Poses, down: Vector3<f64>) -> Option<String
     let found = compare::climb(SensorKind::Acc, steps).filter(|found| found.chosen != rung.name)?;
     let (name, better, why) = (rung.name, found.chosen, found.why);
     Some(format!(
-        "acc: the poses contradict {name}: {why}; use --model acc={better}, which TOML and record store whole, or \
-         `imucal diagnose` where the rig itself may be the cause"
+        "acc: the poses contradict {name}: {why}; use --model acc={better}, or `imucal diagnose` where the rig itself \
+         may be the cause"
     ))
 }
 
