@@ -1,5 +1,5 @@
 //! How long fits take by model and by the number of observations, in f32 (what a device computes, bit for bit) and in f64, and a
-//! particle swarm by its particles. Prints the tables of imucal-host/docs/performance.md; figures are ratios within one run.
+//! particle swarm by its particles, on one core and on all. Prints the tables of imucal-host/docs/performance.md; figures are ratios within one run.
 //!
 //! `cargo bench -p imucal-core --bench solvers`
 
@@ -7,11 +7,11 @@ use std::{hint::black_box, time::Instant};
 
 use imucal_core::{
     model::{
-        Model,
+        Cost, Model,
         dip::{DipModel, DirectionPair},
         norm::NormModel,
         parameterisation::{FULL, FULL_GAIN, UPPER_TRIANGULAR},
-        turn::TurnModel,
+        turn::{TurnModel, TurnPass},
     },
     observation::{BlockBuilder, Durations, ShellPoint, Turn},
     rotation::exp,
@@ -19,12 +19,13 @@ use imucal_core::{
     solver::{
         LevenbergMarquardt, Swarm,
         lm::Settings,
-        swarm::{self, Bounds},
+        swarm::{self, Bounds, SwarmReport},
     },
     triad::Triad,
 };
 use nalgebra::{Matrix3, SVector, Vector3};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use rayon::prelude::*;
 
 /// Observations of a fit.
 const COUNTS: [usize; 3] = [38, 380, 3800];
@@ -44,12 +45,15 @@ fn main() {
     table("norm", 9, |count| [norm::<f64>(count), norm::<f32>(count)]);
     table("dip", 4, |count| [dip::<f64>(count), dip::<f32>(count)]);
     table("turn", 9, |count| [turn::<f64>(count), turn::<f32>(count)]);
-    println!("\n| swarm on turns | particles | f64, s | f32 over f64 |\n| --- | --- | --- | --- |");
-    for (particles, [wide, narrow]) in [
-        (FEW, [search::<f64, FEW>(), search::<f32, FEW>()]),
-        (MANY, [search::<f64, MANY>(), search::<f32, MANY>()]),
+    let threads = rayon::current_num_threads();
+    println!("\n| swarm on turns | particles | f64, s | f32 over f64 | f64, {threads} threads over one |");
+    println!("| --- | --- | --- | --- | --- |");
+    for (particles, [wide, narrow, together]) in [
+        (FEW, [search::<f64, FEW>(), search::<f32, FEW>(), search_together::<FEW>()]),
+        (MANY, [search::<f64, MANY>(), search::<f32, MANY>(), search_together::<MANY>()]),
     ] {
-        println!("| {} | {particles} | {wide:.2e} | {:.2} |", COUNTS[0], narrow / wide);
+        let (narrow, together) = (narrow / wide, together / wide);
+        println!("| {} | {particles} | {wide:.2e} | {narrow:.2} | {together:.2} |", COUNTS[0]);
     }
 }
 
@@ -167,13 +171,29 @@ fn turn<T: Scalar>(count: usize) -> f64 {
 
 /// Seconds of a swarm that looks for gain and bias.
 fn search<T: Scalar, const N: usize>() -> f64 {
+    searched(|swarm: &mut Swarm<T, N, 12, _>, model, rng| swarm.run(model, rng))
+}
+
+/// The same by costs on all cores.
+fn search_together<const N: usize>() -> f64 {
+    searched(|swarm: &mut Swarm<f64, N, 12, _>, model, rng| {
+        swarm.run_ahead(rng, |positions, values| {
+            positions.par_iter().zip(values).for_each(|(theta, value)| *value = model.cost(theta));
+        })
+    })
+}
+
+/// Seconds of a swarm by this way to run it.
+fn searched<T: Scalar, const N: usize>(
+    run: impl Fn(&mut Swarm<T, N, 12, TurnPass<T>>, &TurnModel<'_, T, 12>, &mut ChaCha8Rng) -> SwarmReport<T>,
+) -> f64 {
     let made = Turns::<T>::new(COUNTS[0]);
     let turns = made.turns();
     let model = TurnModel { turns: &turns, form: FULL };
     let bounds = Bounds::around(&FULL.theta(&Triad::identity()), &SVector::repeat(T::of(0.1)));
     let bounds = bounds.expect("low is below high");
     least_time(|| {
-        let mut swarm = Swarm::<T, N, 12, _>::new(bounds, swarm::Settings::default());
-        black_box(swarm.run(black_box(&model), &mut ChaCha8Rng::seed_from_u64(1)));
+        let mut swarm = Swarm::new(bounds, swarm::Settings::default());
+        black_box(run(&mut swarm, black_box(&model), &mut ChaCha8Rng::seed_from_u64(1)));
     })
 }

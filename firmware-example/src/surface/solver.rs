@@ -132,6 +132,13 @@ fn searched() {
     let mut swarm: Swarm<f32, 10, 2, ()> = reach!(solver::swarm::Swarm::new(bounds, settings));
     reach!(solver::swarm::Swarm::step(&mut swarm, &Distance, &mut draws, 3));
     reach!(solver::swarm::Swarm::run(&mut swarm, &Distance, &mut draws));
+    reach!(solver::swarm::Swarm::run_ahead(
+        &mut swarm,
+        &mut draws,
+        |positions: &[SVector<f32, 2>], values: &mut [f32]| {
+            positions.iter().zip(values).for_each(|(theta, value)| *value = Distance.cost(theta));
+        }
+    ));
     reach!(solver::swarm::Swarm::best(&swarm));
     reach!(solver::swarm::Swarm::report(&swarm));
     reach!(solver::swarm::Swarm::minimum_at_bound(&swarm));

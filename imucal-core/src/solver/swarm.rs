@@ -21,12 +21,15 @@
 use nalgebra::SVector;
 use rand_core::Rng;
 
+mod particle;
+
+use self::particle::{Particle, keep};
 use super::report::Termination;
 pub use crate::model::Cost;
 use crate::scalar::Scalar;
 
-/// Largest speed, as a share of the range on each axis.
-const SPEED: f64 = 0.2;
+/// Particles that [`Swarm::run_ahead`] looks ahead at the least.
+const FEWEST_AHEAD: usize = 2;
 
 /// Where to search: a closed range for each parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -125,15 +128,6 @@ pub struct SwarmReport<T: Scalar> {
     pub spread: T,
 }
 
-/// One particle.
-#[derive(Clone, Copy, Debug)]
-struct Particle<T: Scalar, const P: usize> {
-    position: SVector<T, P>,
-    velocity: SVector<T, P>,
-    best: SVector<T, P>,
-    least: T,
-}
-
 /// A search by `N` particles in `P` parameters, with an evaluation's state `S` where it was laid aside.
 ///
 /// Holds `N (3P + 1)` numbers and a few more: below 8 KiB for 40 particles of 12 in `f32`.
@@ -208,11 +202,7 @@ impl<T: Scalar, const N: usize, const P: usize, S> Swarm<T, N, P, S> {
         budget: usize,
     ) -> Option<Termination> {
         let mut left = budget;
-        while self.stopped.is_none() && left > 0 {
-            if self.iterations >= self.settings.iterations || N == 0 {
-                self.stopped = Some(Termination::Iterations);
-                break;
-            }
+        while left > 0 && self.is_under_way() {
             let before = left;
             if !self.evaluate(cost, rng, &mut left) {
                 break;
@@ -228,6 +218,61 @@ impl<T: Scalar, const N: usize, const P: usize, S> Swarm<T, N, P, S> {
         self.report()
     }
 
+    /// Runs to the end as [`run`](Self::run) does, and to the same bits, with the costs of several particles at once.
+    ///
+    /// `costs` works out those of the positions it is given, on as many cores as there are: of the next particles, as
+    /// they move where none before them betters the best. Where one does, the particles after it move again by the new
+    /// best, and their costs are worked out again. A cost under way is begun again.
+    pub fn run_ahead<R: Rng + Clone>(
+        &mut self,
+        rng: &mut R,
+        mut costs: impl FnMut(&[SVector<T, P>], &mut [T]),
+    ) -> SwarmReport<T> {
+        let mut ahead = FEWEST_AHEAD;
+        while self.is_under_way() {
+            let (mut positions, mut values) = ([SVector::zeros(); N], [T::LARGEST; N]);
+            let count = self.look_ahead(&mut rng.clone(), ahead, &mut positions);
+            let (Some(positions), Some(values)) = (positions.get(..count), values.get_mut(..count)) else {
+                break;
+            };
+            costs(positions, values);
+            let least = self.least;
+            for value in values.iter() {
+                self.move_next(rng);
+                self.settle(*value);
+                if self.least < least {
+                    break;
+                }
+            }
+            ahead = if self.least < least { (ahead / 2).max(FEWEST_AHEAD) } else { (2 * ahead).min(N) };
+        }
+        self.report()
+    }
+
+    /// Whether there is an iteration left; the search has stopped where there is none.
+    fn is_under_way(&mut self) -> bool {
+        if self.stopped.is_none() && (self.iterations >= self.settings.iterations || N == 0) {
+            self.stopped = Some(Termination::Iterations);
+        }
+        self.stopped.is_none()
+    }
+
+    /// Positions of the next particles, at most `ahead` and none of the next iteration, if the best stays; their number.
+    fn look_ahead(&self, rng: &mut impl Rng, ahead: usize, positions: &mut [SVector<T, P>; N]) -> usize {
+        let (weights, begun) = (self.weights(), self.state.is_some());
+        let next = self.particles.iter().skip(self.turn).take(ahead);
+        let mut count = 0;
+        for (particle, position) in next.zip(positions) {
+            let mut particle = *particle;
+            if count > 0 || !begun {
+                particle.advance(&self.best, weights, &self.bounds, rng);
+            }
+            *position = particle.position;
+            count += 1;
+        }
+        count
+    }
+
     /// Works on the evaluation whose turn it is; true once it is done.
     fn evaluate<C: Cost<T, P, State = S>>(
         &mut self,
@@ -235,25 +280,38 @@ impl<T: Scalar, const N: usize, const P: usize, S> Swarm<T, N, P, S> {
         rng: &mut impl Rng,
         budget: &mut usize,
     ) -> bool {
-        let Some(particle) = self.particles.get_mut(self.turn) else {
+        self.move_next(rng);
+        let Some(Particle { position, .. }) = self.particles.get(self.turn) else {
             self.turn = 0;
             return true;
         };
-        if self.state.is_none() {
-            if self.iterations == 0 {
-                particle.scatter(&self.bounds, rng);
-            } else {
-                let weights = self.settings.variant.weights(self.iterations, self.settings.iterations);
-                particle.fly(&self.best, weights, &self.bounds, rng);
-            }
-        }
-        let state = self.state.get_or_insert_with(|| cost.begin(&particle.position));
-        let Some(value) = cost.advance(&particle.position, state, budget) else {
+        let state = self.state.get_or_insert_with(|| cost.begin(position));
+        let Some(value) = cost.advance(position, state, budget) else {
             return false;
         };
+        self.settle(value);
+        true
+    }
+
+    /// w, and c₁ = c₂; `None` in the first iteration, whose particles are scattered.
+    fn weights(&self) -> Option<(T, T)> {
+        let Settings { variant, iterations, .. } = self.settings;
+        (self.iterations > 0).then(|| variant.weights(self.iterations, iterations))
+    }
+
+    /// Moves the particle whose turn it is, unless its evaluation has begun.
+    fn move_next(&mut self, rng: &mut impl Rng) {
+        let weights = self.weights();
+        if let (None, Some(particle)) = (&self.state, self.particles.get_mut(self.turn)) {
+            particle.advance(&self.best, weights, &self.bounds, rng);
+        }
+    }
+
+    /// Takes the cost of the particle whose turn it is, which has moved.
+    fn settle(&mut self, value: T) {
+        let Some(Particle { position, best, least, .. }) = self.particles.get_mut(self.turn) else { return };
         self.state = None;
         self.evaluations = self.evaluations.saturating_add(1);
-        let Particle { position, best, least, .. } = particle;
         if value.finite() && value < *least {
             *least = value;
             keep(best, position);
@@ -267,7 +325,6 @@ impl<T: Scalar, const N: usize, const P: usize, S> Swarm<T, N, P, S> {
             self.turn = 0;
             self.finish_iteration();
         }
-        true
     }
 
     fn finish_iteration(&mut self) {
@@ -323,58 +380,6 @@ impl<T: Scalar, const N: usize, const P: usize, S> Swarm<T, N, P, S> {
         }
         sides
     }
-}
-
-impl<T: Scalar, const P: usize> Particle<T, P> {
-    /// Puts the particle anywhere within the bounds, with any speed allowed.
-    fn scatter(&mut self, bounds: &Bounds<T, P>, rng: &mut impl Rng) {
-        let limits = bounds.low.iter().zip(bounds.range.iter()).zip(bounds.high.iter());
-        for ((x, v), ((low, range), high)) in
-            self.position.iter_mut().zip(self.velocity.iter_mut()).zip(limits)
-        {
-            let place = *low + *range * uniform(rng);
-            *x = if place > *high { *high } else { place };
-            let share: T = uniform(rng);
-            *v = *range * T::of(SPEED) * (share + share - T::one());
-        }
-        self.best = self.position;
-    }
-
-    /// The module's equation.
-    fn fly(&mut self, swarm: &SVector<T, P>, (w, c): (T, T), bounds: &Bounds<T, P>, rng: &mut impl Rng) {
-        let limits = bounds.low.iter().zip(bounds.range.iter()).zip(bounds.high.iter());
-        let bests = self.best.iter().zip(swarm.iter());
-        let moving = self.position.iter_mut().zip(self.velocity.iter_mut());
-        for (((x, v), (own, all)), ((low, range), high)) in moving.zip(bests).zip(limits) {
-            let (first, second): (T, T) = (uniform(rng), uniform(rng));
-            let wish = w * *v + c * first * (*own - *x) + c * second * (*all - *x);
-            let most = *range * T::of(SPEED);
-            *v = if wish > most {
-                most
-            } else if wish < -most {
-                -most
-            } else {
-                wish
-            };
-            let place = *x + *v;
-            *x = if place < *low {
-                *v = T::zero();
-                *low
-            } else if place > *high {
-                *v = T::zero();
-                *high
-            } else {
-                place
-            };
-        }
-    }
-}
-
-/// `best ← position`. Out of line: within one particle the compiler would call for a move, 1.6 KiB of code that nothing
-/// else on a device needs.
-#[inline(never)]
-fn keep<T: Scalar, const P: usize>(best: &mut SVector<T, P>, position: &SVector<T, P>) {
-    *best = *position;
 }
 
 /// A number in [0, 1), a multiple of 2⁻²⁴: the top 24 of 32 bits drawn, exact in `f32`, so that `f32` and `f64`

@@ -146,6 +146,28 @@ fn slices_of_any_size_give_the_same_bits_and_never_more_work_than_granted() {
 }
 
 #[test]
+fn costs_ahead_of_their_turn_change_not_a_bit_and_few_are_in_vain() {
+    let cost = rastrigin::<5>();
+    for (settings, seed) in [(CONSTRICTION, 11), (Settings::default(), 12), (Settings::default(), 13)] {
+        let whole = run(&cost, settings, seed);
+        // From the beginning, and from within an evaluation.
+        for begun in [0, 1, 3, 5 * 47 + 2] {
+            let mut swarm = Swarm::<_, 40, 5, _>::new(bounds(), settings);
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            assert_eq!(swarm.step(&cost, &mut rng, begun), None);
+            let mut worked_out = 0;
+            let report = swarm.run_ahead(&mut rng, |positions, values| {
+                worked_out += positions.len() as u32;
+                positions.iter().zip(values).for_each(|(theta, value)| *value = cost.cost(theta));
+            });
+            assert_eq!((report, *swarm.best()), whole, "seed {seed}, {begun} blocks before");
+            let share = f64::from(worked_out) / f64::from(report.evaluations);
+            assert!(share < 1.3, "{share} costs for one that is kept");
+        }
+    }
+}
+
+#[test]
 fn a_grant_without_end_ends_in_one_step() {
     let mut swarm = Swarm::<_, 40, 2, _>::new(bounds(), CONSTRICTION);
     let mut rng = ChaCha8Rng::seed_from_u64(5);

@@ -11,6 +11,7 @@ use imucal_core::{
 };
 use nalgebra::SVector;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use rayon::prelude::*;
 
 /// Particles of a swarm.
 const PARTICLES: usize = 40;
@@ -99,7 +100,7 @@ pub struct Searched<'a, M, C, const P: usize> {
     pub limit: f64,
 }
 
-impl<M: Model<f64, P>, C: Cost<f64, P>, const P: usize> Searched<'_, M, C, P> {
+impl<M: Model<f64, P>, C: Cost<f64, P> + Sync, const P: usize> Searched<'_, M, C, P> {
     /// The better end, and how it was reached.
     pub fn solve(&self) -> (LevenbergMarquardt<f64, P>, Search) {
         let (direct, first) = self.polish(self.start);
@@ -118,8 +119,11 @@ impl<M: Model<f64, P>, C: Cost<f64, P>, const P: usize> Searched<'_, M, C, P> {
     pub fn swarm(&self) -> Option<(LevenbergMarquardt<f64, P>, Swarmed)> {
         let bounds = Bounds::around(&self.start, &self.reach)?;
         let mut swarm = Swarm::<f64, PARTICLES, P, C::State>::new(bounds, swarm::Settings::default());
-        // The same recording gives the same answer.
-        let report = swarm.run(self.cost, &mut ChaCha8Rng::seed_from_u64(1));
+        // The same recording gives the same answer, on any number of cores.
+        let report = swarm.run_ahead(&mut ChaCha8Rng::seed_from_u64(1), |positions, values| {
+            let costs = positions.par_iter().zip(values);
+            costs.for_each(|(theta, value)| *value = self.cost.cost(theta));
+        });
         let (polished, rms) = self.polish(*swarm.best());
         let found = Swarmed {
             termination: report.termination?,
