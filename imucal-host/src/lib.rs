@@ -47,7 +47,7 @@
 //! | `cli`, by default | the program `imucal` and the module `cli` |
 //! | `serial`, by default | devices at a serial port; without it [`device`] reaches those behind TCP and QEMU |
 //! | `parquet`, by default | recordings and summaries of batches in Parquet |
-//! | `logs`, by default | robots' logs as recordings: MCAP and ROS 1 bags |
+//! | `logs`, by default | robots' logs as recordings: MCAP, ROS 2 and ROS 1 bags |
 //!
 //! A program that uses the library takes it with `default-features = false`.
 

@@ -1,11 +1,12 @@
-//! Robots' logs: MCAP files and ROS 1 bags in place of a recording.
+//! Robots' logs: MCAP files and bags in place of a recording.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use imucal_host::recording::{Recording, SensorKind};
-use imucal_tests::robot_log::{Content, Logged, write_bag, write_mcap};
+use imucal_tests::robot_log::{Content, Logged, write_bag, write_db3, write_mcap};
 use imucal_tests::simulated;
+use serde_json::Value;
 
 use super::{Folder, imucal_on_a_day};
 
@@ -47,11 +48,12 @@ fn csv(messages: &[Logged]) -> String {
 const MANIFEST: &str = "format = \"imucal-recording/1\"\n\n";
 const UNITS: &str = "[units]\nt = \"ns\"\nacc = \"m/s^2\"\ngyr = \"rad/s\"\nmag = \"uT\"\n\n";
 
-/// A folder with `run.mcap`, `run.bag` and, below other names that are as long, the same as CSV.
+/// A folder with `run.mcap`, `run.db3`, `run.bag` and, below other names that are as long, the same as CSV.
 fn folder() -> Folder {
     let folder = Folder::new();
     let messages = messages();
     write_mcap(&folder.path("run.mcap"), &messages);
+    write_db3(&folder.path("run.db3"), &messages);
     write_bag(&folder.path("run.bag"), &messages);
     folder.write("run.toml", format!("{MANIFEST}{SECTIONS}"));
     folder.write("rows.csv", csv(&messages));
@@ -61,7 +63,7 @@ fn folder() -> Folder {
 
 /// A JSON file without the names of the recordings that it is of.
 fn nameless(folder: &Folder, name: &str) -> String {
-    ["rows.csv", "run.mcap", "run.bag"]
+    ["rows.csv", "run.mcap", "run.db3", "run.bag"]
         .iter()
         .fold(folder.text(name), |text, other| text.replace(other, "NAME"))
 }
@@ -78,11 +80,43 @@ fn a_log_gives_the_calibration_of_the_same_data_as_csv_to_the_last_digit() {
     calibrate("rows.csv --json csv.json --record csv.bin").printing(&["accelerometer (T9): accepted"]);
     calibrate(&format!("run.mcap {TOPICS} --json mcap.json --record mcap.bin"));
     calibrate(&format!("run.bag {TOPICS} --json bag.json --record bag.bin"));
+    calibrate(&format!("run.db3 {TOPICS} --json db3.json --record db3.bin"));
     let expected = nameless(&folder, "csv.json");
     for log in ["mcap", "bag"] {
         assert_eq!(nameless(&folder, &format!("{log}.json")), expected, "{log}");
         assert_eq!(folder.bytes(&format!("{log}.bin")), folder.bytes("csv.bin"), "{log}");
     }
+    // A bag of Humble in SQLite has no definitions, which is all that differs.
+    assert_eq!(folder.bytes("db3.bin"), folder.bytes("csv.bin"));
+    let [mut found, mut expected] = ["db3.json", "csv.json"]
+        .map(|name| serde_json::from_str::<Value>(&nameless(&folder, name)).expect("a report"));
+    let warnings = found["warnings"].take().to_string();
+    assert_eq!(warnings.matches("carries no definition of its messages").count(), 2, "{warnings}");
+    expected["warnings"].take();
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn a_bag_in_sqlite_is_read_by_every_command_that_reads_logs() {
+    let folder = folder();
+    folder.run(&format!("import run.db3 {TOPICS} --out straight.csv")).with(0);
+    assert_eq!(folder.text("straight.csv"), folder.text("rows.csv"));
+    folder.run("calibrate run.db3 --topic imu=/imu/dta").with(2).telling(&["did you mean `/imu/data`?"]);
+    folder.run("noise run.db3 --topic imu=/imu/data").with(1).telling(&["run.db3"]);
+    folder.run(&format!("calibrate run.db3 {TOPICS} --record unit.bin")).with(0);
+    folder.run(&format!("apply run.db3 {TOPICS} --calibration unit.bin")).with(0);
+    assert!(folder.text("run-calibrated.csv").starts_with("t,acc_x"));
+}
+
+#[test]
+fn of_a_folder_the_files_that_are_read_are_named() {
+    let folder = folder();
+    let bag = folder.path("walk");
+    std::fs::create_dir(&bag).expect("room");
+    folder.run("calibrate ./walk").with(2).telling(&["found a folder, expected a file", "imucal import"]);
+    std::fs::copy(folder.path("run.db3"), bag.join("walk_0.db3")).expect("room");
+    std::fs::write(bag.join("metadata.yaml"), "rosbag2_bagfile_information:\n").expect("room");
+    folder.run("calibrate ./walk").with(2).telling(&["give the one in it that is read", "walk_0.db3"]);
 }
 
 #[test]
@@ -143,8 +177,8 @@ fn another_definition_an_unknown_container_and_options_of_other_files_are_bad_us
         "`/imu/data`",
         "`float32 angular_velocity.x` where `float64 angular_velocity.x` is expected",
     ]);
-    folder.write("run.db3", "SQLite format 3");
-    folder.run("calibrate run.db3").with(2).telling(&["SQLite", "ros2 bag convert", "storage_id: mcap"]);
+    folder.write("cut.db3", &folder.bytes("run.db3")[..9000]);
+    folder.run("calibrate cut.db3").with(2).telling(&["cannot be read", "cut.db3 .recover"]);
     folder.write("bad.mcap", "t,acc_x\n");
     folder.run("calibrate bad.mcap").with(2).telling(&["begins with `t,acc_x", "expected MCAP"]);
     folder.run("calibrate rows.csv --topic imu=/imu/data").with(2).telling(&["--topic", "no log"]);
@@ -276,7 +310,7 @@ fn a_bag_with_a_simulated_topic_becomes_the_page_of_a_diagnosis() {
 
     let streams = "--topic imu=/imu/data --sim run.bag --sim-topic /imu/ideal";
     let ended = folder.run(&format!("diagnose run.bag {streams} --html page.html --json gap.json"));
-    let gap: serde_json::Value = serde_json::from_str(&folder.text("gap.json")).expect("JSON");
+    let gap: Value = serde_json::from_str(&folder.text("gap.json")).expect("JSON");
     let causes: Vec<&str> = gap["causes"]
         .as_array()
         .expect("causes")

@@ -1,4 +1,4 @@
-//! Robots' logs as a recorder writes them: MCAP of ROS 2 and a ROS 1 bag, of the same messages.
+//! Robots' logs as a recorder writes them: MCAP and SQLite of ROS 2 and a ROS 1 bag, of the same messages.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -162,6 +162,37 @@ pub fn write_mcap(path: &Path, messages: &[Logged]) {
         writer.write_to_known_channel(&header, &cdr(message)).expect("room");
     }
     writer.finish().expect("room");
+}
+
+/// The tables of a bag of ROS 2 Humble.
+const TABLES: &str = "
+    CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,
+        serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);
+    CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL,
+        data BLOB NOT NULL);
+    CREATE INDEX timestamp_idx ON messages (timestamp ASC);";
+
+/// Writes a bag of ROS 2 in SQLite, without definitions.
+///
+/// # Panics
+///
+/// Where the file cannot be written.
+pub fn write_db3(path: &Path, messages: &[Logged]) {
+    let mut bag = rusqlite::Connection::open(path).expect("the folder takes files");
+    let rows = bag.transaction().expect("the bag is not in use");
+    rows.execute_batch(TABLES).expect("room");
+    let mut ids = BTreeMap::new();
+    for (id, message) in (1i64..).zip(topics(messages)) {
+        let (package, name) = message.content.type_name();
+        let topic = (id, message.topic, format!("{package}/msg/{name}"));
+        rows.execute("INSERT INTO topics VALUES (?1, ?2, ?3, 'cdr', '')", topic).expect("room");
+        ids.insert(message.topic, id);
+    }
+    for message in messages {
+        let row = (ids[message.topic], message.recorded_ns().cast_signed(), cdr(message));
+        rows.execute("INSERT INTO messages VALUES (NULL, ?1, ?2, ?3)", row).expect("room");
+    }
+    rows.commit().expect("room");
 }
 
 /// A record of named fields and a body.

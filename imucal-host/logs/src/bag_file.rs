@@ -11,6 +11,7 @@ use crate::{
     compression::{ChunkFault, decompress},
     container::{Connection, Listing, RawMessage, Source, Visitor},
     error::LogError,
+    place::Place,
     warning::LogWarning,
 };
 
@@ -183,7 +184,7 @@ impl Reader<'_> {
         };
         if u64::from(length) > size {
             let (path, found) = (source.path().to_path_buf(), length.into());
-            return Err(LogError::TooLarge { path, offset, found, limit: size });
+            return Err(LogError::TooLarge { path, place: Place::Byte(offset), found, limit: size });
         }
         let mut chunk = std::mem::take(&mut self.chunk);
         match decompress(compression, body, length.into(), &mut chunk) {
@@ -228,7 +229,12 @@ impl Reader<'_> {
                 let (Some(connection), Some(log_ns)) = (fields.u32("conn"), fields.time("time")) else {
                     return Err(source.damaged(offset, "a message without its fields", "conn and time"));
                 };
-                self.visitor.message(RawMessage { connection, log_ns, offset, data: body })?;
+                self.visitor.message(RawMessage {
+                    connection,
+                    log_ns,
+                    place: Place::Byte(offset),
+                    data: body,
+                })?;
             }
             _ => {}
         }

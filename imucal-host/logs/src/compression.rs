@@ -1,4 +1,4 @@
-//! Chunks, decompressed.
+//! Chunks and messages, decompressed.
 
 use std::io::Read;
 
@@ -28,6 +28,26 @@ pub(crate) fn decompress(method: &str, data: &[u8], size: u64, into: &mut Vec<u8
             Err(ChunkFault::Damaged(format!("a chunk of {} bytes instead of {size}", into.len())))
         }
         Ok(_) => Ok(()),
+    }
+}
+
+/// The first bytes of a stream of zstd.
+const ZSTD: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
+
+/// Whether bytes begin as a stream of zstd does.
+pub(crate) fn is_zstd(data: &[u8]) -> bool {
+    data.starts_with(ZSTD)
+}
+
+/// Decompresses a stream of zstd of at most `limit` bytes; what was found where it is none.
+pub(crate) fn decompress_message(data: &[u8], limit: u64) -> Result<Vec<u8>, String> {
+    let mut message = Vec::new();
+    let read = zstd::stream::read::Decoder::with_buffer(data)
+        .and_then(|decoder| decoder.take(limit.saturating_add(1)).read_to_end(&mut message));
+    match read {
+        Err(cause) => Err(format!("a damaged zstd stream ({cause})")),
+        Ok(read) if read as u64 > limit => Err(format!("a zstd stream of more than {limit} bytes")),
+        Ok(_) => Ok(message),
     }
 }
 

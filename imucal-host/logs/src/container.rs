@@ -1,4 +1,4 @@
-//! What both containers are: records in a file, connections and their messages.
+//! What all containers are: connections and their messages, in a file.
 
 use std::{
     fs::File,
@@ -6,13 +6,14 @@ use std::{
     path::Path,
 };
 
-use crate::{bag_file, error::LogError, mcap_file, warning::LogWarning};
+use crate::{bag_file, error::LogError, mcap_file, place::Place, sqlite_file, warning::LogWarning};
 
 /// What a log is kept in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Container {
     Mcap,
     Bag,
+    Sqlite,
 }
 
 /// Who publishes what.
@@ -37,14 +38,14 @@ pub(crate) struct RawMessage<'a> {
     /// When it was recorded, ns.
     pub(crate) log_ns: i64,
     /// Of the message, or of its chunk.
-    pub(crate) offset: u64,
+    pub(crate) place: Place,
     pub(crate) data: &'a [u8],
 }
 
 /// Who looks at a file's content, in the file's order.
 pub(crate) trait Visitor {
-    /// A connection; the same one may come again.
-    fn connection(&mut self, connection: Connection);
+    /// A connection; the same one may come again. Whether its messages are of interest: the others need not be shown.
+    fn connection(&mut self, connection: Connection) -> bool;
     fn message(&mut self, message: RawMessage<'_>) -> Result<(), LogError>;
     fn warn(&mut self, warning: LogWarning);
 }
@@ -57,11 +58,13 @@ impl Container {
     pub(crate) fn of(path: &Path) -> Result<Self, LogError> {
         let mut source = Source::open(path)?;
         let mut begin = Vec::new();
-        source.fill(13, &mut begin)?;
+        source.fill(16, &mut begin)?;
         if begin.starts_with(mcap::MAGIC) {
             Ok(Self::Mcap)
         } else if begin.starts_with(bag_file::MAGIC) {
             Ok(Self::Bag)
+        } else if begin.starts_with(sqlite_file::MAGIC) {
+            Ok(Self::Sqlite)
         } else {
             let found = begin.escape_ascii().to_string();
             Err(LogError::Container { path: path.to_path_buf(), found })
@@ -73,6 +76,7 @@ impl Container {
         match self {
             Self::Mcap => mcap_file::scan(path, size, visitor),
             Self::Bag => bag_file::scan(path, size, visitor),
+            Self::Sqlite => sqlite_file::scan(path, size, visitor),
         }
     }
 
@@ -81,6 +85,7 @@ impl Container {
         match self {
             Self::Mcap => mcap_file::listing(path, size),
             Self::Bag => bag_file::listing(path, size),
+            Self::Sqlite => sqlite_file::listing(path),
         }
     }
 }
@@ -143,14 +148,19 @@ impl<'a> Source<'a> {
     pub(crate) fn record(&mut self, bytes: u64, size: u64, into: &mut Vec<u8>) -> Result<(), LogError> {
         if bytes > size {
             let path = self.path.to_path_buf();
-            return Err(LogError::TooLarge { path, offset: self.at, found: bytes, limit: size });
+            return Err(LogError::TooLarge { path, place: Place::Byte(self.at), found: bytes, limit: size });
         }
         self.fill(bytes, into)
     }
 
     /// That the bytes at a place are not what they should be.
     pub(crate) fn damaged(&self, offset: u64, found: impl Into<String>, expected: &'static str) -> LogError {
-        LogError::Damaged { path: self.path.to_path_buf(), offset, found: found.into(), expected }
+        LogError::Damaged {
+            path: self.path.to_path_buf(),
+            place: Place::Byte(offset),
+            found: found.into(),
+            expected,
+        }
     }
 
     pub(crate) fn path(&self) -> &'a Path {

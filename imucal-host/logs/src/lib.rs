@@ -1,14 +1,15 @@
-//! Inertial sensors' topics of robots' logs: MCAP of ROS 2 or ROS 1, and ROS 1 bags (format 2.0).
+//! Inertial sensors' topics of robots' logs: MCAP of ROS 2 or ROS 1, ROS 2 bags in SQLite, and ROS 1 bags (format 2.0).
 //!
 //! ```text
 //!  file ──► container ──► chunk ──► connection ──► message ──► order ──► Stream
 //!           MCAP, bag     decom-    topic, type,   stamp and   by stamp,
-//!           by records    pressed   definition     numbers     each once
+//!           by records,   pressed   definition     numbers     each once
+//!           SQLite by rows
 //! ```
 //!
 //! A file is read record by record and a chunk at a time: in memory are one chunk and the numbers of the topics that are
 //! asked for. A file that was cut is read as far as it goes, with a warning; of a chunk that was cut the messages that are whole.
-//! A damaged one is refused.
+//! A damaged one is refused, and so is a database that was cut, whose tables are in all of the file.
 //!
 //! | message | columns of its [`Stream`] |
 //! | --- | --- |
@@ -25,13 +26,15 @@
 //! the header, and a crate for each would be two ways to say what six messages are. Bags are read here too, since the crate
 //! `rosbag` maps the whole file, which a bag that was cut does not survive.
 //!
-//! Not read: ROS 2's SQLite, messages that IDL defines, and parameter lists and delimited types of XCDR.
+//! Not read: messages that IDL defines, and parameter lists and delimited types of XCDR.
 
 #![forbid(unsafe_code)]
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
 )]
+
+mod place;
 
 mod error;
 mod warning;
@@ -48,6 +51,7 @@ mod message;
 
 mod bag_file;
 mod mcap_file;
+mod sqlite_file;
 
 mod order;
 
@@ -57,5 +61,6 @@ pub use self::{
     error::LogError,
     log::{Log, Reading, Stream, Topic},
     message::Kind,
+    place::Place,
     warning::{LogWarning, Refusal},
 };

@@ -186,11 +186,12 @@ struct Counter {
 }
 
 impl Visitor for Counter {
-    fn connection(&mut self, connection: Connection) {
+    fn connection(&mut self, connection: Connection) -> bool {
         if !self.at.contains_key(&connection.id) {
             self.at.insert(connection.id, self.listed.len());
             self.listed.push((connection, 0));
         }
+        true
     }
 
     fn message(&mut self, message: RawMessage<'_>) -> Result<(), LogError> {
@@ -255,17 +256,20 @@ impl OfTopic {
 }
 
 impl Visitor for Reader<'_> {
-    fn connection(&mut self, connection: Connection) {
-        let Some(at) = self.topics.iter().position(|topic| topic.name == connection.topic) else { return };
+    fn connection(&mut self, connection: Connection) -> bool {
+        let Some(at) = self.topics.iter().position(|topic| topic.name == connection.topic) else {
+            return false;
+        };
         if self.of_connection.contains_key(&connection.id) {
-            return;
+            return true;
         }
-        let Ok((known, encoding)) = readable(&connection) else { return };
+        let Ok((known, encoding)) = readable(&connection) else { return false };
         if connection.definition.trim().is_empty() && connection.md5.is_none() {
             self.warnings
                 .push(LogWarning::NoDefinition { topic: connection.topic, type_name: connection.type_name });
         }
         self.of_connection.insert(connection.id, (at, known, encoding));
+        true
     }
 
     fn message(&mut self, message: RawMessage<'_>) -> Result<(), LogError> {
@@ -278,9 +282,9 @@ impl Visitor for Reader<'_> {
             path: self.path.to_path_buf(),
             topic: topic.name.clone(),
             number: topic.count,
-            offset: message.offset,
-            found: fault.found,
-            expected: fault.expected,
+            place: message.place,
+            found: fault.found.into(),
+            expected: fault.expected.into(),
         })?;
         let frame = topic.frame.get_or_insert_with(|| found.frame.to_owned());
         if frame != found.frame && topic.other_frame.is_none() {
@@ -291,7 +295,7 @@ impl Visitor for Reader<'_> {
         }
         topic.messages.stamps.push(found.stamp_ns);
         topic.messages.logged.push(message.log_ns);
-        topic.messages.offsets.push(message.offset);
+        topic.messages.places.push(message.place);
         topic.messages.values.extend(found.values);
         let name = topic.name.clone();
         if self.topics.iter().map(|topic| topic.messages.size()).sum::<u64>() > self.size {

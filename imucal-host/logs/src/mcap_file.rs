@@ -13,6 +13,7 @@ use crate::{
     compression::{ChunkFault, decompress},
     container::{Connection, Listing, RawMessage, Source, Visitor},
     error::LogError,
+    place::Place,
     warning::LogWarning,
     wire::{Encoding, Wire},
 };
@@ -125,7 +126,7 @@ impl Reader<'_> {
         };
         if head.size > size {
             let (path, found) = (source.path().to_path_buf(), head.size);
-            return Err(LogError::TooLarge { path, offset, found, limit: size });
+            return Err(LogError::TooLarge { path, place: Place::Byte(offset), found, limit: size });
         }
         let mut chunk = std::mem::take(&mut self.chunk);
         match decompress(head.compression, head.records, head.size, &mut chunk) {
@@ -179,7 +180,7 @@ impl Reader<'_> {
             Record::Message { header, data } => self.visitor.message(RawMessage {
                 connection: header.channel_id.into(),
                 log_ns: i64::try_from(header.log_time).unwrap_or(i64::MAX),
-                offset,
+                place: Place::Byte(offset),
                 data: &data,
             })?,
             _ => {}

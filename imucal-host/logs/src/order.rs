@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{error::LogError, message::Kind, warning::LogWarning};
+use crate::{error::LogError, message::Kind, place::Place, warning::LogWarning};
 
 /// Messages overtake each other by less than this on their way to the recorder, ns; a clock that was reset runs back further.
 const OVERTAKES: i64 = 1_000_000_000;
@@ -16,7 +16,7 @@ pub(crate) struct Unordered {
     pub(crate) stamps: Vec<i64>,
     /// When they were recorded, ns.
     pub(crate) logged: Vec<i64>,
-    pub(crate) offsets: Vec<u64>,
+    pub(crate) places: Vec<Place>,
     /// Row by row.
     pub(crate) values: Vec<f64>,
 }
@@ -30,12 +30,12 @@ pub(crate) struct Ordered {
 
 impl Unordered {
     pub(crate) fn new(kind: Kind) -> Self {
-        Self { kind, stamps: Vec::new(), logged: Vec::new(), offsets: Vec::new(), values: Vec::new() }
+        Self { kind, stamps: Vec::new(), logged: Vec::new(), places: Vec::new(), values: Vec::new() }
     }
 
     /// Bytes in memory.
     pub(crate) fn size(&self) -> u64 {
-        8 * (3 * self.stamps.len() + self.values.len()) as u64
+        8 * (4 * self.stamps.len() + self.values.len()) as u64
     }
 
     fn row(&self, row: usize) -> &[f64] {
@@ -47,8 +47,8 @@ impl Unordered {
         self.stamps.get(row).copied().unwrap_or_default()
     }
 
-    fn offset(&self, row: usize) -> u64 {
-        self.offsets.get(row).copied().unwrap_or_default()
+    fn place(&self, row: usize) -> Place {
+        self.places.get(row).copied().unwrap_or(Place::Byte(0))
     }
 
     /// Sorts by stamps. Where no message has one, the times of recording are taken.
@@ -87,7 +87,7 @@ impl Unordered {
                         return Err(LogError::StampTwice {
                             path: path.to_path_buf(),
                             topic: topic_name(),
-                            offset: self.offset(row),
+                            place: self.place(row),
                             found_ns: self.stamp(row),
                         });
                     }
@@ -116,7 +116,7 @@ impl Unordered {
                 return Err(LogError::StampOrder {
                     path: path.to_path_buf(),
                     topic: topic.to_owned(),
-                    offset: self.offset(row),
+                    place: self.place(row),
                     found_ns: found,
                     before_ns: before,
                 });
@@ -143,7 +143,7 @@ mod tests {
         for (stamp, logged, value) in messages {
             all.stamps.push(*stamp);
             all.logged.push(*logged);
-            all.offsets.push(0);
+            all.places.push(Place::Byte(0));
             all.values.push(*value);
         }
         let mut warnings = Vec::new();

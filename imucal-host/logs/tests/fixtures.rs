@@ -5,12 +5,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use imucal_logs::{Kind, Log, LogError, LogWarning, Reading, Refusal, Stream};
+use imucal_logs::{Kind, Log, LogError, LogWarning, Place, Reading, Refusal, Stream};
 
 const BEGIN: i64 = 1_700_000_000_123_456_789;
 const SIZE: u64 = 1 << 30;
-/// Whose content is one and the same.
-const ALL: [&str; 8] = [
+/// Logs of records in a row, whose content is one and the same.
+const RECORDS: [&str; 8] = [
     "ros2-none.mcap",
     "ros2-lz4.mcap",
     "ros2-zstd.mcap",
@@ -20,6 +20,9 @@ const ALL: [&str; 8] = [
     "bz2.bag",
     "lz4.bag",
 ];
+
+/// Databases of the same content: with definitions, with messages that are compressed too, and without definitions.
+const DATABASES: [&str; 3] = ["iron.db3", "compressed.db3", "foxy.db3"];
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
@@ -56,9 +59,12 @@ fn damaged(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
 #[test]
 fn each_container_and_compression_gives_the_numbers_and_stamps_that_were_written() {
     let topics = ["/imu/data", "/imu/mag", "/imu/temperature", "/vicon/pose", "/pose_cov", "/odom"];
-    for name in ALL {
+    for name in RECORDS.into_iter().chain(DATABASES) {
         let reading = read(&fixture(name), &topics);
-        assert_eq!(reading.warnings, [], "{name}");
+        let undefined = |warning: &LogWarning| matches!(warning, LogWarning::NoDefinition { .. });
+        let expected = if name == "foxy.db3" { topics.len() } else { 0 };
+        assert_eq!(reading.warnings.iter().filter(|warning| undefined(warning)).count(), expected, "{name}");
+        assert_eq!(reading.warnings.len(), expected, "{name}: {:?}", reading.warnings);
         assert_imu(&reading.streams[0], 40);
         let mag = &reading.streams[1];
         assert_eq!((mag.kind, mag.stamps_ns.len(), mag.stamps_ns[3]), (Kind::MagneticField, 20, stamp(6)));
@@ -78,7 +84,7 @@ fn each_container_and_compression_gives_the_numbers_and_stamps_that_were_written
 
 #[test]
 fn topics_are_listed_with_type_count_and_why_they_are_not_read() {
-    for name in ALL {
+    for name in RECORDS.into_iter().chain(DATABASES) {
         let log = Log::open(&fixture(name), SIZE).expect("it opens");
         let counts: Vec<(&str, u64)> =
             log.topics().iter().map(|topic| (topic.name.as_str(), topic.count)).collect();
@@ -128,7 +134,7 @@ fn chunks_out_of_order_are_sorted_by_stamp() {
 
 #[test]
 fn of_a_cut_file_what_is_whole_is_read_with_a_warning() {
-    for name in ALL {
+    for name in RECORDS {
         let whole = fs::read(fixture(name)).expect("a fixture");
         let mut before = 0;
         // The index, where there is one, stands in the last part.
@@ -180,14 +186,57 @@ fn a_damaged_chunk_is_refused_with_its_place() {
         bytes[at..at + 40].iter_mut().for_each(|byte| *byte ^= 0x55);
         let (_folder, path) = damaged(name, &bytes);
         let error = Log::open(&path, SIZE).and_then(|log| log.read(&["/imu/data"])).unwrap_err();
-        let LogError::Damaged { offset, .. } = &error else { panic!("{name}: {error}") };
-        assert!(*offset < at as u64, "{name}: {error}");
+        let LogError::Damaged { place, .. } = &error else { panic!("{name}: {error}") };
+        assert!(*place < Place::Byte(at as u64), "{name}: {error}");
     }
 }
 
 #[test]
+fn a_database_that_was_cut_is_refused_with_the_way_to_recover_it() {
+    let whole = fs::read(fixture("iron.db3")).expect("a fixture");
+    for length in [whole.len() - 4096, whole.len() / 2, 4096, 200, 20] {
+        let (_folder, path) = damaged("cut.db3", &whole[..length]);
+        let error = Log::open(&path, SIZE).and_then(|log| log.read(&["/imu/data"])).unwrap_err();
+        assert!(matches!(error, LogError::Database { .. } | LogError::NotABag { .. }), "{length}: {error}");
+        let text = error.to_string();
+        assert!(text.contains("cut.db3") && text.contains("expected"), "{text}");
+    }
+}
+
+#[test]
+fn a_database_of_something_else_is_no_bag() {
+    let (_folder, path) = damaged("other.db3", b"");
+    let database = rusqlite::Connection::open(&path).expect("room");
+    database.execute_batch("CREATE TABLE topics(id INTEGER PRIMARY KEY);").expect("a table");
+    let error = Log::open(&path, SIZE).unwrap_err().to_string();
+    assert!(error.contains("without the table `messages`"), "{error}");
+    // A view could be anything.
+    database.execute_batch("CREATE VIEW messages AS SELECT 1 AS id;").expect("a view");
+    assert_eq!(Log::open(&path, SIZE).unwrap_err().to_string(), error);
+}
+
+#[test]
+fn a_message_of_a_database_that_is_damaged_is_refused_with_its_row() {
+    let change = |change: &str, topic: &str| {
+        let (_folder, path) = damaged("bag.db3", &fs::read(fixture("iron.db3")).expect("a fixture"));
+        rusqlite::Connection::open(&path).and_then(|bag| bag.execute_batch(change)).expect("it changes");
+        Log::open(&path, SIZE).and_then(|log| log.read(&[topic])).unwrap_err().to_string()
+    };
+    let error = change("UPDATE messages SET data = 'text' WHERE id = 9;", "/imu/data");
+    assert!(error.contains("bag.db3, message 9 of the database: found content of the type Text"), "{error}");
+    let error = change("UPDATE messages SET topic_id = 99 WHERE id = 11;", "/imu/data");
+    assert!(error.contains("message 11 of the database: found a message of topic 99"), "{error}");
+    let error = change("UPDATE messages SET data = substr(data, 1, 100) WHERE id = 1;", "/imu/data");
+    assert!(error.contains("`/imu/data`, its message 1, message 1 of the database"), "{error}");
+    let error = change("UPDATE messages SET data = x'28b52ffd00' WHERE id = 1;", "/imu/data");
+    assert!(error.contains("message 1 of the database: found a damaged zstd stream"), "{error}");
+    let error = change("UPDATE message_definitions SET encoding = 'ros2idl';", "/imu/data");
+    assert!(error.contains("`/imu/data`") && error.contains("ros2idl"), "{error}");
+}
+
+#[test]
 fn other_files_are_no_logs() {
-    for bytes in [&b""[..], b"t,acc_x\n", b"SQLite format 3\0", b"#ROSBAG V1.2\n"] {
+    for bytes in [&b""[..], b"t,acc_x\n", b"SQLite format 2\0", b"#ROSBAG V1.2\n"] {
         let (_folder, path) = damaged("a.mcap", bytes);
         let error = Log::open(&path, SIZE).unwrap_err();
         assert!(matches!(error, LogError::Container { .. }), "{error}");
@@ -204,4 +253,11 @@ fn more_than_the_limit_is_refused() {
     let error = Log::open(&path, 8_000)
         .and_then(|log| log.read(&["/imu/data", "/imu/mag", "/vicon/pose", "/odom", "/pose_cov"]));
     assert!(matches!(error, Err(LogError::TooMany { limit: 8_000, .. })), "{error:?}");
+    for name in DATABASES {
+        let error = Log::open(&fixture(name), 50).and_then(|log| log.read(&["/imu/data"])).unwrap_err();
+        let text = error.to_string();
+        let too_long =
+            matches!(error, LogError::TooLarge { limit: 50, .. }) || text.contains("more than 50 bytes");
+        assert!(too_long && text.contains("message 1 of the database"), "{text}");
+    }
 }

@@ -5,8 +5,16 @@ use std::{fs, path::Path};
 use imucal_logs::Log;
 use proptest::prelude::*;
 
-const FIXTURES: [&str; 6] =
-    ["ros2-none.mcap", "ros2-lz4.mcap", "ros2-zstd.mcap", "none.bag", "bz2.bag", "lz4.bag"];
+const FIXTURES: [&str; 8] = [
+    "ros2-none.mcap",
+    "ros2-lz4.mcap",
+    "ros2-zstd.mcap",
+    "none.bag",
+    "bz2.bag",
+    "lz4.bag",
+    "iron.db3",
+    "compressed.db3",
+];
 
 /// Reads whatever can be read of a file.
 fn read_all(path: &Path) {
@@ -49,8 +57,8 @@ proptest! {
 
     /// The first bytes are those of a log, and nothing else is.
     #[test]
-    fn noise_behind_a_magic_is_read_or_refused(is_bag: bool, noise in prop::collection::vec(any::<u8>(), 0..400)) {
-        let magic: &[u8] = if is_bag { b"#ROSBAG V2.0\n" } else { b"\x89MCAP0\r\n" };
+    fn noise_behind_a_magic_is_read_or_refused(which in 0..3usize, noise in prop::collection::vec(any::<u8>(), 0..400)) {
+        let magic: &[u8] = [&b"#ROSBAG V2.0\n"[..], b"\x89MCAP0\r\n", b"SQLite format 3\0"][which];
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a");
         fs::write(&path, [magic, &noise].concat()).expect("room");

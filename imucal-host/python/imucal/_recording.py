@@ -181,7 +181,7 @@ def read(
 ) -> Recording:
     """Reads a recording, with its manifest next to it, or another program's file by ``map``, ``unit`` and ``time``.
 
-    Of a robot's log (``.mcap``, ``.bag``) ``topic`` chooses topics, such as ``{"imu": "/imu/data", "mag": "none"}``.
+    Of a robot's log (``.mcap``, ``.db3``, ``.bag``) ``topic`` chooses topics, such as ``{"imu": "/imu/data", "mag": "none"}``.
     """
     return Recording(_native.read(os.fspath(path), reading(map, unit, time, topic, max_size, max_columns)))
 

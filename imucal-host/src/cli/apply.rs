@@ -17,7 +17,10 @@ use super::{
     reading::Reading,
     refuse, warn,
 };
-use crate::apply::{self, Source, StreamError};
+use crate::{
+    apply::{self, Source, StreamError},
+    recording::is_log,
+};
 
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  imucal apply tumble.csv --calibration unit.bin --out tumble-si.csv")]
@@ -80,10 +83,9 @@ fn default_output(path: &Path) -> PathBuf {
     let lower = name.to_ascii_lowercase();
     let ending = [".csv.gz", ".csv", ".parquet"].into_iter().find(|ending| lower.ends_with(ending));
     // Endings are ASCII, so that the lengths agree and the cut is between characters.
-    let log = [".mcap", ".bag"].into_iter().find(|ending| lower.ends_with(ending));
-    let (stem, ending) = match log {
-        Some(log) => (&name[..name.len() - log.len()], ".csv"),
-        None => name.split_at(name.len() - ending.map_or(0, str::len)),
+    let (stem, ending) = match path.file_stem().and_then(OsStr::to_str) {
+        Some(stem) if is_log(path) => (stem, ".csv"),
+        _ => name.split_at(name.len() - ending.map_or(0, str::len)),
     };
     path.with_file_name(format!("{stem}-calibrated{ending}"))
 }

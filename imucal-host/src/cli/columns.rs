@@ -28,7 +28,7 @@ pub(super) struct Columns {
     /// The column of times; its unit is stated by --unit t=ms, or by the end of its name (timestamp_ms)
     #[arg(long = "time", value_name = "COLUMN", help_heading = "Another program's file")]
     time: Option<String>,
-    /// A topic of an MCAP file or a ROS 1 bag: imu=/imu/data, mag=, temp=, or ref= for a reference's poses; the only one of a
+    /// A topic of an MCAP file or a bag: imu=/imu/data, mag=, temp=, or ref= for a reference's poses; the only one of a
     /// sensor is taken without it, and mag=none takes none. Give it once for each
     #[arg(long = "topic", value_name = "ROLE=TOPIC", help_heading = "A robot's log")]
     topic: Vec<String>,

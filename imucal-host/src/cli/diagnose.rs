@@ -30,7 +30,7 @@ use crate::{
 #[command(after_help = "Example:\n  imucal diagnose robot.csv --sim simulated.csv --html gap.html")]
 pub(super) struct Arguments {
     /// The recording to diagnose: NAME.csv, NAME.csv.gz or NAME.parquet, with its manifest NAME.toml in the same folder; or a log,
-    /// NAME.mcap or NAME.bag
+    /// NAME.mcap, NAME.db3 or NAME.bag
     #[arg(required_unless_present = "list")]
     recording: Option<PathBuf>,
     /// The unit's present model, as `imucal calibrate` wrote it (default: calibrated from the recording)

@@ -23,7 +23,7 @@ use crate::recording::{
 enum Layout {
     /// One CSV file, with its columns by --map, --unit and --time; fields separated by commas, semicolons or tabs
     Csv,
-    /// An MCAP file or a ROS 1 bag, its topics by --topic
+    /// An MCAP file or a bag, its topics by --topic
     Log,
     /// A folder of EuRoC: mav0/imu0 and, as the reference, its ground truth or Vicon's poses
     Euroc,

@@ -2,13 +2,16 @@
 
 use std::path::Path;
 
+/// How the names of robots' logs end: MCAP, ROS 1 bags and ROS 2 bags in SQLite.
+pub(crate) const LOGS: [&str; 3] = [".mcap", ".bag", ".db3"];
+
 /// Format of a samples file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
     Csv,
     CsvGz,
     Parquet,
-    /// A robot's log: MCAP or a ROS 1 bag.
+    /// A robot's log.
     Log,
 }
 
@@ -22,7 +25,7 @@ impl Format {
             Ok(Self::Csv)
         } else if name.ends_with(".parquet") {
             Ok(Self::Parquet)
-        } else if name.ends_with(".mcap") || name.ends_with(".bag") {
+        } else if LOGS.iter().any(|ending| name.ends_with(ending)) {
             Ok(Self::Log)
         } else {
             Err(name.rfind('.').map_or(String::new(), |at| name[at..].to_owned()))

@@ -75,7 +75,7 @@ impl TopicLine {
 #[allow(missing_docs)] // The fields are those of each message.
 pub enum TopicFault {
     /// Topics are chosen of a file that has none.
-    #[error("found --topic with a file that is no log, expected .mcap or .bag; leave --topic out")]
+    #[error("found --topic with a file that is no log, expected .mcap, .db3 or .bag; leave --topic out")]
     NotALog,
     /// Columns are mapped of a file that has none.
     #[error(

@@ -25,6 +25,7 @@ pub use self::{
 };
 use self::{fault::ManifestFault, keys::KeyMap};
 use super::{
+    format::LOGS,
     read_error::ReadError,
     sensor_kind::SensorKind,
     triple::{Nominal, Triple},
@@ -203,11 +204,11 @@ impl Default for Manifest {
 
 impl Manifest {
     /// The manifest's path next to a samples file: `NAME.toml` for `NAME.csv`, `NAME.csv.gz`,
-    /// `NAME.parquet`, `NAME.mcap` and `NAME.bag`; `None` for a file of another ending.
+    /// `NAME.parquet` and robots' logs; `None` for a file of another ending.
     #[must_use]
     pub fn path_beside(samples: &Path) -> Option<PathBuf> {
         let name = samples.file_name()?.to_str()?;
-        let stem = [".csv.gz", ".csv", ".parquet", ".mcap", ".bag"].iter().find_map(|ending| {
+        let stem = [".csv.gz", ".csv", ".parquet"].iter().chain(&LOGS).find_map(|ending| {
             let at = name.len().checked_sub(ending.len())?;
             let (stem, end) = name.split_at_checked(at)?;
             end.eq_ignore_ascii_case(ending).then_some(stem)
@@ -349,6 +350,7 @@ mod tests {
             ("a.parquet", Some("a.toml")),
             ("a.mcap", Some("a.toml")),
             ("a.bag", Some("a.toml")),
+            ("a_0.DB3", Some("a_0.toml")),
             ("a.txt", None),
         ] {
             assert_eq!(Manifest::path_beside(Path::new(samples)), manifest.map(PathBuf::from));

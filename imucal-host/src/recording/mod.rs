@@ -47,7 +47,7 @@ pub use self::{
 };
 use crate::file::{Limits, OutputSet};
 
-/// Whether a file is a robot's log by its ending: MCAP or a ROS 1 bag.
+/// Whether a file is a robot's log by its ending: MCAP or a bag.
 #[must_use]
 pub fn is_log(path: &Path) -> bool {
     Format::of(path) == Ok(Format::Log)
@@ -125,8 +125,8 @@ impl Recording {
         }
     }
 
-    /// Reads `NAME.csv`, `NAME.csv.gz` or, when built with the features `parquet` and `logs`, `NAME.parquet`, `NAME.mcap` and
-    /// `NAME.bag`, and the manifest `NAME.toml` next to it, which a log needs not have. What is odd but harmless is in [`Recording::warnings`].
+    /// Reads `NAME.csv`, `NAME.csv.gz` or, when built with the features `parquet` and `logs`, `NAME.parquet`, `NAME.mcap`,
+    /// `NAME.bag` and `NAME.db3`, and the manifest `NAME.toml` next to it, which a log needs not have. What is odd but harmless is in [`Recording::warnings`].
     ///
     /// # Errors
     ///

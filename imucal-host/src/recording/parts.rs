@@ -1,6 +1,10 @@
 //! Recordings of any length, read by parts in constant memory.
 
-use std::{mem, ops::ControlFlow, path::Path};
+use std::{
+    fs, mem,
+    ops::ControlFlow,
+    path::{Path, PathBuf},
+};
 
 use super::{
     Format, Manifest, Mapping, ReadError, Recording, SensorKind, Triple, Warning, log_topics::TopicFault,
@@ -92,7 +96,17 @@ pub(super) fn opened(
 /// A file whose ending is of no format.
 fn unknown(path: &Path, found: String) -> ReadError {
     let path = path.to_path_buf();
-    if found == ".db3" { ReadError::Sqlite { path } } else { ReadError::UnknownFormat { path, found } }
+    if path.is_dir() { folder(path) } else { ReadError::UnknownFormat { path, found } }
+}
+
+/// A folder, as `ros2 bag record` makes one, with the files in it that are read.
+fn folder(path: PathBuf) -> ReadError {
+    let entries = fs::read_dir(&path).into_iter().flatten().flatten();
+    let readable =
+        entries.map(|entry| entry.path()).filter(|file| file.is_file() && Format::of(file).is_ok());
+    let mut files: Vec<String> = readable.map(|file| file.display().to_string()).collect();
+    files.sort();
+    ReadError::Folder { path, files }
 }
 
 /// Topics are of a log, and named columns of any other file.

@@ -25,7 +25,7 @@ pub enum ReadError {
     Unreadable { path: PathBuf, found: String },
     /// The name says no format there is a reader for.
     #[error(
-        "{path}: found the ending `{found}`, expected .csv, .csv.gz, .parquet, .mcap or .bag; give the samples file, or bring other formats in with `imucal import`"
+        "{path}: found the ending `{found}`, expected .csv, .csv.gz, .parquet, .mcap, .db3 or .bag; give the samples file, or bring other formats in with `imucal import`"
     )]
     UnknownFormat { path: PathBuf, found: String },
     /// Parquet is not built in.
@@ -38,11 +38,9 @@ pub enum ReadError {
         "{path}: found a robot's log, expected .csv, .csv.gz or .parquet since this build is without logs; build with `--features logs`"
     )]
     LogsNotBuilt { path: PathBuf },
-    /// A log in SQLite.
-    #[error(
-        "{path}: found a ROS 2 log in SQLite, expected MCAP; convert it with `ros2 bag convert --input {path} --output-options to.yaml`, where to.yaml has `output_bags: [{{uri: OUT, storage_id: mcap, all: true}}]`"
-    )]
-    Sqlite { path: PathBuf },
+    /// A folder, and the files in it that are read.
+    #[error("{path}: found a folder, expected a file; {}", in_folder(.files))]
+    Folder { path: PathBuf, files: Vec<String> },
     /// A log that cannot be read.
     #[cfg(feature = "logs")]
     #[error(transparent)]
@@ -214,6 +212,20 @@ impl ReadError {
                 | Self::TooLong { .. }
                 | Self::TooManySamples { .. }
         )
+    }
+}
+
+/// Files of a folder that are named, at most.
+const NAMED: usize = 4;
+
+fn in_folder(files: &[String]) -> String {
+    let named = files.iter().take(NAMED).map(|file| format!("`{file}`")).collect::<Vec<_>>().join(", ");
+    match files.len() {
+        0 => "there is none in it that is read; a folder of EuRoC is brought in with `imucal import`"
+            .to_owned(),
+        1 => format!("give the one in it that is read: {named}"),
+        count if count > NAMED => format!("give one of the {count} in it that are read: {named}, …"),
+        _ => format!("give one of those in it that are read: {named}"),
     }
 }
 
