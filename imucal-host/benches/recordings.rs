@@ -1,5 +1,5 @@
-//! How long and in how much memory recordings are simulated, corrected and looked at for noise, by their rows. Prints the tables of
-//! docs/performance.md; figures are ratios within one run.
+//! How long and in how much memory recordings are simulated, brought in, corrected and looked at for noise, by their rows. Prints the
+//! tables of docs/performance.md; figures are ratios within one run.
 //!
 //! `imucal apply` is compared with the same arithmetic by Polars and DuckDB, each a process of its own as ours is, where
 //! Python has them: `IMUCAL_PYTHON=PROGRAM` names it. `IMUCAL_ROWS=N` asks for one more row count for them, as 10000000.
@@ -50,6 +50,13 @@ fn main() {
     for rows in ROWS {
         let path = recording(folder, rows);
         line(rows, &imucal(&["noise"], &[&path]), &mut first);
+    }
+    println!("\nRecordings of two sensors, `imucal import`:\n");
+    heading(ROWS[0]);
+    let mut first = None;
+    for rows in ROWS {
+        let (path, out) = (recording(folder, rows), folder.join("imported.csv"));
+        line(rows, &imucal(&["import", "--force"], &[&path, Path::new("--out"), &out]), &mut first);
     }
     let more = env::var("IMUCAL_ROWS").ok().and_then(|rows| rows.parse().ok());
     let calibration = folder.join("calibration.toml");

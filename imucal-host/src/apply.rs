@@ -4,7 +4,7 @@ use std::convert::Infallible;
 
 mod stream;
 
-pub use self::stream::{Applied, Source, StreamError, stream};
+pub use self::stream::{Applied, StreamError, stream};
 
 use imucal_core::{
     corrector::{Compensator, FullCorrector},

@@ -28,7 +28,7 @@ pub mod stillness;
 use self::sensor::{Refusal, Remark, SensorNoise, SensorStream};
 use crate::{
     file::Limits,
-    recording::{Manifest, Mapping, ReadError, Recording, SensorKind, Warning},
+    recording::{Manifest, Mapping, ReadError, Recording, SensorKind, Source, Warning},
 };
 
 /// A sensor with its noise, or why there is none.
@@ -69,7 +69,8 @@ pub fn noise(path: &Path, mapping: &Mapping, limits: &Limits) -> Result<Noise, R
     let mut streams: Vec<SensorStream> = SensorKind::ALL.into_iter().map(SensorStream::new).collect();
     let mut span: Option<(f64, f64)> = None;
     let mut described = None;
-    let warnings = Recording::read_parts(path, mapping, limits, &mut |part| {
+    let source = Source { path, mapping, manifest: None, limits };
+    let warnings = Recording::read_parts(source, &mut |part| {
         if described.is_none() {
             let there = SensorKind::ALL.map(|kind| part.sensor(kind).is_some());
             described = Some((part.name.clone(), part.manifest.clone(), there));

@@ -1,12 +1,6 @@
-//! From a file to a file, part after part in constant memory: one thread reads and corrects, another one writes.
+//! A recording's file corrected into another one, part after part in constant memory.
 
-use std::{
-    ops::ControlFlow,
-    panic,
-    path::Path,
-    sync::mpsc::{SyncSender, sync_channel},
-    thread,
-};
+use std::path::Path;
 
 use imucal_core::{
     nonlinearity::TooSteep,
@@ -15,24 +9,13 @@ use imucal_core::{
 
 use super::{ApplyError, Correction, check};
 use crate::{
-    file::{Limits, OutputSet},
-    recording::{Mapping, ReadError, Recording, Warning, WriteError},
+    file::OutputSet,
+    recording::{
+        ReadError, Recording, Source, Warning, WriteError,
+        transfer::{TransferError, transfer},
+    },
     store::StoredCalibration,
 };
-
-/// Parts that wait for the writer.
-const WAITING: usize = 1;
-
-/// A recording's file and how it is read.
-#[derive(Clone, Copy, Debug)]
-pub struct Source<'a> {
-    /// The samples.
-    pub path: &'a Path,
-    /// What its columns are, where they have other names.
-    pub mapping: &'a Mapping,
-    /// Limits of one part.
-    pub limits: &'a Limits,
-}
 
 /// What has been corrected.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,17 +67,15 @@ pub fn stream(
     let mut correction = Correction::new(stored, record)?;
     let mut first = None;
     let judge = |part: &Recording| (part.name.clone(), check(part, stored, record, other_serial));
-    let (read, written) = thread::scope(|scope| {
-        let (parts, corrected) = sync_channel(WAITING);
-        let writer = scope.spawn(move || Recording::write_parts(corrected, out, files));
-        let read = read(source, parts, |part| {
-            let (_, judged) = first.get_or_insert_with(|| judge(&part));
-            judged.is_ok().then(|| correction.correct(part))
-        });
-        (read, writer.join().unwrap_or_else(|panicked| panic::resume_unwind(panicked)))
+    let transferred = transfer(source, out, files, |part| {
+        let (_, judged) = first.get_or_insert_with(|| judge(&part));
+        judged.is_ok().then(|| correction.correct(part))
     });
-    let warnings = read?;
-    let rows = written?;
+    let transferred = transferred.map_err(|error| match error {
+        TransferError::Read(error) => StreamError::Read(error),
+        TransferError::Write(error) => StreamError::Write(error),
+    })?;
+    let (rows, warnings) = (transferred.rows, transferred.warnings);
     match first {
         Some((_, Err(refusal))) => Err(StreamError::Refused { refusal, warnings }),
         Some((recording, Ok(remark))) => Ok(Applied { recording, rows, warnings, remark }),
@@ -102,24 +83,12 @@ pub fn stream(
     }
 }
 
-/// Sends what `correct` makes of each part, until it makes nothing of one or nobody takes it any more.
-fn read(
-    source: Source<'_>,
-    parts: SyncSender<Recording>,
-    mut correct: impl FnMut(Recording) -> Option<Recording>,
-) -> Result<Vec<Warning>, ReadError> {
-    Recording::read_parts(source.path, source.mapping, source.limits, &mut |part| {
-        let sent = correct(part).is_some_and(|part| parts.send(part).is_ok());
-        if sent { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use std::{fs, path::PathBuf};
 
     use super::*;
-    use crate::apply::apply;
+    use crate::{apply::apply, file::Limits, recording::Mapping};
 
     const MANIFEST: &str = "format = \"imucal-recording/1\"\n[units]\nt = \"s\"\nacc = \"counts\"\n\
         [counts]\nacc = { offset = 32768.0, per_unit = 600.0 }\n";
@@ -196,7 +165,7 @@ cross_std = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
 
         fn stream(&self, out: &str) -> Result<Applied, StreamError> {
             let (path, mapping, limits) = (self.path("run.csv"), Mapping::default(), Limits::default());
-            let source = Source { path: &path, mapping: &mapping, limits: &limits };
+            let source = Source { path: &path, mapping: &mapping, manifest: None, limits: &limits };
             let mut files = OutputSet::default();
             let applied = stream(source, (&self.stored, &self.record), false, &self.path(out), &mut files)?;
             files.commit().unwrap();

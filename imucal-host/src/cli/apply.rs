@@ -18,8 +18,8 @@ use super::{
     refuse, warn,
 };
 use crate::{
-    apply::{self, Source, StreamError},
-    recording::is_log,
+    apply::{self, StreamError},
+    recording::{Source, is_log},
 };
 
 #[derive(Args, Debug)]
@@ -55,7 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     };
     let record = stored.to_record(&arguments.calibration)?;
     let (mapping, limits) = (arguments.columns.mapping()?, arguments.reading.limits());
-    let source = Source { path: &arguments.recording, mapping: &mapping, limits: &limits };
+    let source = Source { path: &arguments.recording, mapping: &mapping, manifest: None, limits: &limits };
     let progress = Progress::reading(source.path);
     let applied = apply::stream(source, (&stored, &record), arguments.other_serial, &out, &mut files);
     drop(progress);

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{progress::Progress, reading::Reading, warn};
 use crate::{
-    recording::{Manifest, Mapping, ReadError, Recording, layout_guess::guess},
+    recording::{Mapping, ReadError, Recording, layout_guess::guess},
     report::layout,
 };
 
@@ -42,19 +42,9 @@ impl Columns {
 
 /// Reads a recording, or another program's file as one, and warns of what is odd in it.
 pub(super) fn read(path: &Path, columns: &Columns, reading: Reading) -> anyhow::Result<Recording> {
-    read_with(path, columns, None, reading)
-}
-
-/// The same; `manifest` takes the place of the one next to the file.
-pub(super) fn read_with(
-    path: &Path,
-    columns: &Columns,
-    manifest: Option<Manifest>,
-    reading: Reading,
-) -> anyhow::Result<Recording> {
     let mapping = columns.mapping()?;
     let progress = Progress::reading(path);
-    let recording = Recording::read_with(path, &mapping, manifest, &reading.limits())
+    let recording = Recording::read_as(path, &mapping, &reading.limits())
         .map_err(|error| explained(path, error, reading))?;
     drop(progress);
     for warning in &recording.warnings {

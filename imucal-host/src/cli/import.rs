@@ -10,12 +10,17 @@ use super::{
     columns::{self, Columns},
     output::say,
     overwrite::{Overwrite, Planned},
+    progress::Progress,
     reading::Reading,
     warn,
 };
-use crate::recording::{
-    Manifest, Recording,
-    read::{euroc, imu_tk},
+use crate::{
+    file::OutputSet,
+    recording::{
+        Manifest, Recording, Source,
+        read::{euroc, imu_tk},
+        transfer::{TransferError, transfer},
+    },
 };
 
 /// Other people's formats.
@@ -70,31 +75,53 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         }
         None => None,
     };
-    let recording = match (arguments.files.as_slice(), arguments.from) {
-        ([folder], Some(Layout::Euroc)) => euroc(folder, manifest, arguments)?,
-        ([folder], None) if euroc::is_folder(folder) => euroc(folder, manifest, arguments)?,
+    let rows = match (arguments.files.as_slice(), arguments.from) {
+        ([folder], Some(Layout::Euroc)) => {
+            whole(&euroc::read_folder(folder, manifest, &limits)?, arguments, &mut files)?
+        }
+        ([folder], None) if euroc::is_folder(folder) => {
+            whole(&euroc::read_folder(folder, manifest, &limits)?, arguments, &mut files)?
+        }
         ([file], None | Some(Layout::Csv | Layout::Log)) => {
-            columns::read_with(file, &arguments.columns, manifest, arguments.reading)?
+            by_parts(file, manifest.as_ref(), arguments, &mut files)?
         }
         ([acc, gyr], None | Some(Layout::ImuTk)) => {
             let manifest = manifest.context("imu_tk: its files say no units; add --manifest")?;
-            let recording = imu_tk::read_pair(acc, gyr, manifest, &limits)?;
-            recording.warnings.iter().for_each(|warning| warn(warning));
-            recording
+            whole(&imu_tk::read_pair(acc, gyr, manifest, &limits)?, arguments, &mut files)?
         }
         (_, Some(Layout::Csv | Layout::Log | Layout::Euroc)) => {
             anyhow::bail!("--from: found two files, expected one")
         }
         _ => anyhow::bail!("imu_tk: found one file, expected the accelerometer's and then the gyroscope's"),
     };
-    recording.write_into(&arguments.out, &mut files)?;
     files.commit()?;
-    say!("{}: {} rows", arguments.out.display(), recording.rows());
+    say!("{}: {rows} rows", arguments.out.display());
     Ok(Ending::Done)
 }
 
-fn euroc(folder: &Path, manifest: Option<Manifest>, arguments: &Arguments) -> anyhow::Result<Recording> {
-    let recording = euroc::read_folder(folder, manifest, &arguments.reading.limits())?;
+/// Writes a recording that was read as a whole; its number of rows.
+fn whole(recording: &Recording, arguments: &Arguments, files: &mut OutputSet) -> anyhow::Result<usize> {
     recording.warnings.iter().for_each(|warning| warn(warning));
-    Ok(recording)
+    recording.write_into(&arguments.out, files)?;
+    Ok(recording.rows())
+}
+
+/// Reads and writes a file of any length; its number of rows.
+fn by_parts(
+    path: &Path,
+    manifest: Option<&Manifest>,
+    arguments: &Arguments,
+    files: &mut OutputSet,
+) -> anyhow::Result<usize> {
+    let (mapping, limits) = (arguments.columns.mapping()?, arguments.reading.limits());
+    let source = Source { path, mapping: &mapping, manifest, limits: &limits };
+    let progress = Progress::reading(path);
+    let done = transfer(source, &arguments.out, files, Some);
+    drop(progress);
+    let done = done.map_err(|error| match error {
+        TransferError::Read(error) => columns::explained(path, error, arguments.reading),
+        TransferError::Write(error) => error.into(),
+    })?;
+    done.warnings.iter().for_each(|warning| warn(warning));
+    Ok(done.rows)
 }

@@ -23,6 +23,7 @@ mod samples;
 mod sensor_kind;
 pub mod simulated;
 pub mod topic;
+pub mod transfer;
 mod triple;
 pub mod unit;
 mod warning;
@@ -35,6 +36,7 @@ pub use self::{
     manifest::{Manifest, site::LEAST_DIP},
     mapping::Mapping,
     order_statistics::median,
+    parts::Source,
     place::Place,
     read_error::ReadError,
     samples::Samples,

@@ -17,23 +17,35 @@ const ROWS: usize = 1 << 16;
 /// Samples by which a sensor's unit is judged.
 const JUDGED: usize = 100;
 
+/// A recording's file and how it is read.
+#[derive(Clone, Copy, Debug)]
+pub struct Source<'a> {
+    /// The samples.
+    pub path: &'a Path,
+    /// What its columns are, where they have other names.
+    pub mapping: &'a Mapping,
+    /// What takes the place of the manifest next to it.
+    pub manifest: Option<&'a Manifest>,
+    /// Limits of one part.
+    pub limits: &'a Limits,
+}
+
 impl Recording {
     /// Reads a recording by parts, each a recording of consecutive rows. What is odd but harmless is returned, each kind
     /// of warning once, and in [`Recording::warnings`] of no part. No part follows one that `take` breaks off at.
     ///
-    /// A part of a text file has 65 536 rows; one of a Parquet file is a row group, and a log is one part. `limits` hold for one part, so that
+    /// A part of a text file has 65 536 rows; one of a Parquet file is a row group, and a log is one part. Limits hold for one part, so that
     /// the file may be of any length.
     ///
     /// # Errors
     ///
     /// As [`Recording::read`]; intervals are judged by the first part alone, and the unit of a sensor by the first parts that it is in.
     pub fn read_parts(
-        path: &Path,
-        mapping: &Mapping,
-        limits: &Limits,
+        source: Source<'_>,
         take: &mut dyn FnMut(Self) -> ControlFlow<()>,
     ) -> Result<Vec<Warning>, ReadError> {
-        let (format, manifest, warnings) = opened(path, mapping, None, limits)?;
+        let Source { path, mapping, manifest, limits } = source;
+        let (format, manifest, warnings) = opened(path, mapping, manifest.cloned(), limits)?;
         let misled = misled(&warnings);
         let unit = manifest.units.t;
         #[cfg(feature = "logs")]
@@ -268,12 +280,13 @@ mod tests {
 
     fn parts(fixture: &Fixture) -> Result<Read, ReadError> {
         let mut read = Read::default();
-        read.warnings =
-            Recording::read_parts(&fixture.path, &Mapping::default(), &Limits::default(), &mut |part| {
-                read.lengths.push(part.rows());
-                read.values.extend(part.gyr.iter().flat_map(|gyr| gyr.values.iter().map(|rate| rate.z)));
-                ControlFlow::Continue(())
-            })?;
+        let (mapping, limits) = (Mapping::default(), Limits::default());
+        let source = Source { path: &fixture.path, mapping: &mapping, manifest: None, limits: &limits };
+        read.warnings = Recording::read_parts(source, &mut |part| {
+            read.lengths.push(part.rows());
+            read.values.extend(part.gyr.iter().flat_map(|gyr| gyr.values.iter().map(|rate| rate.z)));
+            ControlFlow::Continue(())
+        })?;
         Ok(read)
     }
 

@@ -128,7 +128,7 @@ mod tests {
     use std::{ops::ControlFlow, path::PathBuf};
 
     use super::*;
-    use crate::recording::{Mapping, Recording, fixture::assert_says};
+    use crate::recording::{Mapping, Recording, Source, fixture::assert_says};
 
     fn fixture(name: &str) -> PathBuf {
         Path::new(env!("CARGO_MANIFEST_DIR")).join("logs/tests/fixtures").join(name)
@@ -187,7 +187,9 @@ mod tests {
         let mapping = Mapping::default().with_topics(&["imu=/imu/data".to_owned()]).unwrap();
         let mut lengths = Vec::new();
         let path = fixture("ros2-lz4.mcap");
-        Recording::read_parts(&path, &mapping, &Limits::default(), &mut |part| {
+        let limits = Limits::default();
+        let source = Source { path: &path, mapping: &mapping, manifest: None, limits: &limits };
+        Recording::read_parts(source, &mut |part| {
             lengths.push(part.rows());
             ControlFlow::Continue(())
         })
