@@ -14,7 +14,7 @@ use super::{
     unit::{UnitKind, UnitUnderTest},
 };
 use crate::{
-    effect::{Effect, Input, Truth},
+    effect::{Effect, Input},
     recording::{Manifest, Recording, SensorKind, manifest::Axis},
 };
 
@@ -123,8 +123,8 @@ impl Simulation {
         let chain = Chain::new(&self.doses);
         let rows = (schedule.duration() * self.rate).floor() as usize;
         let time: Vec<f64> = (0..rows).map(|k| k as f64 / self.rate).collect();
-        let truth = chain.truth(&schedule, &time);
-        let input: Vec<Input> = truth.par_iter().map(|row| Input::of(row).turned(&unit.c_t_q)).collect();
+        let mut input = chain.inputs(&schedule, &time);
+        input.par_iter_mut().for_each(|row| *row = row.turned(&unit.c_t_q));
         let mut random = Random::new(self.seed, Purpose::Noise);
         let manifest = self.manifest(&schedule, &unit);
         let mut recording = Recording::new(name, manifest.clone(), time);
@@ -142,15 +142,15 @@ impl Simulation {
                 SensorKind::Mag => recording.mag = triple,
             }
         }
-        recording.temperature = Some(self.thermometer(&truth));
+        recording.temperature = Some(self.thermometer(&input));
         recording.gimbal = Some(self.encoders(&schedule, &recording.time));
         Ok(recording)
     }
 
-    fn thermometer(&self, truth: &[Truth]) -> Vec<f64> {
+    fn thermometer(&self, input: &[Input]) -> Vec<f64> {
         let mut random = Random::new(self.seed, Purpose::Thermometer);
-        let read = |row: &Truth| converter::thermometer(row.temperature, self.noise.then_some(&mut random));
-        truth.iter().map(read).collect()
+        let read = |row: &Input| converter::thermometer(row.temperature, self.noise.then_some(&mut random));
+        input.iter().map(read).collect()
     }
 
     fn encoders(&self, schedule: &Schedule, time: &[f64]) -> Vec<[f64; 3]> {

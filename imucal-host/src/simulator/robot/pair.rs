@@ -10,7 +10,7 @@ use super::{
     vibration::Vibration,
 };
 use crate::{
-    effect::{self, Input, Truth},
+    effect::{self, Input},
     recording::{
         Manifest, Recording, SensorKind, Simulated,
         manifest::{ReferenceInfo, ReferenceKind},
@@ -201,8 +201,8 @@ impl RobotScene {
         let doses = self.all_doses();
         let chain = Chain::new(&doses);
         let time = times(self.duration, self.real_rate);
-        let truth = chain.truth(&motion, &time);
-        let input: Vec<Input> = truth.iter().map(|row| Input::of(row).turned(&unit.c_t_q)).collect();
+        let mut input = chain.inputs(&motion, &time);
+        input.iter_mut().for_each(|row| *row = row.turned(&unit.c_t_q));
         let shown: Vec<f64> = time.iter().map(|time| self.shown(*time)).collect();
         let manifest = unit.manifest(self.place.site(), motion.rig(), self.counts);
         let kept = self.kept(time.len());
@@ -235,8 +235,8 @@ impl RobotScene {
         }
         let mut random = Random::new(self.seed, Purpose::Thermometer);
         let mut read =
-            |row: &Truth| converter::thermometer(row.temperature, self.noise.then_some(&mut random));
-        let temperature: Vec<f64> = truth.iter().map(&mut read).collect();
+            |row: &Input| converter::thermometer(row.temperature, self.noise.then_some(&mut random));
+        let temperature: Vec<f64> = input.iter().map(&mut read).collect();
         recording.temperature = Some(kept.iter().map(|row| temperature[*row]).collect());
         Ok(recording)
     }
