@@ -13,7 +13,7 @@
 //! The states are eliminated in the order of time: Henderson's equations with the random effects first. Sources: C.
 //! Henderson, Biometrics 31 (1975); H. Rue, L. Held, Gaussian Markov Random Fields (2005), ch. 2.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use nalgebra::DMatrix;
 
@@ -21,7 +21,7 @@ use super::{
     process::Process,
     random_effects::{CrossProducts, RandomEffects},
     skyline::{Factor, Skyline},
-    symmetric_product,
+    symmetric_product::{add_product, by_columns, by_rows},
 };
 
 /// States that are multiplied at a time.
@@ -70,9 +70,9 @@ impl Precision {
     /// Xᵀ Σ⁻¹ X, given Yᵀ.
     pub fn less(&self, x: &CrossProducts, eliminated: &DMatrix<f64>) -> DMatrix<f64> {
         let mut products = x.plain.clone();
-        for from in (0..eliminated.ncols()).step_by(PART) {
-            let part = eliminated.columns(from, PART.min(eliminated.ncols() - from)).into_owned();
-            symmetric_product::add_product(&mut products, -1.0, &part, &part.transpose());
+        let count = eliminated.nrows();
+        for part in eliminated.as_slice().chunks(PART * count.max(1)) {
+            add_product(&mut products, -1.0, &by_columns(part, count), &by_rows(part, count));
         }
         products
     }
@@ -133,15 +133,14 @@ fn add_precision(
     (process, count): (usize, usize),
     drift: &Process,
 ) {
+    let (states, signs) = parts(process, count);
     let mut add = |(knot, other): (usize, usize), value: f64| {
         let [start, begin] = [knot, other].map(|knot| effects.of_knots[knot] + first);
-        for (row, signed) in parts(process, count) {
-            for (column, also) in parts(process, count) {
-                // Each pair once: the matrix mirrors what is off its diagonal.
-                if knot != other || row >= column {
-                    matrix.add(start + row, begin + column, signed * also * value);
-                }
-            }
+        for (row, signed) in states.clone().zip(&signs) {
+            // Each pair once: the matrix mirrors what is off its diagonal.
+            let end = if knot == other { row + 1 } else { states.end };
+            let entries = matrix.entries(start + row, begin + states.start..begin + end);
+            entries.iter_mut().zip(&signs).for_each(|(entry, also)| *entry += signed * also * value);
         }
     };
     add((0, 0), 1.0 / (drift.sigma * drift.sigma));
@@ -156,9 +155,11 @@ fn add_precision(
 
 /// A drift as a sum of the `count` states of a knot, by their places and signs: the first is what the others leave of the
 /// sum.
-fn parts(process: usize, count: usize) -> impl Iterator<Item = (usize, f64)> {
-    let states = if process == 0 { 0..count } else { process - 1..process };
-    states.map(move |state| (state, if process == 0 && state + 1 < count { -1.0 } else { 1.0 }))
+fn parts(process: usize, count: usize) -> (Range<usize>, Vec<f64>) {
+    match process {
+        0 => (0..count, (1..=count).map(|state| if state < count { -1.0 } else { 1.0 }).collect()),
+        _ => (process - 1..process, vec![1.0]),
+    }
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ use super::{
     knots::{Knots, Row},
     skyline::Skyline,
     sparse_rows::SparseRows,
-    symmetric_product,
+    symmetric_product::{add_upper, by_columns},
 };
 
 /// Blocks that are multiplied at a time: few enough to stay in a processor's cache.
@@ -128,7 +128,7 @@ impl RandomEffects {
         for (rows, columns) in self.channels.iter().zip(columns) {
             rows.for_each_part(columns, |part, weighted, x| products.add(rows, part, weighted, x));
         }
-        products
+        products.complete()
     }
 
     /// Of some columns of a single channel, and Fᵀ D⁻¹ X of these with others, which are given in parts.
@@ -142,11 +142,13 @@ impl RandomEffects {
         for rows in &self.channels {
             let mut others = others.iter();
             rows.for_each_part(columns, |part, weighted, x| {
-                others.next().into_iter().for_each(|other| across.gemm(1.0, weighted, other, 1.0));
+                if let Some(other) = others.next() {
+                    across.rows_mut(0, weighted.nrows()).gemm(1.0, weighted, other, 1.0);
+                }
                 products.add(rows, part, weighted, x);
             });
         }
-        (products, across)
+        (products.complete(), across)
     }
 
     /// D⁻¹ (x − Z u) of one column of a single channel; puts it in the place of x.
@@ -159,15 +161,19 @@ impl RandomEffects {
 }
 
 impl Rows {
-    /// Hears of some blocks at a time, so that no copy of all columns is held: (D⁻¹X)ᵀ and X over them.
+    /// Hears of some blocks at a time, so that no copy of all columns is held: (D⁻¹X)ᵀ and X over them. Columns that have not
+    /// begun there, and have none behind them that has, are left out: those of effects with an instant come in its order.
     fn for_each_part(
         &self,
         columns: &Columns<'_>,
         mut hear: impl FnMut(Range<usize>, &DMatrix<f64>, &DMatrix<f64>),
     ) {
+        let begins = |column: &&[f64]| column.iter().position(|value| *value != 0.0).unwrap_or(usize::MAX);
+        let begins: Vec<usize> = columns.iter().map(begins).collect();
         for from in (0..self.weights.len()).step_by(PART) {
             let part = from..(from + PART).min(self.weights.len());
-            let x = gathered(columns, part.clone());
+            let begun = begins.iter().rposition(|begins| *begins < part.end).map_or(0, |last| last + 1);
+            let x = gathered(&columns[..begun], part.clone());
             let mut weighted = x.transpose();
             weighted.column_iter_mut().zip(&self.weights[part.clone()]).for_each(|(mut row, w)| row *= *w);
             hear(part, &weighted, &x);
@@ -185,7 +191,7 @@ pub fn in_parts(columns: &Columns<'_>, blocks: usize) -> Vec<DMatrix<f64>> {
 }
 
 /// Some blocks of columns.
-fn gathered(columns: &Columns<'_>, part: Range<usize>) -> DMatrix<f64> {
+fn gathered(columns: &[&[f64]], part: Range<usize>) -> DMatrix<f64> {
     let mut x = DMatrix::zeros(part.len(), columns.len());
     for (mut to, column) in x.column_iter_mut().zip(columns).filter(|(_, column)| !column.is_empty()) {
         to.copy_from_slice(&column[part.clone()]);
@@ -202,17 +208,24 @@ impl CrossProducts {
         }
     }
 
-    /// Adds some blocks of a channel.
+    /// Adds some blocks of a channel's first columns, of D⁻¹X those on and above the diagonal.
     fn add(&mut self, rows: &Rows, part: Range<usize>, weighted: &DMatrix<f64>, x: &DMatrix<f64>) {
-        let count = x.ncols();
+        let (all, count) = (self.plain.ncols(), x.ncols());
         let states = self.states.as_mut_slice();
         for (block, row) in part.zip(weighted.as_slice().chunks_exact(count.max(1))) {
             for (state, z) in rows.z.row(block) {
-                let own = &mut states[state * count..(state + 1) * count];
+                let own = &mut states[state * all..(state + 1) * all];
                 own.iter_mut().zip(row).for_each(|(own, value)| *own += z * value);
             }
         }
-        symmetric_product::add_product(&mut self.plain, 1.0, weighted, x);
+        let (weighted, x) = (by_columns(weighted.as_slice(), count), by_columns(x.as_slice(), x.nrows()));
+        add_upper(&mut self.plain.view_mut((0, 0), (count, count)), 1.0, &weighted, &x);
+    }
+
+    /// With what is below the diagonal.
+    fn complete(mut self) -> Self {
+        self.plain.fill_lower_triangle_with_upper_triangle();
+        self
     }
 
     /// Some of the columns, by their place.

@@ -7,6 +7,8 @@
 //! A. George, J. Liu, Computer Solution of Large Sparse Positive Definite Systems (1981), ch. 4. nalgebra's sparse
 //! factor lacks the envelope, and a dense one would be zeros for the most part.
 
+use std::ops::Range;
+
 /// Rows that are taken from another at a time, so that it is read and written less often.
 const ROWS: usize = 4;
 
@@ -35,6 +37,12 @@ impl Skyline {
         let (row, column) = (row.max(column), row.min(column));
         debug_assert!(column >= self.first[row]);
         self.values[self.begins[row] + column - self.first[row]] += value;
+    }
+
+    /// The entries of a row in some columns, none beyond the diagonal and all within the envelope.
+    pub fn entries(&mut self, row: usize, columns: Range<usize>) -> &mut [f64] {
+        let zero = self.begins[row] - self.first[row];
+        &mut self.values[zero + columns.start..zero + columns.end]
     }
 
     /// Number of its rows.

@@ -69,8 +69,23 @@ impl<'a> Chain<'a> {
         input: &[Input],
     ) -> Result<Vec<Vector3<f64>>, OutputError> {
         let (triad, sensed) = self.sensed(kind, triad, input)?;
-        let mut output: Vec<_> = sensed.iter().map(|sensed| sensed + triad.bias).collect();
-        let mut run = SensorRun { input, sensed: &sensed, output: &mut output };
+        self.output_of(kind, &triad.bias, input, &sensed)
+    }
+
+    /// The same, of what its axes sense.
+    ///
+    /// # Errors
+    ///
+    /// [`OutputError`], where a user's formula has no value.
+    pub fn output_of(
+        &self,
+        kind: SensorKind,
+        bias: &Vector3<f64>,
+        input: &[Input],
+        sensed: &[Vector3<f64>],
+    ) -> Result<Vec<Vector3<f64>>, OutputError> {
+        let mut output: Vec<_> = sensed.iter().map(|sensed| sensed + bias).collect();
+        let mut run = SensorRun { input, sensed, output: &mut output };
         for dose in &self.doses {
             match dose.effect.act {
                 Act::Sensor(of, alter) if of == kind => alter(&dose.values, &mut run),

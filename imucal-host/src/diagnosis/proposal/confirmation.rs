@@ -188,7 +188,7 @@ impl Frozen {
             .collect();
         let taken: Vec<(usize, f64)> = own.iter().copied().zip(amplitudes.iter().map(|a| -a)).collect();
         without.design.restore(&taken);
-        let problem = Problem::new(linear, run, self.kind, fitted.clone())?;
+        let problem = Problem::new(linear, run, self.kind, fitted.clone());
         let left = self.residual(&without.design, &fitted);
         let before = problem.weighed(&problem.design, &[], &best.noise)?;
         let after = problem.weighed(&left, &[], &best.noise)?;

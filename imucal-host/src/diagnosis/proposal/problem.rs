@@ -55,8 +55,6 @@ pub struct Problem<'p, 's> {
     /// Those columns alone, in that order, of the sensor's channels.
     pub design: Design,
     run: &'p Run<'p>,
-    sensed: Vec<Vector3<f64>>,
-    sensed_sparse: Vec<Vector3<f64>>,
 }
 
 /// The columns of a formula, an axis and a term, of the size of white noise in a sample.
@@ -81,20 +79,15 @@ pub struct Weighed {
 
 impl<'p, 's> Problem<'p, 's> {
     /// Of a sensor; `fitted` are the columns that are fitted in any case.
-    ///
-    /// # Errors
-    ///
-    /// [`DiagnosisError::Simulation`], where the sensor's triad is singular.
     pub fn new(
         linear: &'p Linearisation<'s>,
         run: &'p Run<'p>,
         kind: SensorKind,
         fitted: Vec<usize>,
-    ) -> Result<Self, DiagnosisError> {
+    ) -> Self {
         let mut design = linear.design.extended(&fitted, Vec::new(), &[]);
         design.channels.retain(|channel| channel.kind == kind);
-        let (sensed, sensed_sparse) = (run.fine.sensed(kind)?, run.sparse.sensed(kind)?);
-        Ok(Self { linear, kind, fitted, design, run, sensed, sensed_sparse })
+        Self { linear, kind, fitted, design, run }
     }
 
     /// What a formula multiplies on each axis, block by block.
@@ -103,7 +96,7 @@ impl<'p, 's> Problem<'p, 's> {
     ///
     /// [`DiagnosisError::Formula`], where it has no value.
     pub fn factors(&self, formula: &Formula, shapes: &[f64]) -> Result<Vec<Vector3<f64>>, DiagnosisError> {
-        self.run.fine.factors(formula, &self.sensed, shapes)
+        self.run.fine.factors(formula, self.kind, shapes)
     }
 
     /// A formula's columns; `None` where it has no value in this recording.
@@ -115,7 +108,7 @@ impl<'p, 's> Problem<'p, 's> {
     /// What a formula multiplies, from a few nodes a block; `None` where it has no value there.
     pub fn sparse_factors(&self, formula: &Formulated) -> Option<Factors> {
         let (run, shapes) = (&self.run.sparse, formula.shapes());
-        let of_term = |term: &Formula| run.factors(term, &self.sensed_sparse, &shapes).ok();
+        let of_term = |term: &Formula| run.factors(term, self.kind, &shapes).ok();
         formula.parsed().ok()?.iter().map(of_term).collect()
     }
 

@@ -192,7 +192,7 @@ impl<'a, 's> Setting<'a, 's> {
     }
 
     fn start(&self, kind: SensorKind, set: Vec<&'static Effect>) -> Result<Start<'_, 's>, DiagnosisError> {
-        let problem = Problem::new(self.linear, &self.run, kind, self.linear.fitted(&set))?;
+        let problem = Problem::new(self.linear, &self.run, kind, self.linear.fitted(&set));
         let before = problem.weighed(&problem.design, &[], &self.explained.best.noise)?;
         Ok(Start { set, problem, before })
     }
@@ -233,7 +233,7 @@ impl<'a, 's> Setting<'a, 's> {
         }
         let every: Vec<usize> = start.problem.fitted.clone();
         let own = (self.linear.design.columns.len()..linear.design.size).collect::<Vec<_>>();
-        let beside = Problem::new(&linear, &self.run, kind, [every, own].concat())?;
+        let beside = Problem::new(&linear, &self.run, kind, [every, own].concat());
         let second = finalists::next(&beside, formulas, &best.weighed.noise)?;
         let cost = (formulas.len() as f64).ln();
         let is_needed = second.is_some_and(|second| {

@@ -12,6 +12,8 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::{
     gain::Gain,
     strikes::Side,
@@ -108,12 +110,14 @@ impl<'a> CommonInstants<'a> {
         };
         let mut clock = [0.0; 2];
         for (which, step, count) in CLOCK {
-            let tried = (-count..=count).map(|steps| {
+            let tried = (-count..=count).into_par_iter().map(|steps| {
                 let mut tried = clock;
                 tried[which] += step * f64::from(steps);
                 (agreement(tried), tried)
             });
-            clock = tried.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(clock, |(_, tried)| tried);
+            let tried: Vec<(f64, [f64; 2])> = tried.collect();
+            let best = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+            clock = best.map_or(clock, |(_, tried)| tried);
         }
         clock
     }

@@ -11,7 +11,11 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::{block::Means, forward_model::ForwardModel, sample_points::SamplePoints};
+use super::{
+    block::Means,
+    forward_model::{ForwardModel, Sensed},
+    sample_points::SamplePoints,
+};
 use crate::{
     diagnosis::error::DiagnosisError,
     effect::{Act, Effect, Input, Parameter, Role, Truth, user::Formula},
@@ -32,6 +36,7 @@ pub struct Reference<'s> {
     pub doses: Vec<Dose>,
     truth: Vec<Truth>,
     input: Vec<Input>,
+    sensed: [Sensed; 3],
     outputs: [Vec<Vector3<f64>>; 3],
 }
 
@@ -44,8 +49,9 @@ impl<'s> Reference<'s> {
     ) -> Result<Self, DiagnosisError> {
         let truth = scene.truth(&doses, nodes);
         let input: Vec<Input> = truth.iter().map(Input::of).collect();
-        let outputs = scene.outputs(&doses, &SensorKind::ALL, &input)?;
-        Ok(Self { scene, nodes, doses, truth, input, outputs })
+        let sensed = scene.sensed(&doses, &input)?;
+        let outputs = scene.outputs_of(&doses, &SensorKind::ALL, &input, &sensed)?;
+        Ok(Self { scene, nodes, doses, truth, input, sensed, outputs })
     }
 
     /// What a sensor puts out, block by block.
@@ -61,16 +67,7 @@ impl<'s> Reference<'s> {
         &self.truth
     }
 
-    /// What each axis of a sensor senses at the nodes: its output before bias and effects, SI units.
-    ///
-    /// # Errors
-    ///
-    /// [`DiagnosisError::Simulation`], where the triad is singular.
-    pub fn sensed(&self, kind: SensorKind) -> Result<Vec<Vector3<f64>>, DiagnosisError> {
-        self.scene.sensed(&self.doses, kind, &self.input)
-    }
-
-    /// What a formula's amplitudes multiply on each axis, block by block; `sensed` is that of its sensor.
+    /// What the amplitudes of a sensor's formula multiply on each axis, block by block.
     ///
     /// # Errors
     ///
@@ -78,10 +75,10 @@ impl<'s> Reference<'s> {
     pub fn factors(
         &self,
         formula: &Formula,
-        sensed: &[Vector3<f64>],
+        kind: SensorKind,
         shapes: &[f64],
     ) -> Result<Vec<Vector3<f64>>, DiagnosisError> {
-        let each = formula.factors(&self.input, sensed, shapes);
+        let each = formula.factors(&self.input, &self.sensed[kind as usize].axes, shapes);
         let each = each.map_err(|cause| DiagnosisError::Formula(Box::new(cause)))?;
         let node = |row: usize| Vector3::from_fn(|axis, _| each.get(axis).map_or(0.0, |column| column[row]));
         let nodes: Vec<Vector3<f64>> = (0..self.input.len()).map(node).collect();
@@ -124,8 +121,9 @@ impl<'s> Reference<'s> {
             Act::Field(_) => {
                 self.scene.outputs(&doses, effect.sensors, &self.scene.inputs(&doses, self.nodes))?
             }
-            Act::Triad(..) | Act::Sensor(..) | Act::Formula(..) | Act::Signal(..) | Act::Data(..) => {
-                self.scene.outputs(&doses, effect.sensors, &self.input)?
+            Act::Triad(..) => self.scene.outputs(&doses, effect.sensors, &self.input)?,
+            Act::Sensor(..) | Act::Formula(..) | Act::Signal(..) | Act::Data(..) => {
+                self.scene.outputs_of(&doses, effect.sensors, &self.input, &self.sensed)?
             }
         };
         let mut means: Means = Default::default();

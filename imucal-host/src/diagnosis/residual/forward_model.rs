@@ -25,6 +25,19 @@ use crate::{
 /// What sensors put out, row by row.
 type Outputs = Vec<(SensorKind, Vec<Vector3<f64>>)>;
 
+/// What the axes of a sensor sense, row by row: its output before bias and effects, SI units. Empty without the sensor.
+#[derive(Clone, Debug)]
+pub(super) struct Sensed {
+    pub(super) bias: Vector3<f64>,
+    pub(super) axes: Vec<Vector3<f64>>,
+}
+
+impl Default for Sensed {
+    fn default() -> Self {
+        Self { bias: Vector3::zeros(), axes: Vec::new() }
+    }
+}
+
 /// What is simulated for a recording.
 pub struct ForwardModel<'a> {
     /// Settings of the diagnosis.
@@ -299,15 +312,32 @@ impl<'a> ForwardModel<'a> {
         Ok(outputs)
     }
 
-    /// What each axis of a sensor senses of an input.
-    pub(super) fn sensed(
+    /// What the sensors sense of an input.
+    pub(super) fn sensed(&self, doses: &[Dose], input: &[Input]) -> Result<[Sensed; 3], DiagnosisError> {
+        let chain = Chain::new(doses);
+        let mut all: [Sensed; 3] = Default::default();
+        for kind in &self.kinds {
+            let (triad, axes) = chain.sensed(*kind, &self.triads[*kind as usize], input)?;
+            all[*kind as usize] = Sensed { bias: triad.bias, axes };
+        }
+        Ok(all)
+    }
+
+    /// As [`Self::outputs`], of what the sensors sense.
+    pub(super) fn outputs_of(
         &self,
         doses: &[Dose],
-        kind: SensorKind,
+        kinds: &[SensorKind],
         input: &[Input],
-    ) -> Result<Vec<Vector3<f64>>, DiagnosisError> {
-        let (_, sensed) = Chain::new(doses).sensed(kind, &self.triads[kind as usize], input)?;
-        Ok(sensed)
+        sensed: &[Sensed; 3],
+    ) -> Result<[Vec<Vector3<f64>>; 3], DiagnosisError> {
+        let chain = Chain::new(doses);
+        let mut outputs: [Vec<Vector3<f64>>; 3] = Default::default();
+        for kind in kinds.iter().filter(|kind| self.kinds.contains(kind)) {
+            let Sensed { bias, axes } = &sensed[*kind as usize];
+            outputs[*kind as usize] = chain.output_of(*kind, bias, input, axes)?;
+        }
+        Ok(outputs)
     }
 
     fn output(
