@@ -94,6 +94,8 @@ class Calibration(Document):
     warnings: list[str]
     #: Whether something was accepted, every sensor that was named in ``models`` too, and nothing is suspect that may not be.
     ok: bool
+    #: With ``html=True`` the page, byte for byte what ``--html`` writes; it has the hash of the recording's file.
+    html: Optional[str] = field(repr=False)
     _native: Native = field(repr=False)
 
     @classmethod
@@ -103,7 +105,14 @@ class Calibration(Document):
         found = document["sensors"] if "sensors" in document else document
         sensors = {kind: Sensor._of(kind, found[kind]) for kind in _SENSORS if found.get(kind) is not None}
         return cls(
-            document, text, document.get("recording", ""), sensors, document.get("warnings", []), native.ok, native
+            document,
+            text,
+            document.get("recording", ""),
+            sensors,
+            document.get("warnings", []),
+            native.ok,
+            native.html,
+            native,
         )
 
     @classmethod
@@ -143,16 +152,18 @@ def calibrate(
     temperature: bool = True,
     threshold: Optional[float] = None,
     accept_suspect: bool = False,
+    html: bool = False,
 ) -> Calibration:
     """Fits all models that the recording supports, and refuses what it does not determine.
 
     ``models`` names models by sensor, such as ``{"acc": "T9"}``; ``compare`` fits every model and recommends one;
     ``temperature`` estimates how bias and scale follow the temperature; ``threshold`` is the only multiple of the first
-    rest's variance to try; ``accept_suspect`` lets suspect sensors into what is written and applied.
+    rest's variance to try; ``accept_suspect`` lets suspect sensors into what is written and applied;
+    ``html`` makes the page, too.
     """
     native = recording._native
     return Calibration._of(
-        _native.calibrate(native, options(models), compare, temperature, threshold, accept_suspect)
+        _native.calibrate(native, options(models), compare, temperature, threshold, accept_suspect, html)
     )
 
 

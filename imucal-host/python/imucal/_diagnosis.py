@@ -52,6 +52,8 @@ class Diagnosis(Document):
     gap_closed_total_ci95: Optional[list[float]]
     #: Formulas that are proposed where no effect explains the gap, as a file for ``effects``; empty where none is.
     proposals_toml: str = field(repr=False)
+    #: With ``html=True`` the page, byte for byte what ``--html`` writes; it has the hash of the recording's file.
+    html: Optional[str] = field(repr=False)
 
 
 def diagnose(
@@ -64,19 +66,20 @@ def diagnose(
     effects: Optional[Path] = None,
     frozen: bool = False,
     watch: Optional[Path] = None,
+    html: bool = False,
 ) -> Diagnosis:
     """Finds where a recording and a simulator disagree, the cause, and the share that it explains.
 
     ``sim`` is a simulator's ideal stream of the same movement, ``sim_topic`` one of several in it; without it the
     recording's own reference is used. ``model`` is the unit's present calibration, ``without`` names effects that are no
     candidates, ``effects`` is a file of your own ones, which ``frozen`` confirms as the file has found them, and
-    ``watch`` the summary of a device's drift watch.
+    ``watch`` the summary of a device's drift watch. ``html`` makes the page, too.
     """
     if sim is None or isinstance(sim, Recording):
         stream = None if sim is None else sim._native
     else:
         stream, sim_topic = _native.read_stream(os.fspath(sim), sim_topic)
-    text, proposals = _native.diagnose(
+    text, proposals, page = _native.diagnose(
         recording._native,
         stream,
         sim_topic,
@@ -85,6 +88,7 @@ def diagnose(
         None if effects is None else os.fspath(effects),
         frozen,
         None if watch is None else os.fspath(watch),
+        html,
     )
     found: dict[str, Any] = json.loads(text)
     return Diagnosis(
@@ -98,6 +102,7 @@ def diagnose(
         found["gap_closed_total"],
         found["gap_closed_total_ci95"],
         proposals,
+        page,
     )
 
 

@@ -47,6 +47,8 @@ class Noise(Document):
     gyr: Optional[SensorNoise]
     mag: Optional[SensorNoise]
     warnings: list[str]
+    #: With ``html=True`` the page, byte for byte what ``--html`` writes; it has the hash of the recording's file.
+    html: Optional[str] = field(repr=False)
 
 
 def noise(
@@ -58,9 +60,15 @@ def noise(
     topic: Unit = (),
     max_size: Union[int, str, None] = None,
     max_columns: Optional[int] = None,
+    html: bool = False,
 ) -> Noise:
-    """Estimates the noise of a unit from a recording at rest; the file is read by parts and may be of any length."""
-    text = _native.noise(os.fspath(path), reading(map, unit, time, topic, max_size, max_columns))
+    """Estimates the noise of a unit from a recording at rest; the file is read by parts and may be of any length.
+
+    ``html`` makes the page, too.
+    """
+    text, page = _native.noise(
+        os.fspath(path), reading(map, unit, time, topic, max_size, max_columns), html
+    )
     found: dict[str, Any] = json.loads(text)
     acc, gyr, mag = (_sensor(found.get(kind)) for kind in ("acc", "gyr", "mag"))
     return Noise(
@@ -74,6 +82,7 @@ def noise(
         gyr,
         mag,
         found["warnings"],
+        page,
     )
 
 

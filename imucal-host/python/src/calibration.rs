@@ -11,17 +11,23 @@ use imucal_host::{
         request::{ModelOf, Request},
     },
     file::OutputSet,
+    page,
     recording::SensorKind,
     report,
     store::{SaveError, StoredCalibration, today},
 };
 use pyo3::prelude::*;
 
-use crate::{failure, recording::Recording, work};
+use crate::{failure, page::page as asked, recording::Recording, work};
 
 /// A calibration in the memory of the library.
 #[pyclass(frozen, module = "imucal._native")]
-pub(crate) struct Calibration(Origin);
+pub(crate) struct Calibration {
+    origin: Origin,
+    /// The page of `imucal calibrate --html`, where it was asked for.
+    #[pyo3(get)]
+    html: Option<String>,
+}
 
 /// Where a calibration comes from.
 enum Origin {
@@ -34,7 +40,7 @@ enum Origin {
 impl Calibration {
     /// What is stored of it: the sensors that have passed.
     pub(crate) fn stored(&self) -> StoredCalibration {
-        match &self.0 {
+        match &self.origin {
             Origin::Loaded(stored) => StoredCalibration::clone(stored),
             Origin::Made(made, request) if request.accept_suspect => {
                 StoredCalibration::with_suspects(made, today())
@@ -65,7 +71,7 @@ impl Calibration {
 impl Calibration {
     /// The text of `imucal calibrate --json`; of a calibration that was loaded, what its file holds.
     fn json(&self) -> PyResult<String> {
-        match &self.0 {
+        match &self.origin {
             Origin::Made(made, _) => Ok(report::json::text(made)),
             Origin::Loaded(stored) => {
                 let text = serde_json::to_string_pretty(stored).map_err(failure::unread)?;
@@ -77,7 +83,7 @@ impl Calibration {
     /// Whether the program would end with the status 0; a calibration that was loaded is one that was accepted.
     #[getter]
     fn ok(&self) -> bool {
-        match &self.0 {
+        match &self.origin {
             Origin::Made(made, request) => request.is_met(made),
             Origin::Loaded(_) => true,
         }
@@ -96,7 +102,8 @@ impl Calibration {
 
 /// Calibrates what a recording allows.
 #[pyfunction]
-#[pyo3(signature = (recording, models, compare, temperature, threshold, accept_suspect))]
+#[allow(clippy::too_many_arguments)] // One an option of the program.
+#[pyo3(signature = (recording, models, compare, temperature, threshold, accept_suspect, html))]
 pub(crate) fn calibrate(
     py: Python<'_>,
     recording: &Recording,
@@ -105,6 +112,7 @@ pub(crate) fn calibrate(
     temperature: bool,
     threshold: Option<f64>,
     accept_suspect: bool,
+    html: bool,
 ) -> PyResult<Calibration> {
     let models: Vec<ModelOf> =
         models.iter().map(|text| text.parse()).collect::<Result<_, _>>().map_err(failure::option)?;
@@ -117,13 +125,19 @@ pub(crate) fn calibrate(
     let recording = Arc::clone(&recording.0);
     request.check(&recording).map_err(failure::option)?;
     let options = request.options();
-    let made = work::run(py, move || fit(&recording, &options, &|_| {}))?;
-    Ok(Calibration(Origin::Made(Arc::new(made), request)))
+    let (made, html) = work::run(py, move || {
+        let made = fit(&recording, &options, &|_| {});
+        let parts = || [page::calibration::calibration(&made, &recording)];
+        let html = asked(html, &recording.path, || page::of_recording(&recording, today(), &parts()));
+        (made, html)
+    })?;
+    let html = html.map_err(failure::unread)?;
+    Ok(Calibration { origin: Origin::Made(Arc::new(made), request), html })
 }
 
 /// Loads a calibration from TOML or from a record.
 #[pyfunction]
 pub(crate) fn load(path: PathBuf) -> PyResult<Calibration> {
     let stored = StoredCalibration::load(&path).map_err(failure::unread)?;
-    Ok(Calibration(Origin::Loaded(Box::new(stored))))
+    Ok(Calibration { origin: Origin::Loaded(Box::new(stored)), html: None })
 }

@@ -6,16 +6,17 @@ use imucal_host::{
     diagnosis::{self, Options, proposal::confirmation},
     effect::user,
     file::Limits,
+    page,
     recording::Stream,
-    store::watch_file,
+    store::{today, watch_file},
 };
 use pyo3::prelude::*;
 
-use crate::{calibration::Calibration, failure, recording::Recording, work};
+use crate::{calibration::Calibration, failure, page::page as asked, recording::Recording, work};
 
-/// The text of `imucal diagnose --json`, and of the effects that are proposed.
+/// The text of `imucal diagnose --json`, that of the effects that are proposed, and the page of `--html` where it is asked for.
 #[pyfunction]
-#[pyo3(signature = (recording, sim, sim_topic, model, without, effects, frozen, watch))]
+#[pyo3(signature = (recording, sim, sim_topic, model, without, effects, frozen, watch, html))]
 #[allow(clippy::too_many_arguments)] // One an option of the program.
 pub(crate) fn diagnose(
     py: Python<'_>,
@@ -27,7 +28,8 @@ pub(crate) fn diagnose(
     effects: Option<PathBuf>,
     frozen: bool,
     watch: Option<PathBuf>,
-) -> PyResult<(String, String)> {
+    html: bool,
+) -> PyResult<(String, String, Option<String>)> {
     let limits = Limits::default();
     let own =
         effects.as_deref().map(|path| user::read(path, &limits)).transpose().map_err(failure::unread)?;
@@ -46,9 +48,12 @@ pub(crate) fn diagnose(
     let model = model.map(Calibration::stored);
     let options = Options { without, model, stream, effects: own, frozen, watch, settings: None };
     let recording = Arc::clone(&recording.0);
-    work::run(py, move || {
+    let (text, proposed, html) = work::run(py, move || {
         let found = diagnosis::diagnose(&recording, &options, &|_| {});
-        let proposed = found.proposals.iter().map(|proposal| proposal.toml.as_str()).collect();
-        (found.text(), proposed)
-    })
+        let proposed: String = found.proposals.iter().map(|proposal| proposal.toml.as_str()).collect();
+        let parts = || [page::diagnosis::diagnosis(&found)];
+        let html = asked(html, &recording.path, || page::of_recording(&recording, today(), &parts()));
+        (found.text(), proposed, html)
+    })?;
+    Ok((text, proposed, html.map_err(failure::unread)?))
 }

@@ -17,6 +17,7 @@ mod diagnosis;
 mod failure;
 mod manifest;
 mod noise;
+mod page;
 mod recording;
 mod simulation;
 mod work;

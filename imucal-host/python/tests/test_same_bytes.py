@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pathlib
+import pickle
 
 import numpy as np
 import pytest
@@ -21,9 +22,11 @@ def same_calibration(program: Program, path: pathlib.Path, out: pathlib.Path, ac
     """JSON, TOML, record and corrected samples of both."""
     names = ["--out", out / "a.toml", "--record", out / "a.bin", "--json", out / "a.json"]
     flags = ["--accept-suspect"] if accept_suspect else []
-    program(out, "calibrate", path, *names, *flags)
+    program(out, "calibrate", path, *names, "--html", out / "a.html", *flags)
     recording = imucal.read(path)
-    found = imucal.calibrate(recording, accept_suspect=accept_suspect)
+    found = imucal.calibrate(recording, accept_suspect=accept_suspect, html=True)
+    assert found.html == (out / "a.html").read_text()
+    assert imucal.Calibration.load(out / "a.toml").html is None
     assert found.json == (out / "a.json").read_text()
     assert found.to_dict() == json.loads(found.json) and found.ok
     found.write_toml(out / "b.toml")
@@ -42,7 +45,7 @@ def test_a_simulated_recording_is_the_program_s(program: Program, folder: pathli
     assert_same(tmp_path / "rig.toml", folder / "rig.toml")
 
 
-@pytest.mark.parametrize("log", ["rosbag2.mcap", "none.bag"])
+@pytest.mark.parametrize("log", ["rosbag2.mcap", "iron.db3", "none.bag"])
 def test_a_log_is_the_recording_that_the_program_imports(program: Program, log: str, tmp_path: pathlib.Path) -> None:
     path = HERE.parents[1] / "logs" / "tests" / "fixtures" / log
     program(tmp_path, "import", path, "--topic", "mag=none", "--out", "a.csv")
@@ -95,9 +98,13 @@ def test_arrays_are_corrected_to_the_bits_of_the_corrected_recording(
         np.testing.assert_array_equal(found.astype(np.float64) / per_unit, getattr(corrected, kind))
 
 
-def test_a_diagnosis_is_the_program_s(program: Program, folder: pathlib.Path, rig: imucal.Recording) -> None:
-    found = imucal.diagnose(rig)
-    assert found.json == program(folder, "diagnose", "rig.csv.gz", "--json", "-")
+def test_a_diagnosis_is_the_program_s(
+    program: Program, folder: pathlib.Path, rig: imucal.Recording, tmp_path: pathlib.Path
+) -> None:
+    found = imucal.diagnose(rig, html=True)
+    assert found.json == program(folder, "diagnose", "rig.csv.gz", "--json", "-", "--html", tmp_path / "gap.html")
+    assert found.html == (tmp_path / "gap.html").read_text()
+    assert pickle.loads(pickle.dumps(found)).verdict == found.verdict
     assert found.to_dict() == json.loads(found.json)
     assert found.verdict == "explained" and "acc.lever_arm" in [cause.effect for cause in found.causes]
     assert found.causes[0]["probability"] == found.causes[0].probability
@@ -111,9 +118,13 @@ def test_a_diagnosis_along_a_simulator_is_the_program_s(program: Program, tmp_pa
     assert found.json == text and found["reference"] == "simulator"
 
 
-def test_the_noise_of_a_unit_is_the_program_s(program: Program, folder: pathlib.Path) -> None:
-    found = imucal.noise(folder / "still.csv")
-    assert found.json == program(folder, "noise", "still.csv", "--json", "-")
+def test_the_noise_of_a_unit_is_the_program_s(
+    program: Program, folder: pathlib.Path, tmp_path: pathlib.Path
+) -> None:
+    found = imucal.noise(folder / "still.csv", html=True)
+    assert found.json == program(folder, "noise", "still.csv", "--json", "-", "--html", tmp_path / "noise.html")
+    assert found.html == (tmp_path / "noise.html").read_text()
+    assert imucal.noise(folder / "still.csv").html is None
     assert found.to_dict() == json.loads(found.json)
     assert found.gyr is not None and found.gyr.status == "estimated" and found.serial == "7"
     white = found.gyr["axes"][0]["white"]["value"]

@@ -32,12 +32,14 @@ pub(super) struct Row {
     pub(super) name: Option<String>,
     /// As `--model`, in place of the command's.
     model: Option<String>,
-    /// As `--map`, several separated by semicolons. This, `unit` and `time` together take the place of the command's.
+    /// As `--map`, several separated by semicolons. This, `unit`, `time` and `topic` together take the place of the command's.
     map: Option<String>,
     /// As `--unit`.
     unit: Option<String>,
     /// As `--time`.
     time: Option<String>,
+    /// As `--topic`, several separated by semicolons.
+    topic: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -96,12 +98,13 @@ impl Row {
             let asked = models.and_then(|models| method.request.clone().with_models(&models));
             method.request = asked.map_err(|fault| wrong(fault.to_string()))?;
         }
-        if self.map.is_some() || self.unit.is_some() || self.time.is_some() {
+        if [&self.map, &self.unit, &self.time, &self.topic].into_iter().any(Option::is_some) {
             let split = |text: &Option<String>, at: char| -> Vec<String> {
                 text.iter().flat_map(|text| text.split(at)).map(|part| part.trim().to_owned()).collect()
             };
             let mapping =
                 Mapping::parse(&split(&self.map, ';'), &split(&self.unit, ','), self.time.as_deref());
+            let mapping = mapping.and_then(|columns| columns.with_topics(&split(&self.topic, ';')));
             method.mapping = mapping.map_err(|fault| wrong(fault.to_string()))?;
         }
         Ok(method)

@@ -54,7 +54,7 @@ pub enum SourceFault {
     /// A list that cannot be understood.
     #[error(
         "{path}: found {found}, expected a list of recordings: TOML with format = \"imucal-batch/1\" and [[recording]], or CSV, \
-         with the keys path, name, model, map, unit, time; correct it"
+         with the keys path, name, model, map, unit, time, topic; correct it"
     )]
     List { path: PathBuf, found: String },
     /// A name that is no name of a file.

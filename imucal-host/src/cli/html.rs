@@ -1,6 +1,9 @@
 //! The page of a result, for a browser or for paper.
 
-use std::path::{Path, PathBuf};
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
 
 use anyhow::Context;
 use clap::Args;
@@ -38,8 +41,19 @@ impl Html {
         recording: &Recording,
         parts: &dyn Fn() -> Vec<Part>,
     ) -> anyhow::Result<()> {
-        let named = |provenance: Provenance| Ok(provenance.with_recording(recording));
-        self.add_of(files, &recording.name, &[("recording", &recording.path)], &named, parts)
+        self.add_page(files, &recording.path, &|| page::of_recording(recording, today(), &parts()))
+    }
+
+    /// Adds a page that is made of a recording's file.
+    pub(super) fn add_page(
+        &self,
+        files: &mut OutputSet,
+        recording: &Path,
+        page: &dyn Fn() -> io::Result<String>,
+    ) -> anyhow::Result<()> {
+        let Some(path) = &self.html else { return Ok(()) };
+        let text = page().with_context(|| again(recording))?;
+        Ok(files.add(path, text.as_bytes())?)
     }
 
     /// Adds a page with the hashes of the files it comes from, and further facts.
@@ -54,11 +68,13 @@ impl Html {
         let Some(path) = &self.html else { return Ok(()) };
         let mut provenance = Provenance::new(today());
         for (what, input) in inputs {
-            provenance = provenance
-                .with_file(what, input)
-                .with_context(|| format!("{}: cannot be read again", input.display()))?;
+            provenance = provenance.with_file(what, input).with_context(|| again(input))?;
         }
         let text = page::page(title, &further(provenance)?, &parts());
         Ok(files.add(path, text.as_bytes())?)
     }
+}
+
+fn again(path: &Path) -> String {
+    format!("{}: cannot be read again", path.display())
 }

@@ -18,7 +18,7 @@ use crate::{
     allan::{self, sensor::Refusal},
     export::{self, Inputs, Target},
     page, report,
-    store::noise_file::NoiseFile,
+    store::{noise_file::NoiseFile, today},
 };
 
 #[derive(Args, Debug)]
@@ -70,12 +70,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if let Some(path) = arguments.json.as_ref().filter(|_| !on_screen) {
         files.add(path, file.text().as_bytes())?;
     }
-    let facts = |provenance: page::Provenance| {
-        Ok(provenance.with("unit", &file.name).with("serial number", &file.serial))
-    };
-    let inputs = [("recording", arguments.recording.as_path())];
-    let parts = || vec![page::noise::noise(&file)];
-    arguments.html.add_of(&mut files, &file.recording, &inputs, &facts, &parts)?;
+    let page = || page::of_noise(&file, &arguments.recording, today());
+    arguments.html.add_page(&mut files, &arguments.recording, &page)?;
     files.commit()?;
     let estimated = noise.sensors.iter().any(|(_, found)| found.is_ok());
     match arguments.to {

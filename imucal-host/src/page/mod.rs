@@ -15,6 +15,9 @@
 //!
 //! A page has no script and loads nothing. It follows the reader's choice of a light or a dark screen, and prints on A4.
 
+use std::{io, path::Path};
+
+use imucal_core::record::Date;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 pub mod calibration;
@@ -35,6 +38,8 @@ pub mod sphere;
 pub mod waterfall;
 
 pub use provenance::Provenance;
+
+use crate::{recording::Recording, store::noise_file::NoiseFile};
 
 const STYLE: &str = include_str!("style.css");
 
@@ -88,6 +93,27 @@ pub fn page(title: &str, provenance: &Provenance, parts: &[Part]) -> String {
         }
     };
     document.into_string()
+}
+
+/// The page of a recording's result, made on a day, with the hash of the recording's file.
+///
+/// # Errors
+///
+/// What the system says of a file that cannot be read.
+pub fn of_recording(recording: &Recording, made: Date, parts: &[Part]) -> io::Result<String> {
+    let provenance = Provenance::new(made).with_file("recording", &recording.path)?;
+    Ok(page(&recording.name, &provenance.with_recording(recording), parts))
+}
+
+/// The page of a unit's noise, estimated from a file on a day.
+///
+/// # Errors
+///
+/// As [`of_recording`].
+pub fn of_noise(file: &NoiseFile, path: &Path, made: Date) -> io::Result<String> {
+    let provenance = Provenance::new(made).with_file("recording", path)?;
+    let provenance = provenance.with("unit", &file.name).with("serial number", &file.serial);
+    Ok(page(&file.recording, &provenance, &[noise::noise(file)]))
 }
 
 fn answer(answer: &Answer) -> Markup {

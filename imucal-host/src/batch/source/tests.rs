@@ -96,6 +96,30 @@ fn lists_as_toml_and_as_csv_say_the_same() {
 }
 
 #[test]
+fn a_list_has_topics_for_each_log() {
+    let folder = folder(&["a.mcap", "b.db3", "c.bag"]);
+    let rows = "path,topic\na.mcap,imu=/imu/data; mag=none\nb.db3,imu=/head\nc.bag,\n";
+    write(&folder, "list.csv", rows);
+    let toml = "format = \"imucal-batch/1\"\n\
+        [[recording]]\npath = \"a.mcap\"\ntopic = \"imu=/imu/data;mag=none\"\n\
+        [[recording]]\npath = \"b.db3\"\ntopic = \"imu=/head\"\n[[recording]]\npath = \"c.bag\"\n";
+    write(&folder, "list.toml", toml);
+    let with = |topics: &[&str]| {
+        let topics: Vec<String> = topics.iter().map(|topic| (*topic).to_owned()).collect();
+        Method { mapping: Mapping::default().with_topics(&topics).unwrap(), ..method() }.options()
+    };
+    for list in ["list.csv", "list.toml"] {
+        let found = find(&[folder.path().join(list)], &[], &method()).unwrap();
+        let options: Vec<String> = found.iter().map(|source| source.method.options()).collect();
+        let expected = [with(&["imu=/imu/data", "mag=none"]), with(&["imu=/head"]), method().options()];
+        assert_eq!(options, expected, "{list}");
+    }
+    write(&folder, "bad.csv", "path,topic\na.mcap,/imu/data\n");
+    let message = names(&folder, &["bad.csv"], &[]).unwrap_err().to_string();
+    assert!(message.contains("a.mcap") && message.contains("imu=/imu/data"), "{message}");
+}
+
+#[test]
 fn what_cannot_be_understood_is_named_with_what_to_do() {
     let folder = folder(&["empty/notes.txt", "x.csv", "other.txt"]);
     write(&folder, "run.toml", "format = \"imucal-recording/1\"\n");
@@ -109,7 +133,7 @@ fn what_cannot_be_understood_is_named_with_what_to_do() {
         ("empty", &["no recording"]),
         ("other.txt", &["neither a recording nor a list"]),
         ("run.toml", &["the manifest of a recording"]),
-        ("bad.toml", &["colour", "path, name, model, map, unit, time"]),
+        ("bad.toml", &["colour", "path, name, model, map, unit, time, topic"]),
         ("model.csv", &["x.csv", "`acc=T7` is no model"]),
         ("name.csv", &["`../y`", "change it in the list"]),
         ("twice.csv", &["`y`", "x.csv", "z.csv", "in a list"]),
