@@ -47,6 +47,64 @@ fn an_unknown_log_is_answered_with_its_columns_and_the_command_that_calibrates_i
 }
 
 #[test]
+fn a_log_whose_times_are_dates_and_that_begins_with_comments_is_answered_with_the_command_too() {
+    let folder = Folder::new();
+    let plain = log(',');
+    let dated = plain.lines().skip(1).map(|line| {
+        let (time, values) = line.split_once(',').expect("several fields");
+        let milliseconds: f64 = time.parse().expect("a time");
+        let seconds = (1e3 * milliseconds).round() / 1e6;
+        let (minute, second) = ((seconds / 60.0).floor(), seconds % 60.0);
+        format!("2026-05-01T14:{minute:02}:{second:09.6}+02:00,{values}\n")
+    });
+    let header = plain.lines().next().expect("a header");
+    folder.write("dated.csv", format!("# of a logger\n# 100 Hz\n{header}\n{}", dated.collect::<String>()));
+    let first = folder.run("calibrate dated.csv").with(2).telling(&["first 2026-05-01T14:00:00.0"]);
+    let command =
+        first.err.lines().last().expect("a command").trim().strip_prefix("imucal ").expect("a command");
+    let arguments = command.replace(&folder.path("dated.csv").display().to_string(), "dated.csv");
+    folder
+        .run(&format!("{arguments} --json dated.json"))
+        .with(0)
+        .telling(&["2 lines before the header", "passed over as comments"]);
+    folder.write("log.csv", &plain);
+    folder.run(&format!("calibrate log.csv {MAPPED} --json log.json")).with(0);
+    // Equal times in other digits: the last ones of a fit differ.
+    let [dated, plain] = ["dated.json", "log.json"].map(|name| parameters(&folder, name));
+    for row in 0..3 {
+        let of = |json: &serde_json::Value| json["gyr"]["gain"][row][row].as_f64().expect("a number");
+        assert!((of(&dated) - of(&plain)).abs() < 1e-6, "{dated} {plain}");
+    }
+    let times = format!("import dated.csv {} --out made.csv", &arguments["calibrate dated.csv".len()..]);
+    folder.run(&times).with(0);
+    assert!(folder.text("made.csv").lines().nth(1).expect("a row").starts_with("17776368"));
+}
+
+#[test]
+fn a_log_without_names_or_with_another_ending_is_answered_with_what_to_do() {
+    let folder = Folder::new();
+    let plain = log(',');
+    let rows = plain.split_once('\n').expect("a header").1;
+    folder.write("numbers.csv", rows);
+    let names = "t,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,mag_x,mag_y,mag_z";
+    folder.run("calibrate numbers.csv").with(2).telling(&[
+        "holds numbers, not names",
+        "each of its 10 columns",
+        &format!("  {names}\n"),
+    ]);
+    folder.write("named.csv", format!("{names}\n{rows}"));
+    folder.run("calibrate named.csv --unit t=ms,acc=g,gyr=deg/s,mag=uT").with(0);
+    for (name, remedy) in
+        [("log.txt", "let its name end in .csv"), ("log.mat", "in MATLAB by"), ("log.xlsx", "as CSV")]
+    {
+        folder.write(name, &plain);
+        for command in ["calibrate", "import --out out.csv"] {
+            folder.run(&format!("{command} {name}")).with(2).telling(&[name, remedy]);
+        }
+    }
+}
+
+#[test]
 fn a_mapped_log_gives_what_the_recording_made_of_it_gives() {
     let folder = Folder::new();
     folder.write("log.csv", log(','));

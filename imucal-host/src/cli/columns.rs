@@ -6,7 +6,10 @@ use clap::Args;
 
 use super::{progress::Progress, reading::Reading, warn};
 use crate::{
-    recording::{Mapping, ReadError, Recording, layout_guess::guess},
+    recording::{
+        Mapping, ReadError, Recording,
+        layout_guess::{guess, nameless},
+    },
     report::layout,
 };
 
@@ -71,6 +74,9 @@ fn hint(path: &Path, error: &ReadError, reading: Reading) -> Option<String> {
         error,
         ReadError::Header { .. } | ReadError::ManifestMissing { .. } | ReadError::Mapping { .. }
     );
+    if let Some(fields) = nameless(path, &reading.limits()).filter(|_| unknown) {
+        return Some(layout::names_wanted(fields));
+    }
     let guess = guess(path, &reading.limits()).filter(|_| unknown)?;
     Some(layout::guess(&guess, &command, path))
 }

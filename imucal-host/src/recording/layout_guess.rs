@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use super::{
+    epoch::Epoch,
     mapping::unit_of_time,
     order_statistics::median,
     read::{
         column_guess::{meant, unit_behind},
         columns::NAMES,
         csv_rows::Rows,
-        number,
+        date, number,
     },
     unit::{TimeUnit, Unit},
 };
@@ -91,6 +92,14 @@ pub fn guess(path: &Path, limits: &Limits) -> Option<LayoutGuess> {
     Some(LayoutGuess { columns: columns.collect(), options, unknown_units })
 }
 
+/// Number of fields of a file's first line, where they are numbers instead of names.
+#[must_use]
+pub fn nameless(path: &Path, limits: &Limits) -> Option<usize> {
+    let table = Beginning::read(path, limits)?;
+    let is_value = |name: &String| !value(name.as_bytes()).is_nan();
+    table.names.iter().all(is_value).then_some(table.names.len())
+}
+
 /// Names and first rows of a file.
 struct Beginning {
     names: Vec<String>,
@@ -101,6 +110,7 @@ struct Beginning {
 impl Beginning {
     fn read(path: &Path, limits: &Limits) -> Option<Self> {
         let mut rows = Rows::open(path, limits).ok()?;
+        rows.skip_comments().ok()?;
         rows.find_separator().ok()?;
         if !rows.advance().ok()? {
             return None;
@@ -118,7 +128,7 @@ impl Beginning {
             }
             for (column, field) in table.columns.iter_mut().zip(rows.fields()) {
                 let pointed = rows.pointed(field);
-                column.push(number::parse(pointed.as_deref().unwrap_or(field)).unwrap_or(f64::NAN));
+                column.push(value(pointed.as_deref().unwrap_or(field)));
             }
         }
         (table.columns.first()?.len() > 1).then_some(table)
@@ -201,6 +211,12 @@ impl Beginning {
     }
 }
 
+/// A number, or of a date the seconds since 1970; NaN where it is neither.
+fn value(field: &[u8]) -> f64 {
+    let date = || Some(date::parse(field)?.since(Epoch::of_picoseconds(0)));
+    number::parse(field).ok().or_else(date).unwrap_or(f64::NAN)
+}
+
 /// A name of times that has more than the word in it, such as `#timestamp [ns]` or `sensor_time`.
 fn is_time(name: &str) -> bool {
     let name = name.to_lowercase();
@@ -234,6 +250,27 @@ mod tests {
             said,
             "--time Time --map acc=Acc X [mg],Acc Y [mg],Acc Z [mg] --map temp=Temperature --unit acc=mg"
         );
+    }
+
+    #[test]
+    fn a_first_line_of_numbers_has_no_names() {
+        let of = |text: &str| {
+            let folder = tempfile::tempdir().expect("a folder");
+            let path = folder.path().join("log.csv");
+            std::fs::write(&path, text).expect("room");
+            nameless(&path, &Limits::default())
+        };
+        assert_eq!(of("0,0,0,1\n0.01,0,0,1\n0.02,0,0,1\n"), Some(4));
+        assert_eq!(of("12:00:00;0.5;0;1\n12:00:01;0;0;1\n12:00:02;0;0;1\n"), Some(4));
+        assert_eq!(of("t,ax,ay,az\n0.01,0,0,1\n0.02,0,0,1\n"), None);
+    }
+
+    #[test]
+    fn dates_are_times() {
+        let rows =
+            "2026-05-01T12:00:00.00Z,0,0,1\n2026-05-01T12:00:00.01Z,0,1,0\n2026-05-01T12:00:00.02Z,0,0,1\n";
+        let said = options(&format!("timestamp,ax,ay,az\n{rows}"));
+        assert_eq!(said, "--time timestamp --map acc=ax,ay,az --unit acc=g");
     }
 
     #[test]

@@ -25,7 +25,7 @@ pub enum ReadError {
     Unreadable { path: PathBuf, found: String },
     /// The name says no format there is a reader for.
     #[error(
-        "{path}: found the ending `{found}`, expected .csv, .csv.gz, .parquet, .mcap, .db3 or .bag; give the samples file, or bring other formats in with `imucal import`"
+        "{path}: found the ending `{found}`, expected .csv, .csv.gz, .parquet, .mcap, .db3 or .bag; {}", remedy(.found)
     )]
     UnknownFormat { path: PathBuf, found: String },
     /// Parquet is not built in.
@@ -212,6 +212,24 @@ impl ReadError {
                 | Self::TooLong { .. }
                 | Self::TooManySamples { .. }
         )
+    }
+}
+
+/// What becomes a recording out of a file with another ending.
+fn remedy(ending: &str) -> &'static str {
+    match ending {
+        ".txt" | ".tsv" | ".tab" | ".dat" | ".log" | ".asc" => {
+            "if it is text whose fields are separated by commas, semicolons or tabs, let its name end in .csv"
+        }
+        ".mat" => {
+            "write its samples as text, in MATLAB by `writematrix([t acc gyr], \"log.csv\")`, with a line of names before them"
+        }
+        ".xls" | ".xlsx" | ".ods" => "save its sheet as CSV",
+        ".npy" | ".npz" | ".h5" | ".hdf5" | ".pkl" => {
+            "write its samples as CSV or Parquet, for example by pandas"
+        }
+        ".zip" | ".7z" | ".bz2" | ".xz" | ".zst" | ".zstd" => "decompress it first",
+        _ => "give the samples file; `imucal import` takes a folder of EuRoC and files of imu_tk too",
     }
 }
 

@@ -34,6 +34,14 @@ pub enum Warning {
         /// The key probably meant.
         nearest: Option<String>,
     },
+    /// Comments before the header.
+    #[error("{path}: {lines} lines before the header begin with # or % and were passed over as comments")]
+    Comments {
+        /// Samples file.
+        path: PathBuf,
+        /// How many.
+        lines: u64,
+    },
     /// The last line was cut and has been dropped.
     #[error(
         "{path}, {place}: the last line is cut (found {found} of {expected} whole fields and no line end) and was dropped; record or copy the file again if more than a sample is missing"

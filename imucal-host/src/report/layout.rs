@@ -4,6 +4,9 @@ use std::path::Path;
 
 use crate::recording::layout_guess::LayoutGuess;
 
+/// Columns of a usual log.
+const NAMES: [&str; 10] =
+    ["t", "acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z", "mag_x", "mag_y", "mag_z"];
 /// A value is shown up to here, characters.
 const WIDEST: usize = 24;
 
@@ -22,6 +25,18 @@ pub fn guess(guess: &LayoutGuess, command: &str, path: &Path) -> String {
 /// The command with some options, such as those that choose a topic.
 pub fn command(command: &str, path: &Path, options: &[String]) -> String {
     format!("For example:\n  {}", line(command, path, options))
+}
+
+/// What a file whose first line is numbers lacks: names of so many columns, such as these.
+pub fn names_wanted(fields: usize) -> String {
+    // Times, and as many whole sensors as there are columns for.
+    let sensors = (fields.saturating_sub(1) / 3).clamp(1, 3);
+    let names = &NAMES[..1 + 3 * sensors];
+    let more = if fields > names.len() { ",…" } else { "" };
+    format!(
+        "Its first line holds numbers, not names. Put a line with a name for each of its {fields} columns before it, such as:\n  {}{more}",
+        names.join(",")
+    )
 }
 
 fn line(command: &str, path: &Path, options: &[String]) -> String {

@@ -1,6 +1,9 @@
-//! The column `t`: times as the file counts them, or exact ones where they are of an absolute clock.
+//! The column `t`: times as the file counts them, or exact ones where they are of an absolute clock or dates.
 
-use super::number::{self, NotANumber};
+use super::{
+    date,
+    number::{self, NotANumber},
+};
 use crate::recording::{epoch::Epoch, unit::TimeUnit};
 
 /// A first time beyond this, s (eleven days), is one of an absolute clock, whose zero nobody saw.
@@ -12,16 +15,18 @@ pub(crate) struct Clock {
     unit: TimeUnit,
     pub(crate) epoch: Option<Epoch>,
     started: bool,
+    /// Times are dates, not numbers.
+    dated: bool,
 }
 
 impl Clock {
     pub(crate) fn new(unit: TimeUnit) -> Self {
-        Self { unit, epoch: None, started: false }
+        Self { unit, epoch: None, started: false, dated: false }
     }
 
     /// A clock whose times were read already.
     pub(crate) fn of(unit: TimeUnit, epoch: Option<Epoch>) -> Self {
-        Self { unit, epoch, started: true }
+        Self { unit, epoch, started: true, dated: false }
     }
 
     /// How many of what the column counts make a second.
@@ -29,15 +34,28 @@ impl Clock {
         if self.epoch.is_some() { 1.0 } else { self.unit.per_si() }
     }
 
-    /// A field of a text file; NaN if it is empty.
+    /// A field of a text file, all of which are numbers or all dates; NaN if it is empty.
     pub(crate) fn take_text(&mut self, field: &[u8]) -> Result<f64, NotANumber> {
-        let value = number::parse(field)?;
+        let value = match number::parse(field) {
+            Err(NotANumber::Unparsable) => return self.take_date(field),
+            Ok(value) if self.dated && !value.is_nan() => return Err(NotANumber::Unparsable),
+            value => value?,
+        };
         let unit = self.unit;
         Ok(self.take(value, || {
             let text = std::str::from_utf8(field.trim_ascii()).ok()?;
             // With an exponent it has no more digits than a double.
             Epoch::of_text(text, unit).or_else(|| Epoch::of_number(value, unit))
         }))
+    }
+
+    fn take_date(&mut self, field: &[u8]) -> Result<f64, NotANumber> {
+        let instant = date::parse(field).ok_or(NotANumber::Unparsable)?;
+        if !self.started {
+            (self.started, self.dated, self.epoch) = (true, true, Some(instant));
+        }
+        let epoch = self.epoch.filter(|_| self.dated).ok_or(NotANumber::Unparsable)?;
+        Ok(instant.since(epoch))
     }
 
     /// A double of a file; NaN stays NaN.
@@ -73,6 +91,9 @@ impl Clock {
     /// A time of the column as the file has it.
     pub(crate) fn text(&self, time: f64) -> String {
         let absolute = self.epoch.and_then(|epoch| epoch.later(time));
+        if let Some(date) = absolute.filter(|_| self.dated).and_then(date::text) {
+            return date;
+        }
         absolute.map_or_else(|| time.to_string(), |absolute| absolute.text(self.unit))
     }
 
@@ -122,6 +143,19 @@ mod tests {
             assert_eq!(times, [0.0, 0.010_001, 1.0], "{unit}");
             assert_eq!(epoch.unwrap().text(unit), fields[0]);
         }
+    }
+
+    #[test]
+    fn dates_count_from_the_first_and_numbers_among_them_are_refused() {
+        let mut clock = Clock::new(TimeUnit::Millisecond);
+        let fields = ["2026-05-01T12:00:00.125Z", "", "2026-05-01T12:00:00.135Z", "2026-05-01T12:01:00.125Z"];
+        let times: Vec<f64> = fields.iter().map(|field| clock.take_text(field.as_bytes()).unwrap()).collect();
+        assert!(times[1].is_nan() && (times[0], times[2], times[3]) == (0.0, 0.01, 60.0), "{times:?}");
+        assert_eq!(clock.text(0.01), fields[2]);
+        assert_eq!(clock.take_text(b"12.5"), Err(NotANumber::Unparsable));
+        let mut numbers = Clock::new(TimeUnit::Second);
+        numbers.take_text(b"1").unwrap();
+        assert_eq!(numbers.take_text(fields[0].as_bytes()), Err(NotANumber::Unparsable));
     }
 
     #[test]

@@ -68,6 +68,7 @@ fn reader<'a>(
     rows: &mut Rows<'_>,
     limit: u64,
 ) -> Result<CsvReader<'a>, ReadError> {
+    rows.skip_comments()?;
     if !mapping.is_empty() {
         rows.find_separator()?;
     }
@@ -131,6 +132,10 @@ impl CsvReader<'_> {
             self.push(rows, &mut table).map_err(|bad| self.bad_field(rows, &bad))?;
             lines.push(rows.line);
             self.take(rows)?;
+        }
+        if self.rows == 0 && rows.comments > 0 {
+            let path = self.path.to_path_buf();
+            table.warnings.push(Warning::Comments { path, lines: rows.comments });
         }
         self.rows += lines.len();
         if self.ended && rows.text.truncated {

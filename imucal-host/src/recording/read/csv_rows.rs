@@ -4,12 +4,14 @@ use std::path::Path;
 
 use csv_core::{ReadRecordResult, Reader, ReaderBuilder};
 
-use super::text::Text;
+use super::{date, number, text::Text};
 use crate::{
     file::{Limits, limits::Size},
     recording::read_error::ReadError,
 };
 
+/// A time and three axes have so many.
+const LEAST_SEPARATORS: usize = 3;
 /// Room for a row at first; it grows up to the limits.
 const ROOM: usize = 1 << 10;
 
@@ -26,6 +28,8 @@ pub(crate) struct Rows<'a> {
     next_line: u64,
     /// Line of the row, from 1.
     pub(crate) line: u64,
+    /// Lines of comments before the header.
+    pub(crate) comments: u64,
     /// The text ended within the row: its line has no end.
     pub(crate) cut: bool,
     separator: u8,
@@ -43,9 +47,26 @@ impl<'a> Rows<'a> {
             fields: 0,
             next_line: 1,
             line: 1,
+            comments: 0,
             cut: false,
             separator: b',',
         })
+    }
+
+    /// Passes over lines of comments before the header. A header may begin as they do, as `#timestamp [ns],…`.
+    pub(crate) fn skip_comments(&mut self) -> Result<(), ReadError> {
+        loop {
+            self.skip_blank_lines()?;
+            let input = self.text.next()?;
+            let mut lines = input.split_inclusive(|byte| *byte == b'\n');
+            let Some((first, next)) = lines.next().zip(lines.next()) else { return Ok(()) };
+            if !matches!(first[0], b'#' | b'%') || is_header(first, next) {
+                return Ok(());
+            }
+            let length = first.len();
+            self.text.consume(length);
+            (self.next_line, self.comments) = (self.next_line + 1, self.comments + 1);
+        }
     }
 
     /// Takes semicolons or tabs for what separates fields, where the first line has no comma; before the first row.
@@ -142,6 +163,15 @@ impl<'a> Rows<'a> {
     }
 }
 
+/// Whether a line that begins as a comment is the header of the next: samples follow it, or as many fields.
+fn is_header(line: &[u8], next: &[u8]) -> bool {
+    let separates = |byte: &u8| matches!(byte, b',' | b';' | b'\t');
+    let first = next.split(separates).next().unwrap_or_default();
+    let is_sample = number::parse(first).is_ok_and(|value| !value.is_nan()) || date::parse(first).is_some();
+    let [separators, others] = [line, next].map(|line| line.iter().filter(|byte| separates(byte)).count());
+    is_sample || (separators == others && separators >= LEAST_SEPARATORS)
+}
+
 fn count_lines(bytes: &[u8]) -> u64 {
     bytes.iter().filter(|byte| **byte == b'\n').count() as u64
 }
@@ -161,6 +191,20 @@ mod tests {
 
     fn error(fixture: &Fixture) -> String {
         Recording::read_within(&fixture.path, &SMALL).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn comments_before_the_header_are_passed_over_with_a_warning_and_lines_still_counted() {
+        let samples = "0,0,0,9.8\n1,0,0,9.8\n";
+        let commented =
+            csv(format!("# made by a logger\n#\n\n% 100 Hz, raw\nt,acc_x,acc_y,acc_z\n{samples}"));
+        assert_eq!(commented.read().rows(), 2);
+        assert_says(&commented.warnings().join("\n"), &["run.csv: 3 lines before the header", "# or %"]);
+        let bad = csv(format!("# made by a logger\nt,acc_x,acc_y,acc_z\n{samples}2,0,x,9.8\n"));
+        assert_says(&bad.error(), &["line 5"]);
+        // A header that begins as a comment, and a comment behind the header.
+        assert_says(&csv(format!("#t,acc_x,acc_y,acc_z\n{samples}")).error(), &["line 1", "#t"]);
+        assert_says(&csv(format!("t,acc_x,acc_y,acc_z\n# late\n{samples}")).error(), &["line 2"]);
     }
 
     #[test]

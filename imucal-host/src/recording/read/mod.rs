@@ -10,6 +10,7 @@ pub(crate) mod column_guess;
 pub(crate) mod columns;
 pub(crate) mod csv;
 pub(crate) mod csv_rows;
+pub(crate) mod date;
 pub mod euroc;
 pub mod header_fault;
 pub mod imu_tk;
