@@ -111,6 +111,8 @@ fn a_mapped_log_gives_what_the_recording_made_of_it_gives() {
     folder.write("semicolons.csv", log(';'));
     folder.run(&format!("calibrate log.csv {MAPPED} --json direct.json")).with(0);
     folder.run(&format!("calibrate semicolons.csv {MAPPED} --json semicolons.json")).with(0);
+    folder.write("blanks.csv", log(' '));
+    folder.run(&format!("calibrate blanks.csv {MAPPED} --json blanks.json")).with(0);
     folder.run(&format!("import log.csv {MAPPED} --out made.csv")).with(0);
     folder.run("calibrate made.csv --json made.json").with(0);
     let direct = parameters(&folder, "direct.json");
@@ -126,6 +128,7 @@ fn a_mapped_log_gives_what_the_recording_made_of_it_gives() {
         }
     }
     assert_eq!(direct, parameters(&folder, "semicolons.json"));
+    assert_eq!(direct, parameters(&folder, "blanks.json"));
     assert_eq!(direct["acc"]["unit_in"], "g");
 }
 

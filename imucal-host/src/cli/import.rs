@@ -26,7 +26,7 @@ use crate::{
 /// Other people's formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Layout {
-    /// One CSV file, with its columns by --map, --unit and --time; fields separated by commas, semicolons or tabs
+    /// One CSV file, with its columns by --map, --unit and --time; fields separated by commas, semicolons, tabs or blanks
     Csv,
     /// An MCAP file or a bag, its topics by --topic
     Log,

@@ -139,15 +139,17 @@ impl Beginning {
         let named = |name: &String| name == "t" || meant(name, &["t"]).is_some() || is_time(name);
         let rises = |at: &usize| self.columns[*at].windows(2).all(|pair| pair[1] > pair[0]);
         let all = 0..self.names.len();
-        all.clone().find(|at| named(&self.names[*at]) && rises(at)).or_else(|| all.clone().find(rises))
+        let both = all.clone().find(|at| named(&self.names[*at]) && rises(at));
+        // One that is not understood is said so when it is read.
+        both.or_else(|| all.clone().find(rises)).or_else(|| all.clone().find(|at| named(&self.names[*at])))
     }
 
     fn time_unit(&self, time: usize) -> TimeUnit {
         if let Some(unit) = unit_of_time(&self.names[time]) {
             return unit;
         }
-        let steps = self.columns[time].windows(2).map(|pair| pair[1] - pair[0]).collect();
-        match median(steps).unwrap_or(0.0) {
+        let steps = self.columns[time].windows(2).map(|pair| pair[1] - pair[0]);
+        match median(steps.filter(|step| step.is_finite()).collect()).unwrap_or(0.0) {
             step if step < 0.5 => TimeUnit::Second,
             step if step < 200.0 => TimeUnit::Millisecond,
             step if step < 2e5 => TimeUnit::Microsecond,
@@ -286,6 +288,9 @@ mod tests {
     fn a_table_without_a_sensor_is_none() {
         assert_eq!(guessed("t,speed\n0,1\n1,2\n"), None);
         assert_eq!(guessed("acc_x,acc_y,acc_z\n0,0,1\n0,0,1\n"), None);
+        // Times that are not understood are named by what they are called.
+        let said = options("date time;ax;ay;az\n05/01/2026 12:00:00;0;0;1\n05/01/2026 12:00:01;0;0;1\n");
+        assert_eq!(said, "--time date time --map acc=ax,ay,az --unit acc=g");
         assert_eq!(guessed("t,acc_x,acc_y,acc_z\n"), None);
     }
 

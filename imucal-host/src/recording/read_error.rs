@@ -101,6 +101,11 @@ pub enum ReadError {
         "{path}, {place}, column `{column}`: found `{found}`, expected a number with a decimal point; correct it, or leave it empty if it was not measured"
     )]
     NotANumber { path: PathBuf, place: Place, column: String, found: String },
+    /// Text in place of a time.
+    #[error(
+        "{path}, {place}, column `{column}`: found `{found}`, expected a number, a date of ISO 8601 such as 2026-05-01T12:00:00.125Z, or an hour such as 12:00:00.125; write all times of the column in one of these ways"
+    )]
+    NotATime { path: PathBuf, place: Place, column: String, found: String },
     /// An infinite number.
     #[error(
         "{path}, {place}, column `{column}`: found the infinite value `{found}`, expected a finite number; leave it empty if it was not measured"
@@ -219,7 +224,7 @@ impl ReadError {
 fn remedy(ending: &str) -> &'static str {
     match ending {
         ".txt" | ".tsv" | ".tab" | ".dat" | ".log" | ".asc" => {
-            "if it is text whose fields are separated by commas, semicolons or tabs, let its name end in .csv"
+            "if it is text whose fields are separated by commas, semicolons, tabs or single blanks, let its name end in .csv"
         }
         ".mat" => {
             "write its samples as text, in MATLAB by `writematrix([t acc gyr], \"log.csv\")`, with a line of names before them"

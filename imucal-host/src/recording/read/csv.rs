@@ -238,7 +238,9 @@ impl CsvReader<'_> {
         let column = self.names[bad.column].clone();
         let text = String::from_utf8_lossy(rows.field(bad.column));
         let found: String = text.chars().take(40).collect();
+        let is_time = self.layout.targets.get(bad.column) == Some(&Target::Known(TIME));
         match bad.problem {
+            NotANumber::Unparsable if is_time => ReadError::NotATime { path, place, column, found },
             NotANumber::Unparsable => ReadError::NotANumber { path, place, column, found },
             NotANumber::Infinite => ReadError::Infinite { path, place, column, found },
         }
@@ -298,6 +300,14 @@ mod tests {
             &message,
             &["run.csv, line 3, column `acc_y`", "`zero`", "expected a number", "correct it"],
         );
+    }
+
+    #[test]
+    fn text_in_place_of_a_time_says_which_are_understood() {
+        let message = csv(rows("05/01/2026 12:00:00,0,0,9.8\n")).error();
+        assert_says(&message, &["line 2, column `t`", "`05/01/2026 12:00:00`", "ISO 8601", "12:00:00.125"]);
+        let mixed = csv(rows("2026-05-01T12:00:00Z,0,0,9.8\n0.5,0,0,9.8\n")).error();
+        assert_says(&mixed, &["line 3, column `t`", "`0.5`", "all times of the column in one of these ways"]);
     }
 
     #[test]

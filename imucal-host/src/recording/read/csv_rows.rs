@@ -69,12 +69,12 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Takes semicolons or tabs for what separates fields, where the first line has no comma; before the first row.
+    /// Takes semicolons, tabs or blanks for what separates fields, where the first line has no comma; before the first row.
     pub(crate) fn find_separator(&mut self) -> Result<(), ReadError> {
         self.skip_blank_lines()?;
         let input = self.text.next()?;
         let line = input.split(|byte| *byte == b'\n').next().unwrap_or_default();
-        let found = [b',', b';', b'\t'].into_iter().find(|separator| line.contains(separator));
+        let found = [b',', b';', b'\t', b' '].into_iter().find(|separator| line.contains(separator));
         self.separator = found.unwrap_or(b',');
         self.reader = ReaderBuilder::new().delimiter(self.separator).build();
         Ok(())
