@@ -51,7 +51,7 @@ pub(crate) fn listing(path: &Path) -> Result<Option<Listing>, LogError> {
         (connection, u64::try_from(count).unwrap_or(0))
     };
     let listed = bag.connections()?.into_iter().map(count).collect();
-    match counts.into_iter().next() {
+    match counts.into_iter().min() {
         Some((topic, (_, first))) => {
             let found = format!("a message of topic {topic}");
             Err(bag.damaged(first, found, "one that the table `topics` has"))

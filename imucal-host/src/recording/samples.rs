@@ -86,7 +86,7 @@ impl Recording {
             warnings,
             ..Self::new(name, manifest, time)
         };
-        keep_assumed(&mut recording);
+        keep_assumed(&mut recording, true);
         note_columns(&mut recording);
         checked(recording, &Places::WHOLE)
     }

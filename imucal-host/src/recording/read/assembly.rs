@@ -88,7 +88,7 @@ fn converted(path: &Path, manifest: Manifest, mut table: Table) -> Result<(Recor
         warnings: table.warnings,
         manifest,
     };
-    keep_assumed(&mut recording);
+    keep_assumed(&mut recording, !table.clock.is_dated());
     note_columns(&mut recording);
     Ok((recording, table.places))
 }
@@ -193,10 +193,10 @@ fn segments(path: &Path, table: &Table) -> Result<Option<Vec<Option<i64>>>, Read
     Ok((!column.is_empty()).then(|| column.iter().map(label).collect()))
 }
 
-/// A unit that is left out is assumed only where there is a column in it.
-pub(crate) fn keep_assumed(recording: &mut Recording) {
+/// A unit that is left out is assumed only where there is a column in it; times may have none.
+pub(crate) fn keep_assumed(recording: &mut Recording, times_have_a_unit: bool) {
     let measured: Vec<&str> = [
-        ("t", true),
+        ("t", times_have_a_unit),
         ("acc", recording.acc.is_some()),
         ("gyr", recording.gyr.is_some()),
         ("mag", recording.mag.is_some()),

@@ -34,6 +34,11 @@ impl Clock {
         if self.epoch.is_some() { 1.0 } else { self.unit.per_si() }
     }
 
+    /// Whether times are dates, which have no unit.
+    pub(crate) fn is_dated(&self) -> bool {
+        self.dated
+    }
+
     /// A field of a text file, all of which are numbers or all dates; NaN if it is empty.
     pub(crate) fn take_text(&mut self, field: &[u8]) -> Result<f64, NotANumber> {
         let value = match number::parse(field) {
