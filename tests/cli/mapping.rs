@@ -66,7 +66,7 @@ fn a_log_whose_times_are_dates_and_that_begins_with_comments_is_answered_with_th
     let read = folder
         .run(&format!("{arguments} --json dated.json"))
         .with(0)
-        .telling(&["2 lines before the header", "passed over as comments"]);
+        .telling(&["comments before the header were passed over", "# or %: 2)"]);
     assert!(!read.err.contains("leaves out t"), "{}", read.err);
     folder.write("log.csv", &plain);
     folder.run(&format!("calibrate log.csv {MAPPED} --json log.json")).with(0);
@@ -112,7 +112,7 @@ fn a_mapped_log_gives_what_the_recording_made_of_it_gives() {
     folder.write("semicolons.csv", log(';'));
     folder.run(&format!("calibrate log.csv {MAPPED} --json direct.json")).with(0);
     folder.run(&format!("calibrate semicolons.csv {MAPPED} --json semicolons.json")).with(0);
-    folder.write("blanks.csv", log(' '));
+    folder.write("blanks.csv", format!("# {}", log(' ')));
     folder.run(&format!("calibrate blanks.csv {MAPPED} --json blanks.json")).with(0);
     folder.run(&format!("import log.csv {MAPPED} --out made.csv")).with(0);
     folder.run("calibrate made.csv --json made.json").with(0);

@@ -35,7 +35,7 @@ pub enum Warning {
         nearest: Option<String>,
     },
     /// Comments before the header.
-    #[error("{path}: {lines} lines before the header begin with # or % and were passed over as comments")]
+    #[error("{path}: comments before the header were passed over (lines that begin with # or %: {lines})")]
     Comments {
         /// Samples file.
         path: PathBuf,

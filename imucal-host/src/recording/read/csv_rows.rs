@@ -53,14 +53,20 @@ impl<'a> Rows<'a> {
         })
     }
 
-    /// Passes over lines of comments before the header. A header may begin as they do, as `#timestamp [ns],…`.
+    /// Passes over lines of comments before the header. A header may begin as they do, as `#timestamp [ns],…`; of one as
+    /// `# t ax ay az` the mark is none of the first name.
     pub(crate) fn skip_comments(&mut self) -> Result<(), ReadError> {
         loop {
             self.skip_blank_lines()?;
             let input = self.text.next()?;
             let mut lines = input.split_inclusive(|byte| *byte == b'\n');
             let Some((first, next)) = lines.next().zip(lines.next()) else { return Ok(()) };
-            if !matches!(first[0], b'#' | b'%') || is_header(first, next) {
+            if !matches!(first[0], b'#' | b'%') {
+                return Ok(());
+            }
+            if is_header(first, next) {
+                let mark = if first.get(1) == Some(&b' ') { 2 } else { 0 };
+                self.text.consume(mark);
                 return Ok(());
             }
             let length = first.len();
@@ -166,8 +172,12 @@ impl<'a> Rows<'a> {
 /// Whether a line that begins as a comment is the header of the next: samples follow it, or as many fields.
 fn is_header(line: &[u8], next: &[u8]) -> bool {
     let separates = |byte: &u8| matches!(byte, b',' | b';' | b'\t');
+    let is_value = |field: &[u8]| {
+        number::parse(field).is_ok_and(|value| !value.is_nan()) || date::parse(field).is_some()
+    };
+    // Blanks may separate fields, or be in a date.
     let first = next.split(separates).next().unwrap_or_default();
-    let is_sample = number::parse(first).is_ok_and(|value| !value.is_nan()) || date::parse(first).is_some();
+    let is_sample = is_value(first) || first.split(|byte| *byte == b' ').next().is_some_and(is_value);
     let [separators, others] = [line, next].map(|line| line.iter().filter(|byte| separates(byte)).count());
     is_sample || (separators == others && separators >= LEAST_SEPARATORS)
 }
@@ -199,10 +209,16 @@ mod tests {
         let commented =
             csv(format!("# made by a logger\n#\n\n% 100 Hz, raw\nt,acc_x,acc_y,acc_z\n{samples}"));
         assert_eq!(commented.read().rows(), 2);
-        assert_says(&commented.warnings().join("\n"), &["run.csv: 3 lines before the header", "# or %"]);
+        assert_says(
+            &commented.warnings().join("\n"),
+            &["run.csv: comments before the header were passed over", "# or %: 3"],
+        );
         let bad = csv(format!("# made by a logger\nt,acc_x,acc_y,acc_z\n{samples}2,0,x,9.8\n"));
         assert_says(&bad.error(), &["line 5"]);
-        // A header that begins as a comment, and a comment behind the header.
+        // What NumPy writes; then a header that begins as a comment, and a comment behind the header.
+        let marked = csv(format!("# run 7\n# t,acc_x,acc_y,acc_z\n{samples}"));
+        assert_eq!(marked.read().rows(), 2);
+        assert_says(&marked.warnings().join("\n"), &["# or %: 1)"]);
         assert_says(&csv(format!("#t,acc_x,acc_y,acc_z\n{samples}")).error(), &["line 1", "#t"]);
         assert_says(&csv(format!("t,acc_x,acc_y,acc_z\n# late\n{samples}")).error(), &["line 2"]);
     }
