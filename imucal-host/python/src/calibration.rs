@@ -122,6 +122,7 @@ pub(crate) fn calibrate(
     }
     (request.compare, request.no_temperature) = (compare, !temperature);
     (request.threshold, request.accept_suspect) = (threshold, accept_suspect);
+    recording.check_page(html)?;
     let recording = Arc::clone(&recording.0);
     request.check(&recording).map_err(failure::option)?;
     let options = request.options();

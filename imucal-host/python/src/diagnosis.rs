@@ -30,6 +30,7 @@ pub(crate) fn diagnose(
     watch: Option<PathBuf>,
     html: bool,
 ) -> PyResult<(String, String, Option<String>)> {
+    recording.check_page(html)?;
     let limits = Limits::default();
     let own =
         effects.as_deref().map(|path| user::read(path, &limits)).transpose().map_err(failure::unread)?;

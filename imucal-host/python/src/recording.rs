@@ -16,13 +16,30 @@ use pyo3::prelude::*;
 
 use crate::{failure, manifest, work};
 
-/// A recording in the memory of the library.
+/// A recording in the memory of the library, and whether it is what its file holds.
 #[pyclass(frozen, module = "imucal._native")]
-pub(crate) struct Recording(pub(crate) Arc<recording::Recording>);
+pub(crate) struct Recording(pub(crate) Arc<recording::Recording>, bool);
 
 impl Recording {
+    /// One that was made in memory; a file of its name is another one.
     pub(crate) fn new(recording: recording::Recording) -> Self {
-        Self(Arc::new(recording))
+        Self(Arc::new(recording), false)
+    }
+
+    fn of_file(recording: recording::Recording) -> Self {
+        Self(Arc::new(recording), true)
+    }
+
+    /// Refuses a page, where it is asked for, of a recording that has no file whose hash the page could state.
+    pub(crate) fn check_page(&self, asked: bool) -> PyResult<()> {
+        if !asked || self.1 {
+            return Ok(());
+        }
+        Err(failure::option(format!(
+            "html: found `{}`, which was made in memory, expected a recording of a file, whose hash the page states; write \
+             it, and read it again",
+            self.0.name
+        )))
     }
 }
 
@@ -209,7 +226,7 @@ pub(crate) fn read_stream(
 fn read_as(py: Python<'_>, path: PathBuf, mapping: Mapping, limits: Limits) -> PyResult<Recording> {
     let at = path.clone();
     let read = work::run(py, move || recording::Recording::read_as(&path, &mapping, &limits))?;
-    read.map(Recording::new).map_err(|error| explained(&at, &error, &limits))
+    read.map(Recording::of_file).map_err(|error| explained(&at, &error, &limits))
 }
 
 /// A recording of arrays in the units of a manifest; each is copied once.

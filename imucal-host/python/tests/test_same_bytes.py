@@ -110,6 +110,13 @@ def test_a_diagnosis_is_the_program_s(
     assert found.causes[0]["probability"] == found.causes[0].probability
 
 
+def test_a_page_is_of_a_recording_that_has_a_file(rig: imucal.Recording, calibration: imucal.Calibration) -> None:
+    made = imucal.apply(rig, calibration)
+    for make in (imucal.calibrate, imucal.diagnose):
+        with pytest.raises(imucal.OptionError, match="made in memory"):
+            make(made, html=True)
+
+
 def test_a_diagnosis_along_a_simulator_is_the_program_s(program: Program, tmp_path: pathlib.Path) -> None:
     robot = ["--robot", "wheeled", "--duration", "40", "--si", "--effect", "clk.time_offset=2"]
     program(tmp_path, "simulate", "--out", "walk.csv", *robot)
