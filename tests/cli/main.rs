@@ -24,6 +24,7 @@ mod interrupting;
 mod json_contract;
 mod logs;
 mod mapping;
+mod matlab;
 mod outputs;
 mod overwriting;
 mod pages;

@@ -96,7 +96,7 @@ fn a_log_without_names_or_with_another_ending_is_answered_with_what_to_do() {
     folder.write("named.csv", format!("{names}\n{rows}"));
     folder.run("calibrate named.csv --unit t=ms,acc=g,gyr=deg/s,mag=uT").with(0);
     for (name, remedy) in
-        [("log.txt", "let its name end in .csv"), ("log.mat", "in MATLAB by"), ("log.xlsx", "as CSV")]
+        [("log.txt", "let its name end in .csv"), ("log.mat", "found text"), ("log.xlsx", "as CSV")]
     {
         folder.write(name, &plain);
         for command in ["calibrate", "import --out out.csv"] {

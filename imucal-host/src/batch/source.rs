@@ -40,7 +40,7 @@ pub enum SourceFault {
     Missing { path: PathBuf },
     /// A file of another kind.
     #[error(
-        "{path}: found a file that is neither a recording nor a list, expected NAME.csv, NAME.csv.gz, NAME.parquet, or a list as TOML or CSV"
+        "{path}: found a file that is neither a recording nor a list, expected NAME.csv, NAME.csv.gz, NAME.parquet, NAME.mat, a log, or a list as TOML or CSV"
     )]
     Foreign { path: PathBuf },
     /// A pattern that cannot be understood.
@@ -49,7 +49,9 @@ pub enum SourceFault {
     )]
     Pattern { pattern: String, cause: String },
     /// A source without a recording.
-    #[error("{path}: found no recording, expected NAME.csv, NAME.csv.gz or NAME.parquet; check the path")]
+    #[error(
+        "{path}: found no recording, expected NAME.csv, NAME.csv.gz, NAME.parquet, NAME.mat or a log; check the path"
+    )]
     Nothing { path: PathBuf },
     /// A list that cannot be understood.
     #[error(

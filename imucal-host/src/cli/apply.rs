@@ -77,14 +77,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     Ok(Ending::Done)
 }
 
-/// `NAME-calibrated.csv.gz` for `NAME.csv.gz`; of a log, which is not written, `NAME-calibrated.csv`.
+/// `NAME-calibrated.csv.gz` for `NAME.csv.gz`; of a log or a MAT-file, which are not written, `NAME-calibrated.csv`.
 fn default_output(path: &Path) -> PathBuf {
     let name = path.file_name().and_then(OsStr::to_str).unwrap_or("recording.csv");
     let lower = name.to_ascii_lowercase();
     let ending = [".csv.gz", ".csv", ".parquet"].into_iter().find(|ending| lower.ends_with(ending));
     // Endings are ASCII, so that the lengths agree and the cut is between characters.
     let (stem, ending) = match path.file_stem().and_then(OsStr::to_str) {
-        Some(stem) if is_log(path) => (stem, ".csv"),
+        Some(stem) if is_log(path) || lower.ends_with(".mat") => (stem, ".csv"),
         _ => name.split_at(name.len() - ending.map_or(0, str::len)),
     };
     path.with_file_name(format!("{stem}-calibrated{ending}"))

@@ -67,6 +67,7 @@ pub(super) fn explained(path: &Path, error: ReadError, reading: Reading) -> anyh
 /// What the file's columns probably are, where it is not known, or the command that chooses a topic.
 fn hint(path: &Path, error: &ReadError, reading: Reading) -> Option<String> {
     let command = std::env::args().nth(1).unwrap_or_default();
+    let error = error.fault();
     if let ReadError::Topics { fault, .. } = error {
         return Some(layout::command(&command, path, &fault.remedy()?));
     }

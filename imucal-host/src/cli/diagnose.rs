@@ -29,7 +29,7 @@ use crate::{
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  imucal diagnose robot.csv --sim simulated.csv --html gap.html")]
 pub(super) struct Arguments {
-    /// The recording to diagnose: NAME.csv, NAME.csv.gz or NAME.parquet, with its manifest NAME.toml in the same folder; or a log,
+    /// The recording to diagnose: NAME.csv, NAME.csv.gz, NAME.parquet or NAME.mat, with its manifest NAME.toml in the same folder; or a log,
     /// NAME.mcap, NAME.db3 or NAME.bag
     #[arg(required_unless_present = "list")]
     recording: Option<PathBuf>,

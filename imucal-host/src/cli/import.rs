@@ -26,7 +26,9 @@ use crate::{
 /// Other people's formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Layout {
-    /// One CSV file, with its columns by --map, --unit and --time; fields separated by commas, semicolons, tabs or blanks
+    /// One CSV, Parquet or MAT-file, with its columns by --map, --unit and --time; fields of text separated by commas,
+    /// semicolons, tabs or blanks
+    #[value(alias = "matlab")]
     Csv,
     /// An MCAP file or a bag, its topics by --topic
     Log,
@@ -43,7 +45,7 @@ enum Layout {
                   --out log-si.csv"
 )]
 pub(super) struct Arguments {
-    /// One CSV file, log or folder of EuRoC, or the accelerometer's and the gyroscope's file of imu_tk
+    /// One CSV, Parquet or MAT-file, log or folder of EuRoC, or the accelerometer's and the gyroscope's file of imu_tk
     #[arg(required = true, num_args = 1..=2)]
     files: Vec<PathBuf>,
     /// Their layout; without it that of so many files

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+/// How the names of files end that hold columns of samples.
+pub(crate) const COLUMNS: [&str; 4] = [".csv.gz", ".csv", ".parquet", ".mat"];
 /// How the names of robots' logs end: MCAP, ROS 1 bags and ROS 2 bags in SQLite.
 pub(crate) const LOGS: [&str; 3] = [".mcap", ".bag", ".db3"];
 
@@ -11,6 +13,8 @@ pub(crate) enum Format {
     Csv,
     CsvGz,
     Parquet,
+    /// What MATLAB saves.
+    Mat,
     /// A robot's log.
     Log,
 }
@@ -25,6 +29,8 @@ impl Format {
             Ok(Self::Csv)
         } else if name.ends_with(".parquet") {
             Ok(Self::Parquet)
+        } else if name.ends_with(".mat") {
+            Ok(Self::Mat)
         } else if LOGS.iter().any(|ending| name.ends_with(ending)) {
             Ok(Self::Log)
         } else {

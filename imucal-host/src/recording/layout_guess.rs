@@ -1,12 +1,14 @@
-//! What the columns of an unknown CSV file probably are, and the options that read it so.
+//! What the columns of an unknown file probably are, and the options that read it so.
 
 use std::path::Path;
 
 use super::{
     epoch::Epoch,
+    format::Format,
     mapping::unit_of_time,
     order_statistics::median,
     read::{
+        self,
         column_guess::{meant, unit_behind},
         columns::NAMES,
         csv_rows::Rows,
@@ -43,7 +45,7 @@ pub struct LayoutGuess {
     pub unknown_units: Vec<SensorKind>,
 }
 
-/// Looks at the beginning of a file; `None` where it cannot be read as CSV, or no sensor is recognised.
+/// Looks at the beginning of a file; `None` where it cannot be read, or no sensor is recognised.
 #[must_use]
 pub fn guess(path: &Path, limits: &Limits) -> Option<LayoutGuess> {
     let table = Beginning::read(path, limits)?;
@@ -109,6 +111,25 @@ struct Beginning {
 
 impl Beginning {
     fn read(path: &Path, limits: &Limits) -> Option<Self> {
+        match Format::of(path).ok()? {
+            Format::Csv | Format::CsvGz => Self::of_text(path, limits),
+            #[cfg(feature = "parquet")]
+            Format::Parquet => Self::of_numbers(read::parquet::beginning(path, ROWS, limits)?),
+            #[cfg(not(feature = "parquet"))]
+            Format::Parquet => None,
+            Format::Mat => Self::of_numbers(read::matlab::beginning(path, ROWS, limits)?),
+            Format::Log => None,
+        }
+    }
+
+    fn of_numbers(of: Vec<(String, Vec<f64>)>) -> Option<Self> {
+        let (names, columns): (Vec<String>, Vec<Vec<f64>>) = of.into_iter().unzip();
+        let text = |column: &Vec<f64>| column.first().filter(|value| !value.is_nan()).map(f64::to_string);
+        let first = columns.iter().map(|column| text(column).unwrap_or_default()).collect();
+        (columns.first()?.len() > 1).then_some(Self { names, first, columns })
+    }
+
+    fn of_text(path: &Path, limits: &Limits) -> Option<Self> {
         let mut rows = Rows::open(path, limits).ok()?;
         rows.skip_comments().ok()?;
         rows.find_separator().ok()?;

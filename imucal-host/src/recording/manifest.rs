@@ -25,7 +25,7 @@ pub use self::{
 };
 use self::{fault::ManifestFault, keys::KeyMap};
 use super::{
-    format::LOGS,
+    format::{COLUMNS, LOGS},
     read_error::ReadError,
     sensor_kind::SensorKind,
     triple::{Nominal, Triple},
@@ -204,11 +204,11 @@ impl Default for Manifest {
 
 impl Manifest {
     /// The manifest's path next to a samples file: `NAME.toml` for `NAME.csv`, `NAME.csv.gz`,
-    /// `NAME.parquet` and robots' logs; `None` for a file of another ending.
+    /// `NAME.parquet`, `NAME.mat` and robots' logs; `None` for a file of another ending.
     #[must_use]
     pub fn path_beside(samples: &Path) -> Option<PathBuf> {
         let name = samples.file_name()?.to_str()?;
-        let stem = [".csv.gz", ".csv", ".parquet"].iter().chain(&LOGS).find_map(|ending| {
+        let stem = COLUMNS.iter().chain(&LOGS).find_map(|ending| {
             let at = name.len().checked_sub(ending.len())?;
             let (stem, end) = name.split_at_checked(at)?;
             end.eq_ignore_ascii_case(ending).then_some(stem)
@@ -348,6 +348,7 @@ mod tests {
             ("d/a.csv", Some("d/a.toml")),
             ("a.b.csv.gz", Some("a.b.toml")),
             ("a.parquet", Some("a.toml")),
+            ("a.mat", Some("a.toml")),
             ("a.mcap", Some("a.toml")),
             ("a.bag", Some("a.toml")),
             ("a_0.DB3", Some("a_0.toml")),

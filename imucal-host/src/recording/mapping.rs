@@ -279,6 +279,11 @@ fn stated(kind: SensorKind, text: &str) -> Option<Stated> {
     Some(Stated::Counts(number * unit(of.trim())?.per_si()?))
 }
 
+/// The columns of a recording that a quantity has.
+pub(crate) fn names_of(quantity: &str) -> Option<&'static [&'static str]> {
+    QUANTITIES.iter().find(|(known, _)| *known == quantity).map(|(_, names)| *names)
+}
+
 /// The unit of times that stands behind a column's name, such as `timestamp_ms`, `time [s]` or `t(us)`.
 pub(crate) fn unit_of_time(name: &str) -> Option<TimeUnit> {
     TimeUnit::try_from(unit_behind("t", name)?.to_owned()).ok()

@@ -127,7 +127,7 @@ impl Recording {
         }
     }
 
-    /// Reads `NAME.csv`, `NAME.csv.gz` or, when built with the features `parquet` and `logs`, `NAME.parquet`, `NAME.mcap`,
+    /// Reads `NAME.csv`, `NAME.csv.gz`, `NAME.mat` or, when built with the features `parquet` and `logs`, `NAME.parquet`, `NAME.mcap`,
     /// `NAME.bag` and `NAME.db3`, and the manifest `NAME.toml` next to it, which a log needs not have. What is odd but harmless is in [`Recording::warnings`].
     ///
     /// # Errors
@@ -178,6 +178,7 @@ impl Recording {
             Format::Parquet => {
                 return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() });
             }
+            Format::Mat => read::matlab::read(path, unit, mapping, limits)?,
             #[cfg(feature = "logs")]
             Format::Log => read::logs::read(path, &mapping.topics, mapping.states_field(&manifest), limits)?,
             #[cfg(not(feature = "logs"))]

@@ -34,7 +34,7 @@ impl Recording {
     /// Reads a recording by parts, each a recording of consecutive rows. What is odd but harmless is returned, each kind
     /// of warning once, and in [`Recording::warnings`] of no part. No part follows one that `take` breaks off at.
     ///
-    /// A part of a text file has 65 536 rows; one of a Parquet file is a row group, and a log is one part. Limits hold for one part, so that
+    /// A part of a text file has 65 536 rows; one of a Parquet file is a row group, and a MAT-file or a log is one part. Limits hold for one part, so that
     /// the file may be of any length.
     ///
     /// # Errors
@@ -68,6 +68,9 @@ impl Recording {
             Format::Parquet => read::parquet::read_parts(path, unit, mapping, limits, &mut next),
             #[cfg(not(feature = "parquet"))]
             Format::Parquet => return Err(ReadError::ParquetNotBuilt { path: path.to_path_buf() }),
+            Format::Mat => {
+                read::matlab::read(path, unit, mapping, limits).and_then(|table| next(table).map(|_| ()))
+            }
             #[cfg(feature = "logs")]
             Format::Log => read::logs::read(path, &mapping.topics, field_is_stated, limits)
                 .and_then(|table| next(table).map(|_| ())),
@@ -92,6 +95,9 @@ pub(super) fn opened(
         return Err(ReadError::Unreadable { path: path.to_path_buf(), found });
     }
     refuse_options(path, format, mapping)?;
+    if format == Format::Mat {
+        read::matlab::refuse_others(path)?;
+    }
     let (manifest, mut warnings) = match manifest {
         Some(manifest) => (manifest, Vec::new()),
         None if format == Format::Log => manifest_of_log(path, limits)?,
@@ -125,7 +131,9 @@ fn folder(path: PathBuf) -> ReadError {
 fn refuse_options(path: &Path, format: Format, mapping: &Mapping) -> Result<(), ReadError> {
     let fault = match format {
         Format::Log if mapping.has_columns() => TopicFault::Columns,
-        Format::Csv | Format::CsvGz | Format::Parquet if !mapping.topics.is_empty() => TopicFault::NotALog,
+        Format::Csv | Format::CsvGz | Format::Parquet | Format::Mat if !mapping.topics.is_empty() => {
+            TopicFault::NotALog
+        }
         _ => return Ok(()),
     };
     Err(ReadError::Topics { path: path.to_path_buf(), fault: Box::new(fault) })

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{
+    format::Format,
     log_topics::TopicFault,
     manifest::fault::ManifestFault,
     mapping::MappingFault,
@@ -25,7 +26,7 @@ pub enum ReadError {
     Unreadable { path: PathBuf, found: String },
     /// The name says no format there is a reader for.
     #[error(
-        "{path}: found the ending `{found}`, expected .csv, .csv.gz, .parquet, .mcap, .db3 or .bag; {}", remedy(.found)
+        "{path}: found the ending `{found}`, expected .csv, .csv.gz, .parquet, .mat, .mcap, .db3 or .bag; {}", remedy(.found)
     )]
     UnknownFormat { path: PathBuf, found: String },
     /// Parquet is not built in.
@@ -48,6 +49,18 @@ pub enum ReadError {
     /// Topics that are not there, or not those that are asked for.
     #[error("{path}: {fault}")]
     Topics { path: PathBuf, fault: Box<TopicFault> },
+    /// A MAT-file of a level that is not read.
+    #[error("{path}: found {found}, expected a MAT-file of level 5; {remedy}")]
+    OtherMatFile { path: PathBuf, found: String, remedy: &'static str },
+    /// A MAT-file without an array of numbers.
+    #[error(
+        "{path}: found {}, expected vectors or matrices of numbers with as many rows as samples; save such, for example by `save -v7 log.mat t acc gyr`, or of a table T `S = table2struct(T, \"ToScalar\", true)`",
+        if .found.is_empty() { "no variable" } else { found }
+    )]
+    NoNumbers { path: PathBuf, found: String },
+    /// Columns that are wrong or missing, where some variables were left out.
+    #[error("{error}. Also, {warning}")]
+    AmongLeftOut { error: Box<ReadError>, warning: Box<Warning> },
     /// The compressed or columnar container is damaged.
     #[error("{path}: found a damaged file ({found}), expected {expected}; copy or record it again")]
     Damaged { path: PathBuf, found: String, expected: &'static str },
@@ -66,10 +79,10 @@ pub enum ReadError {
     NotUtf8 { path: PathBuf, line: u64 },
 
     /// The columns are not those of a recording.
-    #[error("{path}, line 1: {}", joined(.faults))]
+    #[error("{path}{}: {}", header_of(.path), joined(.faults))]
     Header { path: PathBuf, faults: Vec<HeaderFault> },
     /// A mapping of columns that the file has not.
-    #[error("{path}, line 1: {fault}")]
+    #[error("{path}{}: {fault}", header_of(.path))]
     Mapping { path: PathBuf, fault: MappingFault },
     /// More columns than a recording has.
     #[error(
@@ -208,6 +221,15 @@ impl ReadError {
         }
     }
 
+    /// What is wrong, without what may be the cause of it.
+    #[must_use]
+    pub fn fault(&self) -> &Self {
+        match self {
+            Self::AmongLeftOut { error, .. } | Self::Misled { error, .. } => error.fault(),
+            error => error,
+        }
+    }
+
     /// Whether a limit ended the reading: more of the file is not to be read then.
     pub(crate) fn is_limit(&self) -> bool {
         matches!(
@@ -225,9 +247,6 @@ fn remedy(ending: &str) -> &'static str {
     match ending {
         ".txt" | ".tsv" | ".tab" | ".dat" | ".log" | ".asc" => {
             "if it is text whose fields are separated by commas, semicolons, tabs or single blanks, let its name end in .csv"
-        }
-        ".mat" => {
-            "write its samples as text, in MATLAB by `writematrix([t acc gyr], \"log.csv\")`, with a line of names before them"
         }
         ".xls" | ".xlsx" | ".ods" => "save its sheet as CSV",
         ".npy" | ".npz" | ".h5" | ".hdf5" | ".pkl" => {
@@ -249,6 +268,14 @@ fn in_folder(files: &[String]) -> String {
         1 => format!("give the one in it that is read: {named}"),
         count if count > NAMED => format!("give one of the {count} in it that are read: {named}, …"),
         _ => format!("give one of those in it that are read: {named}"),
+    }
+}
+
+/// Where a file's names stand, if it has lines.
+fn header_of(path: &Path) -> &'static str {
+    match Format::of(path) {
+        Ok(Format::Parquet | Format::Mat) => "",
+        _ => ", line 1",
     }
 }
 

@@ -164,6 +164,18 @@ pub enum Warning {
         /// Samples file.
         path: PathBuf,
     },
+    /// Variables of a MAT-file that are no columns of samples.
+    #[error(
+        "{path}: left out {}, expected numbers in {rows} rows{}", listed(.others), unpacked(.others)
+    )]
+    LeftOut {
+        /// The MAT-file.
+        path: PathBuf,
+        /// Rows of the times, or of most columns.
+        rows: usize,
+        /// Each with what it is.
+        others: Vec<String>,
+    },
     /// Something odd in a log.
     #[error("{path}: {found}")]
     Log {
@@ -269,6 +281,28 @@ impl Warning {
 
 fn units(assumed: &[(&'static str, String)]) -> String {
     assumed.iter().map(|(key, unit)| format!("{key} = \"{unit}\"")).collect::<Vec<_>>().join(", ")
+}
+
+/// Things that are named, at most.
+const NAMED: usize = 8;
+
+fn listed(others: &[String]) -> String {
+    let named = others.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+    match others.len().saturating_sub(NAMED) {
+        0 => named,
+        more => format!("{named} and {more} more"),
+    }
+}
+
+/// What to do with objects of MATLAB that hold samples.
+fn unpacked(others: &[String]) -> &'static str {
+    if others.iter().any(|other| other.ends_with("(timetable)") || other.ends_with("(table)")) {
+        "; of a table T save `S = table2struct(T, \"ToScalar\", true)`, and of a timetable that of `timetable2table(T)`"
+    } else if others.iter().any(|other| other.ends_with("(datetime)") || other.ends_with("(duration)")) {
+        "; of times save `t = seconds(T - T(1))`"
+    } else {
+        ""
+    }
 }
 
 fn poses(there: &[String]) -> String {

@@ -2,7 +2,7 @@
 //!
 //! | goes in | comes out |
 //! | --- | --- |
-//! | CSV (gzipped or not), Parquet, logs, IMU-TK text, EuRoC folders; a manifest | a recording in SI, or an error with file, line and column |
+//! | CSV (gzipped or not), Parquet, MAT-files, logs, IMU-TK text, EuRoC folders; a manifest | a recording in SI, or an error with file, line and column |
 
 pub(crate) mod assembly;
 pub(crate) mod clock;
@@ -18,6 +18,8 @@ pub(crate) mod interval;
 pub(crate) mod joined;
 #[cfg(feature = "logs")]
 pub(crate) mod logs;
+pub(crate) mod matlab;
+mod memory;
 pub(crate) mod number;
 #[cfg(feature = "parquet")]
 pub(crate) mod parquet;

@@ -15,12 +15,13 @@ use ::parquet::{
     schema::types::ColumnDescriptor,
 };
 
-mod memory;
+mod size;
 
-use self::memory::{Memory, refuse_too_long};
+use self::size::refuse_too_long;
 use super::{
     clock::Clock,
     columns::{KNOWN, Layout, TIME, Table, Target, infinite_is_missing},
+    memory::Memory,
 };
 use crate::{
     file::Limits,
@@ -64,6 +65,25 @@ pub(crate) fn read_parts(
         }
     }
     Ok(())
+}
+
+/// The names of a file's columns and the numbers of its first rows; those of columns that hold none are NaN.
+pub(crate) fn beginning(path: &Path, rows: usize, limits: &Limits) -> Option<Vec<(String, Vec<f64>)>> {
+    let reader = open(path).ok()?;
+    refuse_too_long(path, reader.metadata(), &(0..1.min(reader.num_row_groups())), limits).ok()?;
+    let group = reader.get_row_group(0).ok()?;
+    let schema = reader.metadata().file_metadata().schema_descr_ptr();
+    let memory = Memory::new(path, limits.size);
+    let of = schema.columns().iter().enumerate().map(|(at, descriptor)| {
+        let column = ColumnOfGroup { path, at, group: group.as_ref(), descriptor, memory: &memory };
+        let mut numbers = Vec::new();
+        if column.append_numbers(&mut numbers).is_err() {
+            numbers = vec![f64::NAN; usize::try_from(group.metadata().num_rows()).unwrap_or(0).min(rows)];
+        }
+        numbers.truncate(rows);
+        (descriptor.path().string(), numbers)
+    });
+    Some(of.collect())
 }
 
 fn open(path: &Path) -> Result<SerializedFileReader<File>, ReadError> {

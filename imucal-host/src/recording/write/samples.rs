@@ -56,7 +56,7 @@ impl<'a> Samples<'a> {
             }
             #[cfg(not(feature = "parquet"))]
             Format::Parquet => return Err(WriteError::ParquetNotBuilt { path: path.to_path_buf() }),
-            Format::Log => {
+            Format::Mat | Format::Log => {
                 let found = path.extension().unwrap_or_default().to_string_lossy();
                 return Err(WriteError::UnknownFormat {
                     path: path.to_path_buf(),

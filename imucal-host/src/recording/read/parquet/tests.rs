@@ -13,6 +13,7 @@ use super::*;
 use crate::recording::{
     Recording,
     fixture::{Fixture, assert_says},
+    layout_guess::guess,
     write::parquet_writer::ParquetWriter,
 };
 
@@ -112,6 +113,18 @@ fn integers_since_1970_are_exact_and_a_lost_position_is_not_measured() {
     let message =
         Fixture::new("run.parquet", "", of_numbers(&[("t", &[0.0]), ("temp", &[f64::INFINITY])], &[]));
     assert_says(&message.error(), &["column `temp`", "infinite"]);
+}
+
+#[test]
+fn other_names_are_guessed() {
+    let columns: [(&str, &[f64]); 4] =
+        [("stamp_ms", &[0.0, 10.0]), ("ax", &[0.0; 2]), ("ay", &[0.5; 2]), ("az", &[9.8; 2])];
+    let fixture = Fixture::new("run.parquet", "", of_numbers(&columns, &[]));
+    assert_says(&fixture.error(), &["run.parquet: ", "`ax` for `acc_x`"]);
+    let guess = guess(&fixture.path, &Limits::default()).unwrap();
+    assert_eq!(guess.options.join(" "), "--time stamp_ms --map acc=ax,ay,az --unit acc=m/s^2");
+    let names: Vec<_> = guess.columns.iter().map(|column| (column.meaning, column.first.as_str())).collect();
+    assert_eq!(names[3], (Some("acc_z"), "9.8"));
 }
 
 #[test]

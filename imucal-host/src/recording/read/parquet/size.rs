@@ -1,6 +1,6 @@
-//! What a Parquet file may come to: by what it says of itself, and by what its samples take.
+//! What a Parquet file may come to, by what it says of itself.
 
-use std::{cell::Cell, ops::Range, path::Path};
+use std::{ops::Range, path::Path};
 
 use ::parquet::file::metadata::ParquetMetaData;
 
@@ -26,30 +26,4 @@ pub(super) fn refuse_too_long(
         return Err(ReadError::TooLong { path: path.to_path_buf(), limit: Size(limits.size) });
     }
     Ok(())
-}
-
-/// Bytes that the samples take in memory, against those they may take.
-pub(super) struct Memory<'a> {
-    path: &'a Path,
-    limit: u64,
-    taken: Cell<u64>,
-}
-
-impl<'a> Memory<'a> {
-    pub(super) fn new(path: &'a Path, limit: u64) -> Self {
-        Self { path, limit, taken: Cell::new(0) }
-    }
-
-    /// Counts so many more; whether they are allowed.
-    pub(super) fn take(&self, bytes: u64) -> bool {
-        self.taken.set(self.taken.get().saturating_add(bytes));
-        self.taken.get() <= self.limit
-    }
-
-    pub(super) fn check(&self) -> Result<(), ReadError> {
-        if self.take(0) {
-            return Ok(());
-        }
-        Err(ReadError::TooManySamples { path: self.path.to_path_buf(), limit: Size(self.limit) })
-    }
 }

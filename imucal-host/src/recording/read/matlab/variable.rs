@@ -1,0 +1,146 @@
+//! Variables of a MAT-file: arrays of numbers, structures of them, and what is neither.
+
+use super::element::{ByteOrder, Element, Elements, Fault, INT8, INT32, MATRIX, Numbers};
+
+/// Structures within structures are followed to here.
+const DEEPEST: usize = 8;
+/// Bit of an array's flags: its numbers are complex.
+const COMPLEX: u32 = 0x0800;
+
+/// A variable, or a field of a structure.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Variable {
+    pub(super) name: String,
+    pub(super) content: Content,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Content {
+    Array(Array),
+    Structure(Vec<Variable>),
+    /// Something else, in MATLAB's word for it.
+    Other(String),
+}
+
+/// Real numbers in rows and columns, of which there are no more than rows, stored column by column or row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Array {
+    pub(super) rows: usize,
+    pub(super) columns: usize,
+    numbers: Numbers,
+    /// The file has samples side by side, not one below the other.
+    is_turned: bool,
+}
+
+impl Array {
+    pub(super) fn column(&self, at: usize) -> Numbers {
+        match self.is_turned {
+            true => self.numbers.every(at, self.columns, self.rows),
+            false => self.numbers.every(at * self.rows, 1, self.rows),
+        }
+    }
+}
+
+impl Variable {
+    /// Understands the data of an `miMATRIX`. A field's name stands in its structure.
+    pub(super) fn of(element: Element<'_>, order: ByteOrder, field: Option<String>) -> Result<Self, Fault> {
+        within(element, order, field, DEEPEST)
+    }
+}
+
+fn within(
+    element: Element<'_>,
+    order: ByteOrder,
+    field: Option<String>,
+    depth: usize,
+) -> Result<Variable, Fault> {
+    if element.kind != MATRIX {
+        return Err(Fault("an element that is no array"));
+    }
+    let mut parts = Elements::new(order, element.data);
+    let Some(flags) = parts.next()? else {
+        // An empty field has no parts.
+        let content = Content::Other("an empty array".to_owned());
+        return Ok(Variable { name: field.unwrap_or_default(), content });
+    };
+    let flags = match Numbers::of(flags, order)? {
+        Numbers::Integers(numbers) => numbers.first().copied().unwrap_or_default() as u32,
+        Numbers::Doubles(_) => return Err(Fault("flags that are no integers")),
+    };
+    let class = flags & 0xff;
+    if class == OPAQUE {
+        let name = parts.text()?;
+        let (_, class) = (parts.text()?, parts.text()?);
+        return Ok(Variable { name: field.unwrap_or(name), content: Content::Other(class) });
+    }
+    let sizes = sizes(parts.expect()?, order)?;
+    let name = parts.text()?;
+    let name = field.unwrap_or(name);
+    let content = match class {
+        STRUCTURE if sizes.iter().all(|size| *size == 1) && depth > 0 => {
+            Content::Structure(fields(&mut parts, depth - 1)?)
+        }
+        6..=15 if flags & COMPLEX == 0 => array(Numbers::of(parts.expect()?, order)?, &sizes)?,
+        6..=15 => Content::Other("complex numbers".to_owned()),
+        class => Content::Other(word(class).to_owned()),
+    };
+    Ok(Variable { name, content })
+}
+
+/// Class of an array (`mxSTRUCT_CLASS`, and so on).
+const STRUCTURE: u32 = 2;
+const OPAQUE: u32 = 17;
+
+/// MATLAB's word for a class that holds no numbers.
+fn word(class: u32) -> &'static str {
+    match class {
+        1 => "cell",
+        2 => "struct array",
+        4 => "char",
+        5 => "sparse",
+        16 => "function_handle",
+        _ => "object",
+    }
+}
+
+fn sizes(element: Element<'_>, order: ByteOrder) -> Result<Vec<usize>, Fault> {
+    let (INT32, Numbers::Integers(sizes)) = (element.kind, Numbers::of(element, order)?) else {
+        return Err(Fault("sizes of an array that are no integers"));
+    };
+    let sizes = sizes.into_iter().map(|size| usize::try_from(size).map_err(|_| Fault("a negative size")));
+    sizes.collect()
+}
+
+fn fields(parts: &mut Elements<'_>, depth: usize) -> Result<Vec<Variable>, Fault> {
+    let length = match Numbers::of(parts.expect()?, parts.order)? {
+        Numbers::Integers(numbers) => numbers.first().and_then(|length| usize::try_from(*length).ok()),
+        Numbers::Doubles(_) => None,
+    };
+    let length = length.filter(|length| *length > 0).ok_or(Fault("names of fields without a length"))?;
+    let names = parts.expect()?;
+    if names.kind != INT8 {
+        return Err(Fault("names of fields that are no text"));
+    }
+    let named = names.data.chunks_exact(length).map(|name| {
+        let end = name.iter().position(|byte| *byte == 0).unwrap_or(name.len());
+        String::from_utf8_lossy(&name[..end]).into_owned()
+    });
+    named.map(|name| within(parts.expect()?, parts.order, Some(name), depth)).collect()
+}
+
+/// Sizes of one do not count, as Simulink has them.
+fn array(numbers: Numbers, sizes: &[usize]) -> Result<Content, Fault> {
+    let count = sizes.iter().try_fold(1usize, |count, size| count.checked_mul(*size));
+    if count != Some(numbers.len()) {
+        return Err(Fault("an array whose sizes do not agree with its numbers"));
+    }
+    let of: Vec<usize> = sizes.iter().copied().filter(|size| *size != 1).collect();
+    let (rows, columns, is_turned) = match of[..] {
+        [] => (1, 1, false),
+        [rows] => (rows, 1, false),
+        [rows, columns] if rows >= columns => (rows, columns, false),
+        [columns, rows] => (rows, columns, true),
+        _ => return Ok(Content::Other(format!("array of {} dimensions", of.len()))),
+    };
+    Ok(Content::Array(Array { rows, columns, numbers, is_turned }))
+}
