@@ -8,7 +8,7 @@ use imucal_tests::robot_log::{Content, Logged, write_bag, write_db3, write_mcap}
 use imucal_tests::simulated;
 use serde_json::Value;
 
-use super::{Folder, imucal_on_a_day};
+use super::{Folder, imucal, imucal_on_a_day};
 
 /// The first stamp, ns since 1970: beyond the digits of a double.
 const BEGIN: i64 = 1_700_000_000_123_456_789;
@@ -108,15 +108,62 @@ fn a_bag_in_sqlite_is_read_by_every_command_that_reads_logs() {
     assert!(folder.text("run-calibrated.csv").starts_with("t,acc_x"));
 }
 
+/// A bag's folder `walk`: the messages in two files, and what lists them.
+fn write_walk(folder: &Folder) {
+    let (bag, messages) = (folder.path("walk"), messages());
+    std::fs::create_dir(&bag).expect("room");
+    let (first, second) = messages.split_at(messages.len() / 2);
+    write_mcap(&bag.join("walk_0.mcap"), first);
+    write_mcap(&bag.join("walk_1.mcap"), second);
+    let metadata = "rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths:\n    - walk_0.mcap\n    - walk_1.mcap\n";
+    std::fs::write(bag.join("metadata.yaml"), metadata).expect("room");
+    folder.write("walk.toml", folder.text("run.toml"));
+}
+
 #[test]
-fn of_a_folder_the_files_that_are_read_are_named() {
+fn a_bag_of_several_files_is_one_log() {
+    let folder = folder();
+    write_walk(&folder);
+    let walk = folder.path("walk").display().to_string();
+    for (log, record) in [("run.mcap", "one.bin"), (walk.as_str(), "all.bin")] {
+        let record = folder.path(record).display().to_string();
+        let log = if log == walk { walk.clone() } else { folder.path(log).display().to_string() };
+        imucal(&[
+            "calibrate",
+            &log,
+            "--topic",
+            "imu=/imu/data",
+            "--topic",
+            "mag=/imu/mag",
+            "--record",
+            &record,
+        ])
+        .with(0);
+    }
+    assert_eq!(folder.bytes("all.bin"), folder.bytes("one.bin"));
+    let page = folder.path("walk.html").display().to_string();
+    imucal(&["calibrate", &walk, "--html", &page]).with(0);
+    let both = ["walk_0.mcap", "walk_1.mcap"].map(|name| folder.path("walk").join(name));
+    let (bytes, hash) = imucal_host::file::digest::sha256(&both).expect("they are there");
+    let page = folder.text("walk.html");
+    assert!(page.contains(&hash) && page.contains(&format!("walk, {bytes} bytes in 2 files")));
+    let record = folder.path("all.bin").display().to_string();
+    imucal(&["apply", &walk, "--calibration", &record]).with(0);
+    assert!(folder.text("walk-calibrated.csv").starts_with("t,acc_x"));
+    // In a folder of recordings it is one of them.
+    imucal(&["batch", &walk, "--out", &folder.path("out").display().to_string()]).with(0).printing(&["1 "]);
+}
+
+#[test]
+fn of_a_folder_without_metadata_the_files_that_are_read_are_named() {
     let folder = folder();
     let bag = folder.path("walk");
     std::fs::create_dir(&bag).expect("room");
     folder.run("calibrate ./walk").with(2).telling(&["found a folder, expected a file", "imucal import"]);
     std::fs::copy(folder.path("run.db3"), bag.join("walk_0.db3")).expect("room");
-    std::fs::write(bag.join("metadata.yaml"), "rosbag2_bagfile_information:\n").expect("room");
     folder.run("calibrate ./walk").with(2).telling(&["give the one in it that is read", "walk_0.db3"]);
+    std::fs::write(bag.join("metadata.yaml"), "rosbag2_bagfile_information:\n").expect("room");
+    folder.run("calibrate ./walk").with(2).telling(&["metadata.yaml", "ros2 bag reindex"]);
 }
 
 #[test]
@@ -173,7 +220,7 @@ fn several_and_misspelt_topics_are_answered_with_the_list_and_the_command() {
 fn another_definition_an_unknown_container_and_options_of_other_files_are_bad_usage() {
     let folder = folder();
     let other = fixture("other-definition.mcap").display().to_string();
-    super::imucal(&["calibrate", &other]).with(2).telling(&[
+    imucal(&["calibrate", &other]).with(2).telling(&[
         "`/imu/data`",
         "`float32 angular_velocity.x` where `float64 angular_velocity.x` is expected",
     ]);
@@ -288,10 +335,8 @@ fn a_bag_with_a_simulated_topic_becomes_the_page_of_a_diagnosis() {
     let folder = Folder::new();
     let out = folder.path("run.csv").display().to_string();
     let effect = ["--effect", "clk.time_offset=2"];
-    super::imucal(
-        &[&["simulate", "--robot", "wheeled", "--duration", "60", "--out", &out][..], &effect].concat(),
-    )
-    .with(0);
+    imucal(&[&["simulate", "--robot", "wheeled", "--duration", "60", "--out", &out][..], &effect].concat())
+        .with(0);
     let real = Recording::read(&folder.path("run-real.csv")).expect("just written");
     let measured = real.time.iter().enumerate().map(|(row, time)| {
         let value = |kind| -> [f64; 3] { real.sensor(kind).expect("it has it").values[row].into() };
@@ -341,7 +386,7 @@ fn a_folder_of_euroc_becomes_a_recording_with_its_reference() {
     folder.write("mav0/vicon0/data.csv", pose);
     let [within, out] = [folder.0.path().to_path_buf(), folder.path("made.csv")];
     let [within, out] = [within, out].map(|path| path.display().to_string());
-    super::imucal(&["import", &within, "--from", "euroc", "--out", &out]).with(0).printing(&["400 rows"]);
+    imucal(&["import", &within, "--from", "euroc", "--out", &out]).with(0).printing(&["400 rows"]);
     let made = folder.text("made.csv");
     assert!(made.starts_with("t,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_qw"), "{}", &made[..100]);
     assert!(

@@ -6,7 +6,10 @@ use std::{
     path::Path,
 };
 
-use crate::{bag_file, error::LogError, mcap_file, place::Place, sqlite_file, warning::LogWarning};
+use crate::{
+    bag_file, compression::is_zstd, error::LogError, mcap_file, place::Place, sqlite_file,
+    warning::LogWarning,
+};
 
 /// What a log is kept in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,6 +68,8 @@ impl Container {
             Ok(Self::Bag)
         } else if begin.starts_with(sqlite_file::MAGIC) {
             Ok(Self::Sqlite)
+        } else if is_zstd(&begin) {
+            Err(LogError::Packed { path: path.to_path_buf() })
         } else {
             let found = begin.escape_ascii().to_string();
             Err(LogError::Container { path: path.to_path_buf(), found })

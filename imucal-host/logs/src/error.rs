@@ -17,6 +17,16 @@ pub enum LogError {
         "{path}: found a file that begins with `{found}`, expected MCAP, a ROS 2 bag in SQLite or a ROS 1 bag of format 2.0; give the log, or convert it to MCAP"
     )]
     Container { path: PathBuf, found: String },
+    /// The metadata of a folder that do not say its files.
+    #[error(
+        "{path}: found metadata that cannot be understood ({found}), expected those of `ros2 bag record` with relative_file_paths; write them again by `ros2 bag reindex`, or give one of the folder's files"
+    )]
+    Metadata { path: PathBuf, found: String },
+    /// A file that is compressed as a whole.
+    #[error(
+        "{path}: found a file that is compressed as a whole, expected one whose messages or chunks are; decompress it with `zstd -d {path}`, and give that file"
+    )]
+    Packed { path: PathBuf },
     /// A bag whose chunks are encrypted.
     #[error("{path}: found a bag encrypted by `{found}`, expected a plain one; decrypt it first")]
     Encrypted { path: PathBuf, found: String },

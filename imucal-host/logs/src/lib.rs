@@ -1,4 +1,5 @@
-//! Inertial sensors' topics of robots' logs: MCAP of ROS 2 or ROS 1, ROS 2 bags in SQLite, and ROS 1 bags (format 2.0).
+//! Inertial sensors' topics of robots' logs: MCAP of ROS 2 or ROS 1, ROS 2 bags in SQLite, and ROS 1 bags (format 2.0). A folder that the
+//! recorder of ROS 2 made is one log, of all of its files.
 //!
 //! ```text
 //!  file ──► container ──► chunk ──► connection ──► message ──► order ──► Stream
@@ -39,6 +40,8 @@ mod place;
 mod error;
 mod warning;
 
+mod split;
+
 mod container;
 
 mod compression;
@@ -62,5 +65,6 @@ pub use self::{
     log::{Log, Reading, Stream, Topic},
     message::Kind,
     place::Place,
+    split::{files_of, is_bag_folder},
     warning::{LogWarning, Refusal},
 };

@@ -11,15 +11,17 @@ use crate::{
     error::LogError,
     message::{Kind, decode},
     order::Unordered,
+    split::files_of,
     warning::{LogWarning, Refusal},
     wire::Encoding,
 };
 
-/// A log file whose topics are known.
+/// A log whose topics are known: a file, or a folder that the recorder of ROS 2 made.
 #[derive(Clone, Debug)]
 pub struct Log {
     path: PathBuf,
-    container: Container,
+    /// In the order of recording.
+    files: Vec<(PathBuf, Container)>,
     size: u64,
     topics: Vec<Topic>,
 }
@@ -73,22 +75,27 @@ pub struct Reading {
 }
 
 impl Log {
-    /// Opens a log and finds its topics, by its index if it has one. Neither a chunk nor the numbers of the topics that will be
+    /// Opens a log and finds its topics, by the index of each file if it has one. Neither a chunk nor the numbers of the topics that will be
     /// read may take more than `size` bytes.
     ///
     /// # Errors
     ///
     /// [`LogError`].
     pub fn open(path: &Path, size: u64) -> Result<Self, LogError> {
-        let container = Container::of(path)?;
-        let listed = match container.listing(path, size)? {
-            Some(listed) => listed,
-            None => {
-                let mut counter = Counter::default();
-                container.scan(path, size, &mut counter)?;
-                counter.listed
+        let mut files = Vec::new();
+        let mut listed = Vec::new();
+        for file in files_of(path)? {
+            let container = Container::of(&file)?;
+            match container.listing(&file, size)? {
+                Some(of_file) => listed.extend(of_file),
+                None => {
+                    let mut counter = Counter::default();
+                    container.scan(&file, size, &mut counter)?;
+                    listed.extend(counter.listed);
+                }
             }
-        };
+            files.push((file, container));
+        }
         let mut topics: Vec<Topic> = Vec::new();
         for (connection, count) in listed {
             let found = Topic {
@@ -106,7 +113,7 @@ impl Log {
             }
         }
         topics.sort_by(|a, b| a.name.cmp(&b.name));
-        Ok(Self { path: path.to_path_buf(), container, size, topics })
+        Ok(Self { path: path.to_path_buf(), files, size, topics })
     }
 
     /// Its topics by their names. One that carries several types is there once for each.
@@ -121,21 +128,29 @@ impl Log {
     ///
     /// [`LogError`], also of a topic that is not there or whose messages are not read.
     pub fn read(&self, names: &[&str]) -> Result<Reading, LogError> {
-        let mut reader = Reader {
-            path: &self.path,
-            size: self.size,
-            topics: Vec::new(),
-            of_connection: HashMap::new(),
-            warnings: Vec::new(),
-        };
-        for name in names {
-            reader.topics.push(OfTopic::new(name, self.kind_of(name)?));
+        let topics: Result<Vec<OfTopic>, LogError> =
+            names.iter().map(|name| Ok(OfTopic::new(name, self.kind_of(name)?))).collect();
+        let (mut topics, mut warnings) = (topics?, Vec::new());
+        for (file, container) in &self.files {
+            topics.iter_mut().for_each(|topic| topic.messages.begin(file));
+            let mut reader = Reader {
+                path: file,
+                size: self.size,
+                topics: &mut topics,
+                of_connection: HashMap::new(),
+                warnings: Vec::new(),
+            };
+            container.scan(file, self.size, &mut reader)?;
+            for warning in reader.warnings {
+                let warning = if self.files.len() > 1 { warning.in_file(file) } else { warning };
+                if !warnings.contains(&warning) {
+                    warnings.push(warning);
+                }
+            }
         }
-        self.container.scan(&self.path, self.size, &mut reader)?;
-        let mut warnings = reader.warnings;
         let mut streams = Vec::new();
-        for topic in reader.topics {
-            streams.push(topic.stream(&self.path, &mut warnings)?);
+        for topic in topics {
+            streams.push(topic.stream(&mut warnings)?);
         }
         Ok(Reading { streams, warnings })
     }
@@ -206,11 +221,11 @@ impl Visitor for Counter {
     fn warn(&mut self, _: LogWarning) {}
 }
 
-/// Keeps the numbers of some topics.
+/// Keeps the numbers of some topics in one of the files.
 struct Reader<'a> {
     path: &'a Path,
     size: u64,
-    topics: Vec<OfTopic>,
+    topics: &'a mut [OfTopic],
     /// Topic, type and encoding of the connections that are read.
     of_connection: HashMap<u32, (usize, MessageType, Encoding)>,
     warnings: Vec<LogWarning>,
@@ -237,13 +252,13 @@ impl OfTopic {
         }
     }
 
-    fn stream(self, path: &Path, warnings: &mut Vec<LogWarning>) -> Result<Stream, LogError> {
+    fn stream(self, warnings: &mut Vec<LogWarning>) -> Result<Stream, LogError> {
         let (kind, frame) = (self.messages.kind, self.frame.unwrap_or_default());
         if let Some(other) = self.other_frame {
             let (topic, first) = (self.name.clone(), frame.clone());
             warnings.push(LogWarning::FrameChanges { topic, first, other });
         }
-        let ordered = self.messages.ordered(path, &self.name, warnings)?;
+        let ordered = self.messages.ordered(&self.name, warnings)?;
         Ok(Stream {
             topic: self.name,
             kind,

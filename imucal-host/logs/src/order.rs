@@ -1,6 +1,6 @@
 //! The messages of a topic in the order of their stamps, each once.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::{error::LogError, message::Kind, place::Place, warning::LogWarning};
 
@@ -9,10 +9,12 @@ const OVERTAKES: i64 = 1_000_000_000;
 /// Stamps beyond this are of an absolute clock, which is not at its zero, ns.
 const FAR: i64 = 1_000_000_000_000_000;
 
-/// The messages of a topic as they stand in the file.
+/// The messages of a topic as they stand in the log's files.
 #[derive(Clone, Debug)]
 pub(crate) struct Unordered {
     pub(crate) kind: Kind,
+    /// From which message on they stand in which file.
+    pub(crate) files: Vec<(usize, PathBuf)>,
     pub(crate) stamps: Vec<i64>,
     /// When they were recorded, ns.
     pub(crate) logged: Vec<i64>,
@@ -30,7 +32,13 @@ pub(crate) struct Ordered {
 
 impl Unordered {
     pub(crate) fn new(kind: Kind) -> Self {
-        Self { kind, stamps: Vec::new(), logged: Vec::new(), places: Vec::new(), values: Vec::new() }
+        let (stamps, logged) = (Vec::new(), Vec::new());
+        Self { kind, files: Vec::new(), stamps, logged, places: Vec::new(), values: Vec::new() }
+    }
+
+    /// The messages from now on stand in another file.
+    pub(crate) fn begin(&mut self, file: &Path) {
+        self.files.push((self.stamps.len(), file.to_path_buf()));
     }
 
     /// Bytes in memory.
@@ -51,10 +59,14 @@ impl Unordered {
         self.places.get(row).copied().unwrap_or(Place::Byte(0))
     }
 
+    fn file(&self, row: usize) -> PathBuf {
+        let last = self.files.iter().rfind(|(first, _)| *first <= row);
+        last.map_or_else(PathBuf::new, |(_, file)| file.clone())
+    }
+
     /// Sorts by stamps. Where no message has one, the times of recording are taken.
     pub(crate) fn ordered(
         mut self,
-        path: &Path,
         topic: &str,
         warnings: &mut Vec<LogWarning>,
     ) -> Result<Ordered, LogError> {
@@ -71,7 +83,7 @@ impl Unordered {
                 warnings.push(LogWarning::StampsMissing { topic: topic_name(), count });
             }
         }
-        self.refuse_reset(path, topic, &rows)?;
+        self.refuse_reset(topic, &rows)?;
         let late = |pair: &&[usize]| matches!(pair, [a, b] if self.stamp(*b) < self.stamp(*a));
         let count = rows.windows(2).filter(late).count() as u64;
         if count > 0 {
@@ -85,7 +97,7 @@ impl Unordered {
                 Some(last) if self.stamp(*last) == self.stamp(row) => {
                     if !is_same(self.row(*last), self.row(row)) {
                         return Err(LogError::StampTwice {
-                            path: path.to_path_buf(),
+                            path: self.file(row),
                             topic: topic_name(),
                             place: self.place(row),
                             found_ns: self.stamp(row),
@@ -106,7 +118,7 @@ impl Unordered {
     }
 
     /// Stamps that run back in the order of recording. Chunks may stand in any order; times of recording do not.
-    fn refuse_reset(&self, path: &Path, topic: &str, rows: &[usize]) -> Result<(), LogError> {
+    fn refuse_reset(&self, topic: &str, rows: &[usize]) -> Result<(), LogError> {
         let mut recorded = rows.to_vec();
         recorded.sort_by_key(|row| self.logged.get(*row).copied().unwrap_or_default());
         let mut before = i64::MIN;
@@ -114,7 +126,7 @@ impl Unordered {
             let found = self.stamp(row);
             if found < before.saturating_sub(OVERTAKES) {
                 return Err(LogError::StampOrder {
-                    path: path.to_path_buf(),
+                    path: self.file(row),
                     topic: topic.to_owned(),
                     place: self.place(row),
                     found_ns: found,
@@ -140,6 +152,7 @@ mod tests {
 
     fn ordered(messages: &[(i64, i64, f64)]) -> Result<(Ordered, Vec<String>), String> {
         let mut all = Unordered::new(Kind::Temperature);
+        all.begin(Path::new("a.mcap"));
         for (stamp, logged, value) in messages {
             all.stamps.push(*stamp);
             all.logged.push(*logged);
@@ -147,7 +160,7 @@ mod tests {
             all.values.push(*value);
         }
         let mut warnings = Vec::new();
-        let found = all.ordered(Path::new("a.mcap"), "/t", &mut warnings);
+        let found = all.ordered("/t", &mut warnings);
         let found = found.map_err(|error| error.to_string())?;
         Ok((found, warnings.iter().map(ToString::to_string).collect()))
     }

@@ -1,5 +1,7 @@
 //! What stops nothing: remarks about a log, and why some of its topics are not read.
 
+use std::path::Path;
+
 /// Something noticed while reading a log.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -10,6 +12,9 @@ pub enum LogWarning {
         "the file is cut at byte {offset}; what is whole before was read; copy it again, or close the recorder before copying"
     )]
     Truncated { offset: u64 },
+    /// Something noticed in one of a log's files.
+    #[error("{file}: {warning}")]
+    InFile { file: String, warning: Box<LogWarning> },
     /// A bag that was not closed.
     #[error("the bag has no index, as one that was not closed; it was read from its beginning")]
     NoIndex,
@@ -37,6 +42,19 @@ pub enum LogWarning {
         "topic `{topic}`: the frame changes from `{first}` to `{other}`; all messages were taken for ones in the first"
     )]
     FrameChanges { topic: String, first: String, other: String },
+}
+
+impl LogWarning {
+    /// The same of one of several files; what is said of a topic is said once of all of them.
+    pub(crate) fn in_file(self, file: &Path) -> Self {
+        match self {
+            Self::Truncated { .. } | Self::NoIndex => {
+                let file = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                Self::InFile { file, warning: Box::new(self) }
+            }
+            of_topic => of_topic,
+        }
+    }
 }
 
 /// Why the messages of a topic are not read.

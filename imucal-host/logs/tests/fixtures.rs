@@ -23,6 +23,8 @@ const RECORDS: [&str; 8] = [
 
 /// Databases of the same content: with definitions, with messages that are compressed too, and without definitions.
 const DATABASES: [&str; 3] = ["iron.db3", "compressed.db3", "foxy.db3"];
+/// A folder of two files that together are the same.
+const FOLDER: &str = "split";
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
@@ -59,7 +61,7 @@ fn damaged(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
 #[test]
 fn each_container_and_compression_gives_the_numbers_and_stamps_that_were_written() {
     let topics = ["/imu/data", "/imu/mag", "/imu/temperature", "/vicon/pose", "/pose_cov", "/odom"];
-    for name in RECORDS.into_iter().chain(DATABASES) {
+    for name in RECORDS.into_iter().chain(DATABASES).chain([FOLDER]) {
         let reading = read(&fixture(name), &topics);
         let undefined = |warning: &LogWarning| matches!(warning, LogWarning::NoDefinition { .. });
         let expected = if name == "foxy.db3" { topics.len() } else { 0 };
@@ -84,7 +86,7 @@ fn each_container_and_compression_gives_the_numbers_and_stamps_that_were_written
 
 #[test]
 fn topics_are_listed_with_type_count_and_why_they_are_not_read() {
-    for name in RECORDS.into_iter().chain(DATABASES) {
+    for name in RECORDS.into_iter().chain(DATABASES).chain([FOLDER]) {
         let log = Log::open(&fixture(name), SIZE).expect("it opens");
         let counts: Vec<(&str, u64)> =
             log.topics().iter().map(|topic| (topic.name.as_str(), topic.count)).collect();
@@ -260,4 +262,46 @@ fn more_than_the_limit_is_refused() {
             matches!(error, LogError::TooLarge { limit: 50, .. }) || text.contains("more than 50 bytes");
         assert!(too_long && text.contains("message 1 of the database"), "{text}");
     }
+}
+
+/// The folder of two files, to be damaged.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["metadata.yaml", "split_0.mcap", "split_1.mcap"] {
+        fs::copy(fixture(FOLDER).join(name), folder.path().join(name)).expect("room");
+    }
+    folder
+}
+
+#[test]
+fn what_is_wrong_with_a_file_of_a_folder_is_said_with_its_name() {
+    let folder = folder();
+    let second = folder.path().join("split_1.mcap");
+    let whole = fs::read(&second).expect("it is there");
+    fs::write(&second, &whole[..whole.len() / 3]).expect("room");
+    let reading = read(folder.path(), &["/imu/data"]);
+    assert!(reading.streams[0].stamps_ns.len() > 20, "{}", reading.streams[0].stamps_ns.len());
+    let said: Vec<String> = reading.warnings.iter().map(ToString::to_string).collect();
+    assert!(said[0].starts_with("split_1.mcap: the file is cut at byte"), "{said:?}");
+    fs::write(&second, [&b"\x28\xb5\x2f\xfd"[..], &whole].concat()).expect("room");
+    let packed = Log::open(folder.path(), SIZE).expect_err("it is packed");
+    assert_eq!(packed, LogError::Packed { path: second.clone() });
+    fs::remove_file(&second).expect("it is there");
+    let missing = Log::open(folder.path(), SIZE).expect_err("one is missing").to_string();
+    assert!(missing.contains("split_1.mcap") && missing.contains("cannot be read"), "{missing}");
+}
+
+#[test]
+fn a_folder_in_another_order_is_sorted_by_its_stamps() {
+    let folder = folder();
+    let metadata = folder.path().join("metadata.yaml");
+    let text = fs::read_to_string(&metadata).expect("it is there");
+    fs::write(
+        &metadata,
+        text.replace("- split_0.mcap\n  - split_1.mcap", "- split_1.mcap\n  - split_0.mcap"),
+    )
+    .expect("room");
+    let reading = read(folder.path(), &["/imu/data"]);
+    assert_imu(&reading.streams[0], 40);
+    assert!(matches!(reading.warnings[0], LogWarning::Reordered { .. }), "{:?}", reading.warnings);
 }

@@ -18,7 +18,7 @@ use crate::{
         Limits,
         digest::{sha256, sha256_of},
     },
-    recording::{Manifest, SensorKind},
+    recording::{Manifest, SensorKind, files_of},
     store::form::Form,
 };
 
@@ -238,9 +238,10 @@ pub(super) fn output_path(out: &Path, name: &str, ending: &str) -> PathBuf {
 impl Input {
     /// Of the files of a recording.
     pub(super) fn of(samples: &Path) -> io::Result<Self> {
-        let (size, of_samples) = sha256(samples)?;
+        let files = files_of(samples).map_err(io::Error::other)?;
+        let (size, of_samples) = sha256(&files)?;
         let manifest = Manifest::path_beside(samples).filter(|path| path.is_file());
-        let manifest_sha256 = manifest.map(|path| sha256(&path)).transpose()?.map(|(_, sum)| sum);
+        let manifest_sha256 = manifest.map(|path| sha256(&[path])).transpose()?.map(|(_, sum)| sum);
         Ok(Self { size, sha256: of_samples, manifest_sha256 })
     }
 }

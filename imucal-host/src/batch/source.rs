@@ -10,7 +10,7 @@ use std::{
 };
 
 use super::{Method, list};
-use crate::recording::{Format, Manifest};
+use crate::recording::{Format, Manifest, is_bag_folder};
 
 /// A recording to be calibrated.
 #[derive(Clone, Debug)]
@@ -108,7 +108,9 @@ struct Search {
 impl Search {
     fn source(&mut self, path: &Path, method: &Method, found: &mut Vec<Found>) -> Result<(), SourceFault> {
         let text = path.to_string_lossy();
-        if path.is_dir() {
+        if is_bag_folder(path) {
+            self.single(Found::new(path.to_path_buf(), None, method.clone()), found)
+        } else if path.is_dir() {
             self.roots.push(place(path));
             self.folder(path, method, found)
         } else if path.is_file() {
@@ -129,10 +131,10 @@ impl Search {
                 continue;
             }
             // Links to folders are not followed: they may lead back.
-            if entry.file_type().map_err(failed)?.is_dir() {
-                self.folder(&path, method, found)?;
-            } else if is_recording(&path) {
+            if is_recording(&path) {
                 found.push(Found::new(path, None, method.clone()));
+            } else if entry.file_type().map_err(failed)?.is_dir() {
+                self.folder(&path, method, found)?;
             }
         }
         Ok(())
@@ -199,9 +201,10 @@ impl Found {
     }
 }
 
-/// A file by the name of a recording; a link that leads nowhere is one that cannot be read.
+/// A file by the name of a recording, or a bag that is a folder; a link that leads nowhere is one that cannot be read.
 fn is_recording(path: &Path) -> bool {
-    Format::of(path).is_ok() && fs::metadata(path).map_or(true, |found| found.is_file())
+    let is_file = || fs::metadata(path).map_or(true, |found| found.is_file());
+    is_bag_folder(path) || (Format::of(path).is_ok() && is_file())
 }
 
 /// A name of a file, without a folder.

@@ -31,8 +31,8 @@ pub(super) use crate::store::today;
     after_help = "Example:\n  imucal calibrate tumble.csv --out unit.toml --record unit.bin --html unit.html"
 )]
 pub(super) struct Arguments {
-    /// The recording: NAME.csv, NAME.csv.gz, NAME.parquet or NAME.mat, with its manifest NAME.toml in the same folder; or a log, NAME.mcap,
-    /// NAME.db3 or NAME.bag
+    /// The recording: NAME.csv, NAME.csv.gz, NAME.parquet or NAME.mat, with its manifest NAME.toml in the same folder;
+    /// or a log, NAME.mcap, NAME.db3 or NAME.bag, or the folder of a ROS 2 bag
     recording: PathBuf,
     #[command(flatten)]
     fitting: Fitting,

@@ -29,8 +29,8 @@ use crate::{
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  imucal diagnose robot.csv --sim simulated.csv --html gap.html")]
 pub(super) struct Arguments {
-    /// The recording to diagnose: NAME.csv, NAME.csv.gz, NAME.parquet or NAME.mat, with its manifest NAME.toml in the same folder; or a log,
-    /// NAME.mcap, NAME.db3 or NAME.bag
+    /// The recording to diagnose: NAME.csv, NAME.csv.gz, NAME.parquet or NAME.mat, with its manifest NAME.toml in the
+    /// same folder; or a log, NAME.mcap, NAME.db3 or NAME.bag, or the folder of a ROS 2 bag
     #[arg(required_unless_present = "list")]
     recording: Option<PathBuf>,
     /// The unit's present model, as `imucal calibrate` wrote it (default: calibrated from the recording)

@@ -8,24 +8,27 @@ use std::{
 
 use sha2::{Digest, Sha256};
 
-/// A file's length in bytes and its SHA-256 in hexadecimal digits.
+/// The length in bytes of files, one behind the other, and their SHA-256 in hexadecimal digits.
 ///
 /// # Errors
 ///
 /// What the system says of a file that cannot be read.
-pub fn sha256(path: &Path) -> io::Result<(u64, String)> {
-    let mut file = File::open(path)?;
+pub fn sha256<P: AsRef<Path>>(files: &[P]) -> io::Result<(u64, String)> {
     let mut hash = Sha256::new();
     let mut buffer = vec![0; 1 << 16];
     let mut bytes = 0;
-    loop {
-        let read = file.read(&mut buffer)?;
-        if read == 0 {
-            return Ok((bytes, hexadecimal(&hash.finalize())));
+    for path in files {
+        let mut file = File::open(path)?;
+        loop {
+            let read = file.read(&mut buffer)?;
+            if read == 0 {
+                break;
+            }
+            hash.update(&buffer[..read]);
+            bytes += read as u64;
         }
-        hash.update(&buffer[..read]);
-        bytes += read as u64;
     }
+    Ok((bytes, hexadecimal(&hash.finalize())))
 }
 
 /// SHA-256 of what a file is to hold, in hexadecimal digits.
@@ -49,7 +52,12 @@ mod tests {
         std::fs::write(&path, "abc").unwrap();
         // FIPS 180-2, appendix B.1.
         let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
-        assert_eq!(sha256(&path).unwrap(), (3, expected.to_owned()));
+        assert_eq!(sha256(&[&path]).unwrap(), (3, expected.to_owned()));
+        let parts = ["a", "bc"].map(|part| folder.path().join(part));
+        parts
+            .iter()
+            .for_each(|part| std::fs::write(part, part.file_name().unwrap().as_encoded_bytes()).unwrap());
+        assert_eq!(sha256(&parts).unwrap(), (3, expected.to_owned()));
         assert_eq!(sha256_of(b"abc"), expected);
     }
 }

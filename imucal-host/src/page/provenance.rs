@@ -7,7 +7,7 @@ use maud::{Markup, html};
 
 use crate::{
     file::digest::sha256,
-    recording::{Recording, manifest::site::Site},
+    recording::{Recording, files_of, manifest::site::Site},
     report::measure::plain,
 };
 
@@ -34,15 +34,17 @@ impl Provenance {
         self
     }
 
-    /// With a file by its name, size and SHA-256.
+    /// With a file by its name, size and SHA-256; of a bag that is a folder, those of its files one behind the other.
     ///
     /// # Errors
     ///
     /// What the system says of a file that cannot be read.
     pub fn with_file(self, what: &str, path: &Path) -> io::Result<Self> {
         let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        let (bytes, hash) = sha256(path)?;
-        Ok(self.with(what, &format!("{name}, {bytes} bytes")).with("its SHA-256", &hash))
+        let files = files_of(path).map_err(io::Error::other)?;
+        let (bytes, hash) = sha256(&files)?;
+        let among = if files.len() > 1 { format!(" in {} files", files.len()) } else { String::new() };
+        Ok(self.with(what, &format!("{name}, {bytes} bytes{among}")).with("its SHA-256", &hash))
     }
 
     /// With what was recorded: unit, when, for how long, where.

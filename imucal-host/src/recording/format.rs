@@ -1,4 +1,4 @@
-//! File formats of the samples, known by the name's ending.
+//! File formats of the samples, known by the name's ending; a folder that the recorder of ROS 2 made is a log.
 
 use std::path::Path;
 
@@ -6,6 +6,14 @@ use std::path::Path;
 pub(crate) const COLUMNS: [&str; 4] = [".csv.gz", ".csv", ".parquet", ".mat"];
 /// How the names of robots' logs end: MCAP, ROS 1 bags and ROS 2 bags in SQLite.
 pub(crate) const LOGS: [&str; 3] = [".mcap", ".bag", ".db3"];
+
+/// What lists the files of a ROS 2 bag.
+const METADATA: &str = "metadata.yaml";
+
+/// Whether a path is a folder that the recorder of ROS 2 made.
+pub(crate) fn is_bag_folder(path: &Path) -> bool {
+    path.join(METADATA).is_file()
+}
 
 /// Format of a samples file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,6 +30,9 @@ pub(crate) enum Format {
 impl Format {
     /// Format by the ending, case aside; else the ending found.
     pub(crate) fn of(path: &Path) -> Result<Self, String> {
+        if is_bag_folder(path) {
+            return Ok(Self::Log);
+        }
         let name = path.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
         if name.ends_with(".csv.gz") {
             Ok(Self::CsvGz)

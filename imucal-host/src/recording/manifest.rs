@@ -25,7 +25,7 @@ pub use self::{
 };
 use self::{fault::ManifestFault, keys::KeyMap};
 use super::{
-    format::{COLUMNS, LOGS},
+    format::{COLUMNS, LOGS, is_bag_folder},
     read_error::ReadError,
     sensor_kind::SensorKind,
     triple::{Nominal, Triple},
@@ -204,10 +204,13 @@ impl Default for Manifest {
 
 impl Manifest {
     /// The manifest's path next to a samples file: `NAME.toml` for `NAME.csv`, `NAME.csv.gz`,
-    /// `NAME.parquet`, `NAME.mat` and robots' logs; `None` for a file of another ending.
+    /// `NAME.parquet`, `NAME.mat`, robots' logs and the folder `NAME` of one; `None` for a file of another ending.
     #[must_use]
     pub fn path_beside(samples: &Path) -> Option<PathBuf> {
         let name = samples.file_name()?.to_str()?;
+        if is_bag_folder(samples) {
+            return Some(samples.with_file_name(format!("{name}.toml")));
+        }
         let stem = COLUMNS.iter().chain(&LOGS).find_map(|ending| {
             let at = name.len().checked_sub(ending.len())?;
             let (stem, end) = name.split_at_checked(at)?;

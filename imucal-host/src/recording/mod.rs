@@ -30,7 +30,7 @@ mod warning;
 mod write;
 mod write_error;
 
-pub(crate) use self::format::Format;
+pub(crate) use self::format::{Format, is_bag_folder};
 pub use self::{
     epoch::Epoch,
     manifest::{Manifest, site::LEAST_DIP},
@@ -49,10 +49,24 @@ pub use self::{
 };
 use crate::file::{Limits, OutputSet};
 
-/// Whether a file is a robot's log by its ending: MCAP or a bag.
+/// Whether a path is a robot's log: a file by its ending, MCAP or a bag, or a folder that the recorder of ROS 2 made.
 #[must_use]
 pub fn is_log(path: &Path) -> bool {
     Format::of(path) == Ok(Format::Log)
+}
+
+/// The files that hold the samples of a recording: itself, or of a folder that the recorder of ROS 2 made those that its metadata
+/// list.
+///
+/// # Errors
+///
+/// [`ReadError::Log`] of metadata that cannot be understood.
+pub fn files_of(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
+    #[cfg(feature = "logs")]
+    let files = imucal_logs::files_of(path).map_err(|error| ReadError::Log(Box::new(error)))?;
+    #[cfg(not(feature = "logs"))]
+    let files = vec![path.to_path_buf()];
+    Ok(files)
 }
 
 /// A recording of an inertial measurement unit. All columns that are there have as many rows as `time`.
@@ -128,7 +142,7 @@ impl Recording {
     }
 
     /// Reads `NAME.csv`, `NAME.csv.gz`, `NAME.mat` or, when built with the features `parquet` and `logs`, `NAME.parquet`, `NAME.mcap`,
-    /// `NAME.bag` and `NAME.db3`, and the manifest `NAME.toml` next to it, which a log needs not have. What is odd but harmless is in [`Recording::warnings`].
+    /// `NAME.bag`, `NAME.db3` and the folder `NAME` of a ROS 2 bag, and the manifest `NAME.toml` next to it, which a log needs not have. What is odd but harmless is in [`Recording::warnings`].
     ///
     /// # Errors
     ///

@@ -96,6 +96,15 @@ fn lists_as_toml_and_as_csv_say_the_same() {
 }
 
 #[test]
+fn a_bag_of_several_files_is_one_recording() {
+    let folder = folder(&["in/walk/walk_0.mcap", "in/walk/walk_1.mcap", "in/walk/metadata.yaml", "in/x.csv"]);
+    for from in ["in", "in/*"] {
+        assert_eq!(names(&folder, &[from], &[]).unwrap(), ["walk", "x"], "{from}");
+    }
+    assert_eq!(names(&folder, &["in/walk"], &[]).unwrap(), ["walk"]);
+}
+
+#[test]
 fn a_list_has_topics_for_each_log() {
     let folder = folder(&["a.mcap", "b.db3", "c.bag"]);
     let rows = "path,topic\na.mcap,imu=/imu/data; mag=none\nb.db3,imu=/head\nc.bag,\n";
