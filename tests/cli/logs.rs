@@ -150,6 +150,9 @@ fn a_bag_of_several_files_is_one_log() {
     let record = folder.path("all.bin").display().to_string();
     imucal(&["apply", &walk, "--calibration", &record]).with(0);
     assert!(folder.text("walk-calibrated.csv").starts_with("t,acc_x"));
+    let first = folder.path("walk").join("walk_0.mcap").display().to_string();
+    imucal(&["check", &first, "--calibration", &record])
+        .telling(&["one of the 2 files of a bag", "give the folder"]);
     // In a folder of recordings it is one of them.
     imucal(&["batch", &walk, "--out", &folder.path("out").display().to_string()]).with(0).printing(&["1 "]);
 }

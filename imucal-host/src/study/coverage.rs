@@ -137,7 +137,7 @@ pub fn shifts(share: f64, runs: u32, seed: u64) -> Vec<Shift> {
 /// The study's tables.
 pub fn report(runs: u32, seed: u64) -> String {
     let mut text = format!(
-        "Centre error along the cap's axis, mG: {POINTS} points, noise {NOISE} mG, field {FIELD} mG, no soft iron.\n\n"
+        "Centre error along the cap's axis, mG: {POINTS} points, noise {NOISE} mG,\nfield {FIELD} mG, no soft iron.\n\n"
     );
     let _ =
         writeln!(text, "Top 30 % of the sphere, {runs} clouds (seed {seed}); models.md 5 for comparison.");
@@ -159,7 +159,7 @@ pub fn report(runs: u32, seed: u64) -> String {
     let fewer = (runs / 5).max(2);
     let _ = writeln!(
         text,
-        "\nMean by the share of the sphere that is seen, {fewer} clouds each; none: no ellipsoid from a tenth or more."
+        "\nMean by the share of the sphere that is seen, {fewer} clouds each;\nnone: no ellipsoid from a tenth or more."
     );
     sweep(&mut text, fewer, seed);
     text
@@ -171,13 +171,13 @@ fn failed(shift: &Shift) -> String {
 
 /// A mean where nine clouds of ten gave an ellipsoid: what the others left would flatter the estimator.
 fn cell(shift: &Shift) -> String {
-    if shift.share_failed() > 0.1 { format!("{:>8}", "none") } else { format!("{:>+8.1}", shift.mean) }
+    if shift.share_failed() > 0.1 { format!("{:>7}", "none") } else { format!("{:>+7.1}", shift.mean) }
 }
 
 fn sweep(text: &mut String, runs: u32, seed: u64) {
     let columns: Vec<Vec<Shift>> = SHARES.iter().map(|share| shifts(*share, runs, seed)).collect();
     let head: String =
-        SHARES.iter().map(|share| format!("{:>8}", format!("{:.0} %", 100.0 * share))).collect();
+        SHARES.iter().map(|share| format!("{:>7}", format!("{:.0} %", 100.0 * share))).collect();
     let _ = writeln!(text, "{:<26}{head}", "");
     for (k, estimator) in ESTIMATORS.iter().enumerate() {
         let cells: String = columns.iter().map(|column| cell(&column[k])).collect();
@@ -185,7 +185,7 @@ fn sweep(text: &mut String, runs: u32, seed: u64) {
     }
     let errors = |pick: fn(f64, f64) -> f64, start: f64| -> String {
         let of = |column: &Vec<Shift>| column.iter().map(|shift| shift.error).fold(start, pick);
-        columns.iter().map(|column| format!("{:>8.1}", of(column))).collect()
+        columns.iter().map(|column| format!("{:>7.1}", of(column))).collect()
     };
     let _ = writeln!(text, "{:<26}{}", "error of a mean, at most", errors(f64::max, 0.0));
 }

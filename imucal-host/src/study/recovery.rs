@@ -155,13 +155,13 @@ pub fn moments(values: &[f64]) -> (f64, f64) {
 /// As [`simulation`].
 pub fn report(first: u64, count: u64) -> Result<String, SimulationError> {
     let mut text = format!(
-        "Errors over the standard errors reported, {count} recordings of two units from seed {first} on.\n"
+        "Errors over the standard errors reported, {count} recordings of two units\nfrom seed {first} on.\n"
     );
     for (noise, base, what) in [
         (
             Noise::All,
             Base::Drawn,
-            "white noise, drift and scatter of the stops; field's direction estimated (X21)",
+            "white noise, drift and scatter of the stops; field's direction estimated\n(X21)",
         ),
         (Noise::All, Base::Exact, "the same on a base that is level and points north, field known (X18)"),
         (Noise::White, Base::Drawn, "white noise alone; field's direction estimated (X21)"),

@@ -199,20 +199,21 @@ fn per_unit(kind: SensorKind) -> (&'static str, f64) {
 /// As [`rows`].
 pub fn report(seed: u64) -> Result<String, SimulationError> {
     let mut text = format!(
-        "Rms error on a second recording (seed {seed}). Our figures of simulated units, not the paper's of real ones.\n\
-         Base tilted by 0.1° more than it is drawn, 15 mG on each of two gimbals; magnetometers against Earth's field.\n\
-         calibration, length: without noise in the second recording, an axis' error and the vector length's;\n\
-         samples: an axis' error with noise and drift.\n\n"
+        "Rms error on a second recording (seed {seed}). Our figures of simulated units,\n\
+         not the paper's of real ones. Base tilted by 0.1° more than it is drawn, 15 mG\n\
+         on each of two gimbals; magnetometers against Earth's field.\n\
+         calibration, length: without noise in the second recording, an axis' error and\n\
+         the vector length's; samples: an axis' error with noise and drift.\n\n"
     );
     let _ = writeln!(
         text,
-        "{:<8} {:<4} {:<34} {:>11} {:>9} {:>9}",
+        "{:<7} {:<3} {:<33} {:>11} {:>7} {:>7}",
         "unit", "", "model", "calibration", "length", "samples"
     );
     for row in rows(seed)? {
         let _ = writeln!(
             text,
-            "{:<8} {:<4} {:<34} {:>11.3} {:>9.3} {:>9.3} {}",
+            "{:<7} {:<3} {:<33} {:>11.3} {:>7.3} {:>7.3} {}",
             row.unit,
             row.kind.prefix(),
             row.model,

@@ -8,7 +8,7 @@ impl RobotScore {
     pub fn table(&self) -> String {
         let [healthy, afflicted] = self.trials;
         let mut text = format!(
-            "{healthy} healthy and {afflicted} afflicted pairs of a robot and its simulator; 95 % intervals of Clopper and Pearson.\n\n"
+            "{healthy} healthy and {afflicted} afflicted pairs of a robot and its simulator;\n95 % intervals of Clopper and Pearson.\n\n"
         );
         text += &head();
         self.shares.iter().for_each(|share| text += &line(share));

@@ -9,7 +9,7 @@
 
 use std::path::Path;
 
-use imucal_logs::{Kind, Log, LogError, Stream};
+use imucal_logs::{Kind, Log, LogError, Stream, files_of, is_bag_folder};
 
 use super::{
     columns::{POSITION, REFERENCE, TEMPERATURE, Table, slot_of},
@@ -42,7 +42,7 @@ pub(crate) fn read(
     let lines = lines(&log);
     let fault = |fault| ReadError::Topics { path: path.to_path_buf(), fault: Box::new(fault) };
     let choice = topics.choose(&lines).map_err(fault)?;
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<Warning> = part_of(path).into_iter().collect();
     if !choice.unasked.is_empty() {
         let described = |(role, line): &(Role, TopicLine)| format!("{} as {}", line.described(), role.name());
         let taken = choice.unasked.iter().map(described).collect::<Vec<_>>().join(", ");
@@ -66,6 +66,16 @@ pub(crate) fn read(
     let mut table = join(path, series, limits)?;
     table.warnings.splice(0..0, warnings);
     Ok(table)
+}
+
+/// A file that is one of several of a bag.
+fn part_of(path: &Path) -> Option<Warning> {
+    let folder = path.parent().filter(|folder| is_bag_folder(folder))?;
+    let files =
+        files_of(folder).ok().filter(|files| files.len() > 1 && files.iter().any(|file| file == path))?;
+    let (count, folder) = (files.len(), folder.display());
+    let found = format!("one of the {count} files of a bag; give the folder {folder} to read all of them");
+    Some(Warning::Log { path: path.to_path_buf(), found })
 }
 
 fn explained(error: LogError, limits: &Limits) -> ReadError {

@@ -85,8 +85,8 @@ impl Noise {
     pub fn name(self) -> &'static str {
         match self {
             Self::White => "white",
-            Self::NoisyAccelerometer => "noisy accelerometer",
-            Self::NoisyGyroscope => "noisy gyroscope",
+            Self::NoisyAccelerometer => "noisy acc",
+            Self::NoisyGyroscope => "noisy gyr",
             Self::Flicker => "white and 1/f",
             Self::CoarseSteps => "coarse steps",
         }

@@ -135,17 +135,18 @@ pub fn table(lines: &[Line]) -> String {
         refused + suspect + right + wrong
     });
     let mut text = format!(
-        "Hand recordings with a fault, {each} of each kind. An accepted sensor is wrong where an entry errs by more than\n\
-         {WRONG} of its standard errors and the fault has moved it by more than one.\n\
-         {:<40} {:<4} {:>8} {:>8} {:>9} {:>9}\n",
+        "Hand recordings with a fault, {each} of each kind. An accepted sensor is wrong\n\
+         where an entry errs by more than {WRONG} of its standard errors and the fault has\n\
+         moved it by more than one.\n\
+         {:<40} {:<3} {:>7} {:>7} {:>8} {:>8}\n",
         "fault", "", "refused", "suspect", "accepted", "silently"
     );
-    let _ = writeln!(text, "{:<40} {:<4} {:>8} {:>8} {:>9} {:>9}", "", "", "", "", "right", "wrong");
+    let _ = writeln!(text, "{:<40} {:<3} {:>7} {:>7} {:>8} {:>8}", "", "", "", "", "right", "wrong");
     for line in lines {
         let Count { refused, suspect, right, wrong } = line.count;
         let sensor = line.sensor.prefix();
         let _ =
-            writeln!(text, "{:<40} {sensor:<4} {refused:>8} {suspect:>8} {right:>9} {wrong:>9}", line.fault);
+            writeln!(text, "{:<40} {sensor:<3} {refused:>7} {suspect:>7} {right:>8} {wrong:>8}", line.fault);
     }
     text
 }

@@ -144,11 +144,15 @@ fn groups() -> Vec<Group> {
 /// The table.
 pub fn table(trials: &[Trial]) -> String {
     let mut text = format!(
-        "{} healthy hand recordings: how many sensors are accepted, how many of the 95 % intervals of these hold, and the\n\
-         largest error in standard errors.\n",
+        "{} healthy hand recordings: how many sensors are accepted, which share of the\n\
+         95 % intervals of these hold, in %, and the largest error in standard errors.\n",
         trials.len()
     );
-    let _ = writeln!(text, "{:<36}{:>21}{:>23}{:>23}", "", "accelerometer", "gyroscope", "magnetometer");
+    let _ = writeln!(
+        text,
+        "{:<27}{:>5}{:>16}{:>16}{:>16}",
+        "", "of", "accelerometer", "gyroscope", "magnetometer"
+    );
     for (name, pick) in groups() {
         line(&mut text, &name, trials, &pick);
     }
@@ -163,13 +167,13 @@ pub fn table(trials: &[Trial]) -> String {
 }
 
 fn line(text: &mut String, name: &str, trials: &[Trial], pick: &dyn Fn(&Cell) -> bool) {
-    let _ = write!(text, "{name:<36}");
+    let recorded = held(trials, SensorKind::Acc, pick).recorded;
+    let _ = write!(text, "{name:<27}{recorded:>5}");
     for kind in SensorKind::ALL {
         let held = held(trials, kind, pick);
-        let accepted = format!("{}/{}", held.accepted, held.recorded);
         let _ = match held.parameters {
-            0 => write!(text, "{accepted:>10}{:>13}", "–"),
-            _ => write!(text, "{accepted:>10}{:>7.1} %{:>4.1}", 100.0 * held.share(), held.worst),
+            0 => write!(text, "{:>6}{:>10}", held.accepted, "–"),
+            _ => write!(text, "{:>6}{:>6.1}{:>4.1}", held.accepted, 100.0 * held.share(), held.worst),
         };
     }
     text.push('\n');
