@@ -2,7 +2,8 @@
 //! `rosbag2_storage/metadata_io.cpp`.
 
 use std::{
-    fs,
+    fs::{self, File},
+    io::Read,
     path::{Path, PathBuf},
 };
 
@@ -12,13 +13,20 @@ use crate::error::LogError;
 
 /// What lists the files.
 const METADATA: &str = "metadata.yaml";
+/// What it begins with, after comments.
+const OWN: &[u8] = b"rosbag2_bagfile_information";
+/// Bytes of it by which it is known.
+const BEGINNING: u64 = 4096;
 /// Bytes of it that are read: a line for each file and each topic.
 const LONGEST: u64 = 1 << 22;
 
-/// Whether a path is a folder that a recorder of ROS 2 made.
+/// Whether a path is a folder that the recorder of ROS 2 made. Other programs write a file of this name, too.
 #[must_use]
 pub fn is_bag_folder(path: &Path) -> bool {
-    path.join(METADATA).is_file()
+    let mut beginning = Vec::new();
+    let file = File::open(path.join(METADATA));
+    let read = file.and_then(|file| file.take(BEGINNING).read_to_end(&mut beginning));
+    read.is_ok() && beginning.windows(OWN.len()).any(|part| part == OWN)
 }
 
 /// The files of a log in their order: those that the bag's metadata list, or the file itself.
@@ -91,8 +99,18 @@ mod tests {
     #[test]
     fn metadata_of_any_depth_end_in_an_error() {
         for part in ["[", "{a: ", "- ", "a:\n  "] {
-            assert!(files(&part.repeat(100_000)).is_err(), "{part}");
+            let deep = format!("rosbag2_bagfile_information: {}", part.repeat(100_000));
+            assert!(files(&deep).is_err(), "{part}");
         }
+    }
+
+    #[test]
+    fn metadata_of_another_program_make_no_bag() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(!is_bag_folder(folder.path()));
+        fs::write(folder.path().join(METADATA), "dataset: {name: walk, rate: 100}\n").unwrap();
+        assert!(!is_bag_folder(folder.path()));
+        assert_eq!(files_of(folder.path()).unwrap(), [folder.path()]);
     }
 
     #[test]
@@ -104,8 +122,8 @@ mod tests {
     #[test]
     fn metadata_that_cannot_be_understood_are_refused_and_so_are_packed_files() {
         for (metadata, found) in [
-            ("", "no relative_file_paths"),
-            ("a: [", "found"),
+            ("rosbag2_bagfile_information:", "no relative_file_paths"),
+            ("rosbag2_bagfile_information: [", "while"),
             ("rosbag2_bagfile_information: {relative_file_paths: []}", "no names of files"),
             ("rosbag2_bagfile_information: {relative_file_paths: [[1]]}", "no names of files"),
             ("rosbag2_bagfile_information: {relative_file_paths: [a_0.db3.zstd]}", "zstd -d"),

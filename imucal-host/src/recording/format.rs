@@ -2,17 +2,18 @@
 
 use std::path::Path;
 
+#[cfg(feature = "logs")]
+pub(crate) use imucal_logs::is_bag_folder;
+
 /// How the names of files end that hold columns of samples.
 pub(crate) const COLUMNS: [&str; 4] = [".csv.gz", ".csv", ".parquet", ".mat"];
 /// How the names of robots' logs end: MCAP, ROS 1 bags and ROS 2 bags in SQLite.
 pub(crate) const LOGS: [&str; 3] = [".mcap", ".bag", ".db3"];
 
-/// What lists the files of a ROS 2 bag.
-const METADATA: &str = "metadata.yaml";
-
-/// Whether a path is a folder that the recorder of ROS 2 made.
-pub(crate) fn is_bag_folder(path: &Path) -> bool {
-    path.join(METADATA).is_file()
+/// Without logs no folder is one: its files are named.
+#[cfg(not(feature = "logs"))]
+pub(crate) fn is_bag_folder(_: &Path) -> bool {
+    false
 }
 
 /// Format of a samples file.

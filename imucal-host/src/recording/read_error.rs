@@ -11,7 +11,7 @@ use super::{
     read::header_fault::HeaderFault,
     sensor_kind::SensorKind,
     unit::{TimeUnit, Unit},
-    warning::Warning,
+    warning::{Warning, listed},
 };
 use crate::file::limits::{ReadFault, Size};
 
@@ -55,9 +55,9 @@ pub enum ReadError {
     /// A MAT-file without an array of numbers.
     #[error(
         "{path}: found {}, expected vectors or matrices of numbers with as many rows as samples; save such, for example by `save -v7 log.mat t acc gyr`, or of a table T `S = table2struct(T, \"ToScalar\", true)`",
-        if .found.is_empty() { "no variable" } else { found }
+        if .others.is_empty() { "no variable".to_owned() } else { listed(.others) }
     )]
-    NoNumbers { path: PathBuf, found: String },
+    NoNumbers { path: PathBuf, others: Vec<String> },
     /// Columns that are wrong or missing, where some variables were left out.
     #[error("{error}. Also, {warning}")]
     AmongLeftOut { error: Box<ReadError>, warning: Box<Warning> },

@@ -286,7 +286,8 @@ fn units(assumed: &[(&'static str, String)]) -> String {
 /// Things that are named, at most.
 const NAMED: usize = 8;
 
-fn listed(others: &[String]) -> String {
+/// The first of things that are found, each as it is described.
+pub(super) fn listed(others: &[String]) -> String {
     let named = others.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
     match others.len().saturating_sub(NAMED) {
         0 => named,

@@ -97,7 +97,10 @@ fn lists_as_toml_and_as_csv_say_the_same() {
 
 #[test]
 fn a_bag_of_several_files_is_one_recording() {
-    let folder = folder(&["in/walk/walk_0.mcap", "in/walk/walk_1.mcap", "in/walk/metadata.yaml", "in/x.csv"]);
+    let folder = folder(&["in/walk/walk_0.mcap", "in/walk/walk_1.mcap", "in/x.csv"]);
+    write(&folder, "in/walk/metadata.yaml", "rosbag2_bagfile_information:\n");
+    // Another program's.
+    write(&folder, "in/metadata.yaml", "dataset: walks\n");
     for from in ["in", "in/*"] {
         assert_eq!(names(&folder, &[from], &[]).unwrap(), ["walk", "x"], "{from}");
     }

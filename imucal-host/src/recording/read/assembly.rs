@@ -69,7 +69,7 @@ fn converted(path: &Path, manifest: Manifest, mut table: Table) -> Result<(Recor
     let [acc, gyr, mag] = <[Option<Triple>; 3]>::try_from(sensors).unwrap_or_default();
     let angle = 1.0 / manifest.units.gimbal.per_si();
     let mut recording = Recording {
-        name: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
+        name: name_of(path),
         path: path.to_path_buf(),
         time: scaled(time, table.clock.per_si()),
         epoch: table.clock.epoch,
@@ -230,6 +230,12 @@ pub(crate) fn note_columns(recording: &mut Recording) {
             None => Warning::NoSensor { path },
         });
     }
+}
+
+/// A file's name; of a folder that is given as `.` its own.
+fn name_of(path: &Path) -> String {
+    let named = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
+    named(path).or_else(|| named(&path.canonicalize().ok()?)).unwrap_or_default()
 }
 
 #[cfg(test)]

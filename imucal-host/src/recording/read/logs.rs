@@ -73,7 +73,8 @@ fn part_of(path: &Path) -> Option<Warning> {
     let folder = path.parent().filter(|folder| is_bag_folder(folder))?;
     let files =
         files_of(folder).ok().filter(|files| files.len() > 1 && files.iter().any(|file| file == path))?;
-    let (count, folder) = (files.len(), folder.display());
+    let here = Path::new(".");
+    let (count, folder) = (files.len(), if folder.as_os_str().is_empty() { here } else { folder }.display());
     let found = format!("one of the {count} files of a bag; give the folder {folder} to read all of them");
     Some(Warning::Log { path: path.to_path_buf(), found })
 }

@@ -67,7 +67,7 @@ pub(crate) fn read(
 ) -> Result<Table, ReadError> {
     let Saved { columns, mut others } = saved(path, limits)?;
     if columns.is_empty() {
-        return Err(ReadError::NoNumbers { path: path.to_path_buf(), found: others.join(", ") });
+        return Err(ReadError::NoNumbers { path: path.to_path_buf(), others });
     }
     let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
     let fault = |fault| ReadError::Mapping { path: path.to_path_buf(), fault };
@@ -137,10 +137,14 @@ pub(crate) fn beginning(path: &Path, rows: usize, limits: &Limits) -> Option<Vec
     Some(of.map(|column| (column.name, column.numbers.every(0, 1, rows).doubles())).collect())
 }
 
-/// The length that most columns have, the longest of these.
+/// The length that most columns have, the longest of these. A single number is no column of samples where there are others.
 fn usual_length(columns: &[Column]) -> usize {
     let mut counts: HashMap<usize, usize> = HashMap::new();
-    columns.iter().for_each(|column| *counts.entry(column.numbers.len()).or_default() += 1);
+    let lengths = || columns.iter().map(|column| column.numbers.len());
+    let several = lengths().any(|length| length > 1);
+    lengths()
+        .filter(|length| !several || *length > 1)
+        .for_each(|length| *counts.entry(length).or_default() += 1);
     counts.into_iter().max_by_key(|(length, count)| (*count, *length)).map_or(0, |(length, _)| length)
 }
 
@@ -156,17 +160,15 @@ fn saved(path: &Path, limits: &Limits) -> Result<Saved, ReadError> {
     let memory = Memory::new(path, limits.size);
     let mut variables = Vec::new();
     while let Some(element) = elements.next().map_err(damaged)? {
-        if element.kind == COMPRESSED {
-            let inflated = inflated(element, limits.size, &memory)
-                .ok_or(Fault("a compressed array that does not end as it should"))
-                .map_err(damaged);
-            memory.check()?;
-            let inflated = inflated?;
-            let mut within = Elements::new(order, &inflated);
-            variables.push(Variable::of(within.expect().map_err(damaged)?, order, None).map_err(damaged)?);
-        } else if element.kind == MATRIX {
-            variables.push(Variable::of(element, order, None).map_err(damaged)?);
-        }
+        let variable = match element.kind {
+            MATRIX => Variable::of(element, order, &memory),
+            COMPRESSED => inflated(element, limits.size, &memory)
+                .and_then(|inflated| Variable::of(Elements::new(order, &inflated).expect()?, order, &memory)),
+            _ => continue,
+        };
+        // Too much is refused before it is said to be damaged.
+        memory.check()?;
+        variables.push(variable.map_err(damaged)?);
     }
     let mut saved = Saved::default();
     // An array without a name is MATLAB's own.
@@ -181,12 +183,13 @@ fn saved(path: &Path, limits: &Limits) -> Result<Saved, ReadError> {
     Ok(saved)
 }
 
-fn inflated(element: Element<'_>, limit: u64, memory: &Memory<'_>) -> Option<Vec<u8>> {
+fn inflated(element: Element<'_>, limit: u64, memory: &Memory<'_>) -> Result<Vec<u8>, Fault> {
     let mut bytes = Vec::new();
     let whole = ZlibDecoder::new(element.data).take(limit.saturating_add(1)).read_to_end(&mut bytes);
-    // What it says of itself is refused before it is said to be damaged.
-    memory.take(bytes.len() as u64);
-    whole.ok().map(|_| bytes)
+    match (whole, memory.take(bytes.len() as u64)) {
+        (Ok(_), true) => Ok(bytes),
+        _ => Err(Fault("a compressed array that does not end as it should")),
+    }
 }
 
 /// Refuses what only has the name of a MAT-file, or is of another level.

@@ -69,7 +69,7 @@ impl<'a> Elements<'a> {
     /// A text of bytes.
     pub(super) fn text(&mut self) -> Result<String, Fault> {
         let Element { data, .. } = self.expect()?;
-        Ok(String::from_utf8_lossy(data).trim_end_matches('\0').to_owned())
+        Ok(text_of(data))
     }
 
     fn number(&self, bytes: [u8; 4]) -> u32 {
@@ -81,6 +81,12 @@ impl<'a> Elements<'a> {
 }
 
 const ENDS_EARLY: Fault = Fault("an element that ends beyond the file");
+
+/// A text that ends at its first zero, as a terminal can show it.
+pub(super) fn text_of(bytes: &[u8]) -> String {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    String::from_utf8_lossy(&bytes[..end]).replace(char::is_control, "?")
+}
 
 /// Numbers as they are stored: integers are exact.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,6 +119,17 @@ impl Numbers {
             }
             _ => return Err(Fault("numbers of an unknown type")),
         })
+    }
+
+    /// Bytes that the numbers of an element take in memory.
+    pub(super) fn size_of(element: Element<'_>) -> u64 {
+        let width = match element.kind {
+            3 | 4 => 2,
+            5..=7 => 4,
+            9 | 12 | 13 => 8,
+            _ => 1,
+        };
+        (element.data.len() / width * size_of::<f64>()) as u64
     }
 
     pub(super) fn len(&self) -> usize {

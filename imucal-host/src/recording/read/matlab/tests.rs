@@ -127,6 +127,10 @@ fn objects_of_matlab_are_named_with_what_to_do() {
     let error = recording(&[object("t", "datetime"), doubles("acc", &[4, 3], &FORCES)]).error();
     assert_says(&error, &["no column `t`", "`t` (datetime)", "`t = seconds(T - T(1))`"]);
     assert_says(&recording(&[]).error(), &["found no variable"]);
+    let constants = ["a", "b", "c", "d", "e"].map(|name| doubles(name, &[1, 1], &[1.0]));
+    let file = [constants.concat(), doubles("acc", &[4, 3], &FORCES)];
+    assert_says(&recording(&file).error(), &["no column `t` among `acc_x`", "`a` (1 row)"]);
+    assert_says(&recording(&[object("a\x1b[31m", "table")]).error(), &["`a?[31m` (table)"]);
 }
 
 #[test]
@@ -169,5 +173,9 @@ fn an_array_that_inflates_beyond_the_limit_is_refused() {
     let fixture = recording(&[packed(&long)]);
     let limits = Limits { size: 1 << 16, ..Limits::default() };
     let error = Recording::read_within(&fixture.path, &limits).unwrap_err();
+    assert!(matches!(error, ReadError::TooManySamples { .. }), "{error}");
+    // Bytes become doubles.
+    let bytes = recording(&[array(9, "t", &[20_000, 1], &element(2, &[0; 20_000]))]);
+    let error = Recording::read_within(&bytes.path, &limits).unwrap_err();
     assert!(matches!(error, ReadError::TooManySamples { .. }), "{error}");
 }

@@ -1,6 +1,7 @@
 //! Variables of a MAT-file: arrays of numbers, structures of them, and what is neither.
 
-use super::element::{ByteOrder, Element, Elements, Fault, INT8, INT32, MATRIX, Numbers};
+use super::element::{ByteOrder, Element, Elements, Fault, INT8, INT32, MATRIX, Numbers, text_of};
+use crate::recording::read::memory::Memory;
 
 /// Structures within structures are followed to here.
 const DEEPEST: usize = 8;
@@ -42,15 +43,17 @@ impl Array {
 }
 
 impl Variable {
-    /// Understands the data of an `miMATRIX`. A field's name stands in its structure.
-    pub(super) fn of(element: Element<'_>, order: ByteOrder, field: Option<String>) -> Result<Self, Fault> {
-        within(element, order, field, DEEPEST)
+    /// Understands an `miMATRIX`, whose numbers may take so much memory.
+    pub(super) fn of(element: Element<'_>, order: ByteOrder, memory: &Memory<'_>) -> Result<Self, Fault> {
+        within(element, order, memory, None, DEEPEST)
     }
 }
 
+/// A field's name stands in its structure.
 fn within(
     element: Element<'_>,
     order: ByteOrder,
+    memory: &Memory<'_>,
     field: Option<String>,
     depth: usize,
 ) -> Result<Variable, Fault> {
@@ -78,9 +81,15 @@ fn within(
     let name = field.unwrap_or(name);
     let content = match class {
         STRUCTURE if sizes.iter().all(|size| *size == 1) && depth > 0 => {
-            Content::Structure(fields(&mut parts, depth - 1)?)
+            Content::Structure(fields(&mut parts, memory, depth - 1)?)
         }
-        6..=15 if flags & COMPLEX == 0 => array(Numbers::of(parts.expect()?, order)?, &sizes)?,
+        6..=15 if flags & COMPLEX == 0 => {
+            let numbers = parts.expect()?;
+            if !memory.take(Numbers::size_of(numbers)) {
+                return Err(Fault("numbers that take more memory than allowed"));
+            }
+            array(Numbers::of(numbers, order)?, &sizes)?
+        }
         6..=15 => Content::Other("complex numbers".to_owned()),
         class => Content::Other(word(class).to_owned()),
     };
@@ -111,7 +120,7 @@ fn sizes(element: Element<'_>, order: ByteOrder) -> Result<Vec<usize>, Fault> {
     sizes.collect()
 }
 
-fn fields(parts: &mut Elements<'_>, depth: usize) -> Result<Vec<Variable>, Fault> {
+fn fields(parts: &mut Elements<'_>, memory: &Memory<'_>, depth: usize) -> Result<Vec<Variable>, Fault> {
     let length = match Numbers::of(parts.expect()?, parts.order)? {
         Numbers::Integers(numbers) => numbers.first().and_then(|length| usize::try_from(*length).ok()),
         Numbers::Doubles(_) => None,
@@ -121,11 +130,8 @@ fn fields(parts: &mut Elements<'_>, depth: usize) -> Result<Vec<Variable>, Fault
     if names.kind != INT8 {
         return Err(Fault("names of fields that are no text"));
     }
-    let named = names.data.chunks_exact(length).map(|name| {
-        let end = name.iter().position(|byte| *byte == 0).unwrap_or(name.len());
-        String::from_utf8_lossy(&name[..end]).into_owned()
-    });
-    named.map(|name| within(parts.expect()?, parts.order, Some(name), depth)).collect()
+    let named = names.data.chunks_exact(length).map(text_of);
+    named.map(|name| within(parts.expect()?, parts.order, memory, Some(name), depth)).collect()
 }
 
 /// Sizes of one do not count, as Simulink has them.
