@@ -101,6 +101,26 @@ fn samples_one_below_the_other_and_side_by_side_are_the_same() {
 }
 
 #[test]
+fn the_order_of_bytes_is_that_of_the_file() {
+    let element = |kind: u32, data: &[u8]| {
+        let mut bytes = [&kind.to_be_bytes()[..], &(data.len() as u32).to_be_bytes(), data].concat();
+        bytes.resize(bytes.len().next_multiple_of(8), 0);
+        bytes
+    };
+    let column = |name: &str, values: &[f64; 4]| {
+        let data: Vec<u8> = values.iter().flat_map(|value| value.to_be_bytes()).collect();
+        let (flags, sizes) =
+            ([6u32.to_be_bytes(), [0; 4]].concat(), [4u32, 1].map(u32::to_be_bytes).concat());
+        let parts = [element(6, &flags), element(5, &sizes), element(1, name.as_bytes()), element(9, &data)];
+        element(14, &parts.concat())
+    };
+    let mut bytes = file(&[column("t", &TIMES), column("temp", &[20.0, 20.5, 21.0, 21.5])]);
+    bytes[HEADER - 4..HEADER].copy_from_slice(&[1, 0, b'M', b'I']);
+    let read = Fixture::new("run.mat", "", bytes).read();
+    assert_eq!((read.time, read.temperature.unwrap()), (TIMES.to_vec(), vec![20.0, 20.5, 21.0, 21.5]));
+}
+
+#[test]
 fn other_names_are_mapped_and_guessed() {
     let log = file(&[doubles("time", &[1, 4], &TIMES), doubles("accel", &[4, 3], &FORCES)]);
     let fixture = Fixture::new("run.mat", "", log);
