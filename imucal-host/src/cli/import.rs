@@ -28,7 +28,6 @@ use crate::{
 enum Layout {
     /// One CSV, Parquet or MAT-file, with its columns by --map, --unit and --time; fields of text separated by commas,
     /// semicolons, tabs or blanks
-    #[value(alias = "matlab")]
     Csv,
     /// An MCAP file or a bag, its topics by --topic
     Log,

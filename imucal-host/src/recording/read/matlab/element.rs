@@ -15,7 +15,6 @@ pub(super) enum ByteOrder {
 
 /// Type of an element (`miCOMPRESSED`, and so on).
 pub(super) const INT8: u32 = 1;
-pub(super) const INT32: u32 = 5;
 pub(super) const MATRIX: u32 = 14;
 pub(super) const COMPRESSED: u32 = 15;
 

@@ -138,6 +138,9 @@ fn a_column_of_another_length_than_the_times_is_refused_or_left_out() {
     let of = |name| [times(), doubles("acc", &[4, 3], &FORCES), doubles(name, &[3, 1], &[1.0; 3])];
     assert_says(&recording(&of("temp")).error(), &["run.mat, column `temp`", "found 3 rows, expected 4"]);
     assert_says(&recording(&of("gps")).warnings().join(" "), &["left out `gps` (3 rows)"]);
+    // A sensor whose variable was never filled is not lost in silence.
+    let empty = [times(), doubles("acc", &[4, 3], &FORCES), doubles("gyr", &[0, 0], &[])];
+    assert_says(&recording(&empty).warnings().join(" "), &["left out `gyr` (empty)"]);
 }
 
 #[test]

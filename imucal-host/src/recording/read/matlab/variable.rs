@@ -1,10 +1,14 @@
 //! Variables of a MAT-file: arrays of numbers, structures of them, and what is neither.
 
-use super::element::{ByteOrder, Element, Elements, Fault, INT8, INT32, MATRIX, Numbers, text_of};
+use super::element::{ByteOrder, Element, Elements, Fault, INT8, MATRIX, Numbers, text_of};
 use crate::recording::read::memory::Memory;
 
 /// Structures within structures are followed to here.
 const DEEPEST: usize = 8;
+/// Bytes of the flags, of the sizes or of the length of names: 64 dimensions have no more.
+const LONGEST: usize = 256;
+/// What holds no number.
+const EMPTY: &str = "empty";
 /// Bit of an array's flags: its numbers are complex.
 const COMPLEX: u32 = 0x0800;
 
@@ -63,13 +67,10 @@ fn within(
     let mut parts = Elements::new(order, element.data);
     let Some(flags) = parts.next()? else {
         // An empty field has no parts.
-        let content = Content::Other("an empty array".to_owned());
+        let content = Content::Other(EMPTY.to_owned());
         return Ok(Variable { name: field.unwrap_or_default(), content });
     };
-    let flags = match Numbers::of(flags, order)? {
-        Numbers::Integers(numbers) => numbers.first().copied().unwrap_or_default() as u32,
-        Numbers::Doubles(_) => return Err(Fault("flags that are no integers")),
-    };
+    let flags = description(flags, order)?.first().copied().unwrap_or_default() as u32;
     let class = flags & 0xff;
     if class == OPAQUE {
         let name = parts.text()?;
@@ -112,19 +113,25 @@ fn word(class: u32) -> &'static str {
     }
 }
 
+/// The few integers that describe an array.
+fn description(element: Element<'_>, order: ByteOrder) -> Result<Vec<i64>, Fault> {
+    if element.data.len() > LONGEST {
+        return Err(Fault("an array whose description is longer than any"));
+    }
+    match Numbers::of(element, order)? {
+        Numbers::Integers(numbers) => Ok(numbers),
+        Numbers::Doubles(_) => Err(Fault("an array that is described by no integers")),
+    }
+}
+
 fn sizes(element: Element<'_>, order: ByteOrder) -> Result<Vec<usize>, Fault> {
-    let (INT32, Numbers::Integers(sizes)) = (element.kind, Numbers::of(element, order)?) else {
-        return Err(Fault("sizes of an array that are no integers"));
-    };
-    let sizes = sizes.into_iter().map(|size| usize::try_from(size).map_err(|_| Fault("a negative size")));
-    sizes.collect()
+    let sizes = description(element, order)?.into_iter();
+    sizes.map(|size| usize::try_from(size).map_err(|_| Fault("a negative size"))).collect()
 }
 
 fn fields(parts: &mut Elements<'_>, memory: &Memory<'_>, depth: usize) -> Result<Vec<Variable>, Fault> {
-    let length = match Numbers::of(parts.expect()?, parts.order)? {
-        Numbers::Integers(numbers) => numbers.first().and_then(|length| usize::try_from(*length).ok()),
-        Numbers::Doubles(_) => None,
-    };
+    let length = description(parts.expect()?, parts.order)?.first().copied();
+    let length = length.and_then(|length| usize::try_from(length).ok());
     let length = length.filter(|length| *length > 0).ok_or(Fault("names of fields without a length"))?;
     let names = parts.expect()?;
     if names.kind != INT8 {
@@ -139,6 +146,9 @@ fn array(numbers: Numbers, sizes: &[usize]) -> Result<Content, Fault> {
     let count = sizes.iter().try_fold(1usize, |count, size| count.checked_mul(*size));
     if count != Some(numbers.len()) {
         return Err(Fault("an array whose sizes do not agree with its numbers"));
+    }
+    if numbers.len() == 0 {
+        return Ok(Content::Other(EMPTY.to_owned()));
     }
     let of: Vec<usize> = sizes.iter().copied().filter(|size| *size != 1).collect();
     let (rows, columns, is_turned) = match of[..] {
