@@ -140,7 +140,7 @@ fn extra_columns_are_reported_and_change_nothing() {
     for (index, row) in bad.rows.iter_mut().enumerate() {
         row.push(if index == 0 { "note".into() } else { "x y".into() });
     }
-    bad.calibrate().with(0).telling(&["warning", "small.csv, column `note`", "not used"]);
+    bad.calibrate().with(0).telling(&["warning", "small.csv, line 1, column `note`", "not used"]);
     assert_as_clean(&bad, &ALL);
 }
 

@@ -284,7 +284,8 @@ impl Manifest {
         let mut warnings = keys.unknown(path);
         let assumed = manifest.units.without(|key| keys.has("units", key));
         if !assumed.is_empty() {
-            warnings.push(Warning::UnitsAssumed { path: path.to_path_buf(), assumed });
+            let line = keys.has_section("units").then(|| keys.line_of("units", ""));
+            warnings.push(Warning::UnitsAssumed { path: path.to_path_buf(), line, assumed });
         }
         if let Some(found) = manifest.site.gravity.filter(|g| !(9.76..=9.84).contains(g)) {
             let line = keys.line_of("site", "gravity");

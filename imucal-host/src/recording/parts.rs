@@ -184,8 +184,11 @@ fn manifest_of(
     match Manifest::read_within(&beside, limits) {
         Err(ReadError::ManifestMissing { .. }) if !mapping.is_empty() => {
             let assumed = mapping.unstated();
-            let warning =
-                (!assumed.is_empty()).then(|| Warning::UnitsAssumed { path: path.to_path_buf(), assumed });
+            let warning = (!assumed.is_empty()).then(|| Warning::UnitsAssumed {
+                path: path.to_path_buf(),
+                line: None,
+                assumed,
+            });
             Ok((Manifest::default(), warning.into_iter().collect()))
         }
         read => read,

@@ -5,7 +5,7 @@ use std::fmt;
 /// A place in a samples file, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Place {
-    /// Line of a text file; its header is line 1.
+    /// Line of a text file; its header counts.
     Line(u64),
     /// Row of a file without lines.
     Row(u64),
@@ -18,6 +18,11 @@ impl fmt::Display for Place {
             Self::Row(row) => write!(f, "row {row}"),
         }
     }
+}
+
+/// Where a message is about a line, if the file has lines.
+pub(super) fn at_line(line: &Option<impl fmt::Display>) -> String {
+    line.as_ref().map(|line| format!(", line {line}")).unwrap_or_default()
 }
 
 /// The places of a table's rows.

@@ -3,11 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    format::Format,
     log_topics::TopicFault,
     manifest::fault::ManifestFault,
     mapping::MappingFault,
-    place::Place,
+    place::{Place, at_line},
     read::header_fault::HeaderFault,
     sensor_kind::SensorKind,
     unit::{TimeUnit, Unit},
@@ -79,16 +78,17 @@ pub enum ReadError {
     NotUtf8 { path: PathBuf, line: u64 },
 
     /// The columns are not those of a recording.
-    #[error("{path}{}: {}", header_of(.path), joined(.faults))]
-    Header { path: PathBuf, faults: Vec<HeaderFault> },
+    #[error("{path}{}: {}", at_line(.line), joined(.faults))]
+    Header { path: PathBuf, line: Option<u64>, faults: Vec<HeaderFault> },
     /// A mapping of columns that the file has not.
-    #[error("{path}{}: {fault}", header_of(.path))]
-    Mapping { path: PathBuf, fault: MappingFault },
+    #[error("{path}{}: {fault}", at_line(.line))]
+    Mapping { path: PathBuf, line: Option<u64>, fault: MappingFault },
     /// More columns than a recording has.
     #[error(
-        "{path}, line {line}: found more than {limit} columns, expected at most as many; check that the file is a recording, and raise the limit with --max-columns if it is"
+        "{path}{}: found more than {limit} columns, expected at most as many; check that the file is a recording, and raise the limit with --max-columns if it is",
+        at_line(.line)
     )]
-    TooManyColumns { path: PathBuf, line: u64, limit: usize },
+    TooManyColumns { path: PathBuf, line: Option<u64>, limit: usize },
     /// A line longer than one of a recording.
     #[error(
         "{path}, line {line}: found a line longer than {limit}, expected at most that; check that the file is a recording, and raise the limit with --max-columns if it is"
@@ -268,14 +268,6 @@ fn in_folder(files: &[String]) -> String {
         1 => format!("give the one in it that is read: {named}"),
         count if count > NAMED => format!("give one of the {count} in it that are read: {named}, …"),
         _ => format!("give one of those in it that are read: {named}"),
-    }
-}
-
-/// Where a file's names stand, if it has lines.
-fn header_of(path: &Path) -> &'static str {
-    match Format::of(path) {
-        Ok(Format::Parquet | Format::Mat) => "",
-        _ => ", line 1",
     }
 }
 

@@ -87,7 +87,7 @@ impl Recording {
             ..Self::new(name, manifest, time)
         };
         keep_assumed(&mut recording, true);
-        note_columns(&mut recording);
+        note_columns(&mut recording, None);
         checked(recording, &Places::WHOLE)
     }
 }

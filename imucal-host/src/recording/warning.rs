@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{
-    place::Place,
+    place::{Place, at_line},
     sensor_kind::SensorKind,
     unit::{TimeUnit, Unit},
 };
@@ -14,11 +14,14 @@ use super::{
 pub enum Warning {
     /// A column the contract does not know.
     #[error(
-        "{path}, column `{column}`: not a column of a recording; kept as it is and not used (rename it if it is meant as one)"
+        "{path}{}, column `{column}`: not a column of a recording; kept as it is and not used (rename it if it is meant as one)",
+        at_line(.line)
     )]
     UnknownColumn {
         /// Samples file.
         path: PathBuf,
+        /// Line of the header, where the file has lines.
+        line: Option<u64>,
         /// Name in the header.
         column: String,
     },
@@ -128,13 +131,16 @@ pub enum Warning {
     },
     /// Units that the manifest leaves out.
     #[error(
-        "{path}: [units] leaves out {}, which {} taken as said here; write the units the file is in",
+        "{path}{}: [units] leaves out {}, which {} taken as said here; write the units the file is in",
+        at_line(.line),
         units(.assumed),
         if .assumed.len() == 1 { "is" } else { "are" }
     )]
     UnitsAssumed {
         /// Manifest.
         path: PathBuf,
+        /// Line of its section, if there is one.
+        line: Option<usize>,
         /// Each key with the unit that is taken for it.
         assumed: Vec<(&'static str, String)>,
     },
@@ -158,11 +164,14 @@ pub enum Warning {
     },
     /// A position of the reference without an attitude.
     #[error(
-        "{path}, column `ref_px`: a position without an attitude is kept and not used; add ref_qw, ref_qx, ref_qy, ref_qz of the same body"
+        "{path}{}, column `ref_px`: a position without an attitude is kept and not used; add ref_qw, ref_qx, ref_qy, ref_qz of the same body",
+        at_line(.line)
     )]
     PositionAlone {
         /// Samples file.
         path: PathBuf,
+        /// Line of the header, where the file has lines.
+        line: Option<u64>,
     },
     /// Variables of a MAT-file that are no columns of samples.
     #[error(
@@ -236,19 +245,25 @@ pub enum Warning {
     },
     /// The file holds no sensor.
     #[error(
-        "{path}: no sensor columns found, expected acc_x, acc_y, acc_z or those of gyr or mag; nothing can be calibrated from it"
+        "{path}{}: no sensor columns found, expected acc_x, acc_y, acc_z or those of gyr or mag; nothing can be calibrated from it",
+        at_line(.line)
     )]
     NoSensor {
         /// Samples file.
         path: PathBuf,
+        /// Line of the header, where the file has lines.
+        line: Option<u64>,
     },
     /// The file holds a simulator's columns and no sensor; which is as it should be where a simulator's file is asked for.
     #[error(
-        "{path}: a simulator's columns found and no sensor's; nothing can be calibrated from it, but a recording of the sensor can be compared with it: imucal diagnose RECORDING --sim {path}"
+        "{path}{}: a simulator's columns found and no sensor's; nothing can be calibrated from it, but a recording of the sensor can be compared with it: imucal diagnose RECORDING --sim {path}",
+        at_line(.line)
     )]
     SimulatorAlone {
         /// Samples file.
         path: PathBuf,
+        /// Line of the header, where the file has lines.
+        line: Option<u64>,
     },
     /// Gravity of the site that no place on Earth has.
     #[error(

@@ -38,6 +38,11 @@ impl<'a> KeyMap<'a> {
         1 + before.filter(|byte| **byte == b'\n').count()
     }
 
+    /// Whether there is a section.
+    pub(crate) fn has_section(&self, section: &str) -> bool {
+        self.table.get_ref().iter().any(|(name, _)| name.get_ref() == section)
+    }
+
     /// Whether a section has a key.
     pub(crate) fn has(&self, section: &str, key: &str) -> bool {
         let sections = self.table.get_ref().iter().filter(|(name, _)| name.get_ref() == section);

@@ -89,7 +89,7 @@ fn converted(path: &Path, manifest: Manifest, mut table: Table) -> Result<(Recor
         manifest,
     };
     keep_assumed(&mut recording, !table.clock.is_dated());
-    note_columns(&mut recording);
+    note_columns(&mut recording, table.header);
     Ok((recording, table.places))
 }
 
@@ -214,20 +214,23 @@ pub(crate) fn keep_assumed(recording: &mut Recording, times_have_a_unit: bool) {
     });
 }
 
-pub(crate) fn note_columns(recording: &mut Recording) {
+/// What is odd about the columns, whose names stand in a line of a text.
+pub(crate) fn note_columns(recording: &mut Recording, line: Option<u64>) {
     for column in &recording.extra {
-        recording
-            .warnings
-            .push(Warning::UnknownColumn { path: recording.path.clone(), column: column.name.clone() });
+        recording.warnings.push(Warning::UnknownColumn {
+            path: recording.path.clone(),
+            line,
+            column: column.name.clone(),
+        });
     }
     if recording.position.is_some() && recording.reference.is_none() && recording.gimbal.is_none() {
-        recording.warnings.push(Warning::PositionAlone { path: recording.path.clone() });
+        recording.warnings.push(Warning::PositionAlone { path: recording.path.clone(), line });
     }
     if SensorKind::ALL.iter().all(|kind| recording.sensor(*kind).is_none()) {
         let path = recording.path.clone();
         recording.warnings.push(match recording.simulated {
-            Some(_) => Warning::SimulatorAlone { path },
-            None => Warning::NoSensor { path },
+            Some(_) => Warning::SimulatorAlone { path, line },
+            None => Warning::NoSensor { path, line },
         });
     }
 }
@@ -310,7 +313,7 @@ mod tests {
         let alone = with("", "");
         assert_says(
             &alone.warnings()[0],
-            &["run.csv, column `ref_px`", "without an attitude", "not used", "ref_qw"],
+            &["run.csv, line 1, column `ref_px`", "without an attitude", "not used", "ref_qw"],
         );
         let position = alone.read().position.unwrap()[0];
         assert!(position[0] == 1.0 && position[1].is_nan() && position[2].is_nan());

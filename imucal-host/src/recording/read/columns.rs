@@ -111,6 +111,8 @@ pub(crate) struct Layout {
     pub(crate) extra: Vec<String>,
     /// Which slots are there.
     pub(crate) present: [bool; KNOWN],
+    /// Line of the header, where the file is a text that has one.
+    line: Option<u64>,
 }
 
 /// Samples as read, in file units, one vector a slot; those of absent columns stay empty.
@@ -118,6 +120,8 @@ pub(crate) struct Layout {
 pub(crate) struct Table {
     pub(crate) columns: Vec<Vec<f64>>,
     pub(crate) extra: Vec<ExtraColumn>,
+    /// Line of the header, where the file is a text that has one.
+    pub(crate) header: Option<u64>,
     pub(crate) places: Places,
     /// What the column `t` counts.
     pub(crate) clock: Clock,
@@ -142,10 +146,11 @@ impl Table {
 }
 
 impl Layout {
-    /// Understands a header; blanks around names do not count. All that is wrong with it is said at once.
-    pub(crate) fn new(header: &[&str], path: &Path) -> Result<Self, ReadError> {
+    /// Understands a header, which stands at `line` of a text; blanks around names do not count. All that is wrong with it is said at
+    /// once.
+    pub(crate) fn new(header: &[&str], path: &Path, line: Option<u64>) -> Result<Self, ReadError> {
         let (names, mut faults) = separated(header);
-        let layout = Self::of(&names);
+        let layout = Self { line, ..Self::of(&names) };
         faults.extend(duplicates(&names));
         let misspelt = layout.misspelt();
         let mut present = layout.present;
@@ -166,13 +171,13 @@ impl Layout {
         if faults.is_empty() {
             Ok(layout)
         } else {
-            Err(ReadError::Header { path: path.to_path_buf(), faults })
+            Err(ReadError::Header { path: path.to_path_buf(), line, faults })
         }
     }
 
     /// What names mean, each for itself.
     fn of(names: &[&str]) -> Self {
-        let mut layout = Self { targets: Vec::new(), extra: Vec::new(), present: [false; KNOWN] };
+        let mut layout = Self { targets: Vec::new(), extra: Vec::new(), present: [false; KNOWN], line: None };
         for name in names {
             let slot = NAMES.iter().position(|known| known == name);
             layout.targets.push(slot.map_or(Target::Extra(layout.extra.len()), Target::Known));
@@ -196,6 +201,7 @@ impl Layout {
                 .iter()
                 .map(|name| ExtraColumn { name: name.clone(), values: Vec::new() })
                 .collect(),
+            header: self.line,
             places,
             clock,
             warnings: Vec::new(),
@@ -267,7 +273,7 @@ mod tests {
 
     fn layout(header: &str) -> Result<Layout, String> {
         let names: Vec<&str> = header.split(',').collect();
-        Layout::new(&names, Path::new("a.csv")).map_err(|error| error.to_string())
+        Layout::new(&names, Path::new("a.csv"), Some(1)).map_err(|error| error.to_string())
     }
 
     fn message(header: &str) -> String {

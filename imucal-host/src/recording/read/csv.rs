@@ -78,9 +78,10 @@ fn reader<'a>(
     }
     let names: Result<Vec<&str>, _> = rows.fields().map(std::str::from_utf8).collect();
     let names = names.map_err(|_| ReadError::NotUtf8 { path: path.to_path_buf(), line: rows.line })?;
-    let fault = |fault| ReadError::Mapping { path: path.to_path_buf(), fault };
+    let line = Some(rows.line);
+    let fault = |fault| ReadError::Mapping { path: path.to_path_buf(), line, fault };
     let renamed = mapping.renamed(&names).map_err(fault)?;
-    let layout = Layout::new(&renamed.iter().map(String::as_str).collect::<Vec<_>>(), path)?;
+    let layout = Layout::new(&renamed.iter().map(String::as_str).collect::<Vec<_>>(), path, line)?;
     let names: Vec<String> = names.iter().map(|name| name.trim().to_owned()).collect();
     Ok(CsvReader { path, clock: Clock::new(unit), layout, names, limit, taken: 0, rows: 0, ended: false })
 }
@@ -290,7 +291,7 @@ mod tests {
     fn unknown_columns_are_kept_as_they_are_and_reported() {
         let fixture = csv("t,acc_x,acc_y,acc_z,note\n0,0,0,9.8,\"a, b\"\n1,0,0,9.8,007\n");
         assert_eq!(fixture.read().extra[0].values, ["a, b", "007"]);
-        assert_says(&fixture.warnings()[0], &["run.csv, column `note`", "kept as it is", "rename"]);
+        assert_says(&fixture.warnings()[0], &["run.csv, line 1, column `note`", "kept as it is", "rename"]);
     }
 
     #[test]

@@ -162,7 +162,11 @@ impl<'a> Rows<'a> {
     fn make_room_for_fields(&mut self) -> Result<(), ReadError> {
         let limit = self.limits.columns;
         if self.ends.len() >= limit {
-            return Err(ReadError::TooManyColumns { path: self.path.to_path_buf(), line: self.line, limit });
+            return Err(ReadError::TooManyColumns {
+                path: self.path.to_path_buf(),
+                line: Some(self.line),
+                limit,
+            });
         }
         self.ends.resize((2 * self.ends.len()).min(limit), 0);
         Ok(())
@@ -221,6 +225,10 @@ mod tests {
         assert_says(&marked.warnings().join("\n"), &["# or %: 1)"]);
         assert_says(&csv(format!("#t,acc_x,acc_y,acc_z\n{samples}")).error(), &["line 1", "#t"]);
         assert_says(&csv(format!("t,acc_x,acc_y,acc_z\n# late\n{samples}")).error(), &["line 2"]);
+        // What is said of the header names its own line.
+        let odd = csv("# run 7\n\nt,acc_x,acc_y,acc_z,lamp\n0,0,0,9.8,1\n");
+        assert_says(&odd.warnings().join("\n"), &["run.csv, line 3, column `lamp`"]);
+        assert_says(&csv(format!("# run 7\nt,acc_x,acc_y\n{samples}")).error(), &["line 2: "]);
     }
 
     #[test]

@@ -144,7 +144,7 @@ fn check_header(path: &Path, rows: &Rows<'_>, names: &'static [&'static str]) ->
     let listed: Vec<&str> = found.iter().map(String::as_str).collect();
     let fault =
         HeaderFault::Incomplete { missing, found: names_listed(&listed), expected: names_listed(names) };
-    Err(ReadError::Header { path: path.to_path_buf(), faults: vec![fault] })
+    Err(ReadError::Header { path: path.to_path_buf(), line: Some(rows.line), faults: vec![fault] })
 }
 
 fn check_order(path: &Path, place: Place, before: Option<i64>, found: i64) -> Result<(), ReadError> {

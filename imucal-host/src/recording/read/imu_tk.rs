@@ -39,7 +39,7 @@ pub fn read_pair(
 ) -> Result<Recording, ReadError> {
     manifest.check().map_err(|fault| ReadError::Manifest { path: acc.to_path_buf(), line: 1, fault })?;
     let header = [["t"].as_slice(), &SensorKind::Acc.columns(), &SensorKind::Gyr.columns()].concat();
-    let mut table = Layout::new(&header, acc)?.table(0, Places::WHOLE, Clock::new(manifest.units.t));
+    let mut table = Layout::new(&header, acc, None)?.table(0, Places::WHOLE, Clock::new(manifest.units.t));
     let acc_file = TextFile::read(acc, limits)?;
     let gyr_file = TextFile::read(gyr, limits)?;
     compare_times(acc, &acc_file, gyr, &gyr_file, manifest.units.t.per_si())?;

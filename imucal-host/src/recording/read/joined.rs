@@ -104,7 +104,7 @@ pub(crate) fn join(path: &Path, mut series: Vec<Series>, limits: &Limits) -> Res
         .chain(others.iter().flat_map(|each| each.slots.iter().copied()))
         .map(|slot| NAMES[slot])
         .collect();
-    let layout = Layout::new(&names, path)?;
+    let layout = Layout::new(&names, path, None)?;
     let rows = first.stamps_ns.len();
     if (rows as u64).saturating_mul(layout.row_size() as u64) > limits.size {
         return Err(ReadError::TooManySamples { path: path.to_path_buf(), limit: Size(limits.size) });

@@ -70,7 +70,7 @@ pub(crate) fn read(
         return Err(ReadError::NoNumbers { path: path.to_path_buf(), others });
     }
     let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-    let fault = |fault| ReadError::Mapping { path: path.to_path_buf(), fault };
+    let fault = |fault| ReadError::Mapping { path: path.to_path_buf(), line: None, fault };
     let renamed = mapping.renamed(&names).map_err(fault)?;
     let rows = match renamed.iter().position(|name| name == NAMES[TIME]) {
         Some(time) => columns[time].numbers.len(),
@@ -89,7 +89,7 @@ pub(crate) fn read(
         }
     }
     let left_out = (!others.is_empty()).then(|| Warning::LeftOut { path: path.to_path_buf(), rows, others });
-    let layout = Layout::new(&kept.iter().map(|(name, _)| *name).collect::<Vec<_>>(), path);
+    let layout = Layout::new(&kept.iter().map(|(name, _)| *name).collect::<Vec<_>>(), path, None);
     let layout = layout.map_err(|error| match left_out.clone() {
         Some(warning) => ReadError::AmongLeftOut { error: Box::new(error), warning: Box::new(warning) },
         None => error,
@@ -177,7 +177,7 @@ fn saved(path: &Path, limits: &Limits) -> Result<Saved, ReadError> {
     }
     if saved.columns.len() > limits.columns {
         let (path, limit) = (path.to_path_buf(), limits.columns);
-        return Err(ReadError::TooManyColumns { path, line: 1, limit });
+        return Err(ReadError::TooManyColumns { path, line: None, limit });
     }
     saved.shorten_names();
     Ok(saved)

@@ -105,9 +105,9 @@ fn groups(
     refuse_too_long(path, reader.metadata(), &which, limits)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
-    let fault = |fault| ReadError::Mapping { path: path.to_path_buf(), fault };
+    let fault = |fault| ReadError::Mapping { path: path.to_path_buf(), line: None, fault };
     let renamed = mapping.renamed(&names.iter().map(String::as_str).collect::<Vec<_>>()).map_err(fault)?;
-    let layout = Layout::new(&renamed.iter().map(String::as_str).collect::<Vec<_>>(), path)?;
+    let layout = Layout::new(&renamed.iter().map(String::as_str).collect::<Vec<_>>(), path, None)?;
     let found = &reader.metadata().row_groups()[which.clone()];
     let rows: u64 = found.iter().map(|group| group.num_rows().max(0) as u64).sum();
     let memory = Memory::new(path, limits.size);

@@ -124,7 +124,8 @@ mod tests {
             columns[TIME] = (0..rows).map(|row| row as f64 / 8.0).collect();
             columns[SEGMENT] = (0..rows).map(|row| row as f64).collect();
             let (clock, places) = (Clock::new(TimeUnit::Second), Places::WHOLE);
-            let table = Table { columns, extra: Vec::new(), places, clock, warnings: Vec::new() };
+            let table =
+                Table { columns, extra: Vec::new(), header: None, places, clock, warnings: Vec::new() };
             let mut writer = CsvWriter::begin(Vec::new(), &table, [false; KNOWN]).unwrap();
             writer.append(&table, rows).unwrap();
             let text = String::from_utf8(writer.finish()).unwrap();

@@ -59,7 +59,7 @@ pub(crate) fn table_of(recording: &Recording) -> Table {
     let label = |label: &Option<i64>| label.map_or(f64::NAN, |label| label as f64);
     columns[SEGMENT] = recording.segment.iter().flatten().map(label).collect();
     let extra = recording.extra.clone();
-    Table { columns, extra, places: Places::WHOLE, clock, warnings: Vec::new() }
+    Table { columns, extra, header: None, places: Places::WHOLE, clock, warnings: Vec::new() }
 }
 
 fn put_simulated(recording: &Recording, columns: &mut [Vec<f64>]) {

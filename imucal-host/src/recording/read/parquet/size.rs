@@ -18,7 +18,7 @@ pub(super) fn refuse_too_long(
 ) -> Result<(), ReadError> {
     if found.file_metadata().schema_descr().num_columns() > limits.columns {
         let (path, limit) = (path.to_path_buf(), limits.columns);
-        return Err(ReadError::TooManyColumns { path, line: 1, limit });
+        return Err(ReadError::TooManyColumns { path, line: None, limit });
     }
     let sizes = found.row_groups()[which.clone()].iter().flat_map(|group| group.columns());
     let size = sizes.fold(0u64, |sum, column| sum.saturating_add(column.uncompressed_size().max(0) as u64));

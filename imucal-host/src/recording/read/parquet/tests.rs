@@ -134,7 +134,7 @@ fn a_damaged_file_and_text_for_numbers_are_refused() {
     let message = Fixture::new("run.parquet", "", bytes).error();
     assert_says(&message, &["run.parquet", "damaged", "expected an intact Parquet file", "copy"]);
 
-    let layout = Layout::new(&["t", "speed"], Path::new("a")).unwrap();
+    let layout = Layout::new(&["t", "speed"], Path::new("a"), None).unwrap();
     let mut table = layout.table(1, Places::WHOLE, Clock::new(TimeUnit::Second));
     table.columns[0].push(0.0);
     table.extra[0].name = "temp".to_owned();
@@ -153,7 +153,7 @@ fn more_than_the_limits_allow_is_refused_before_it_is_read() {
         &error(Limits { columns: 3, ..Limits::default() }),
         &["more than 3 columns", "--max-columns"],
     );
-    let layout = Layout::new(&["t", "note"], Path::new("a")).unwrap();
+    let layout = Layout::new(&["t", "note"], Path::new("a"), None).unwrap();
     let mut table = layout.table(0, Places::WHOLE, Clock::new(TimeUnit::Second));
     table.columns[0] = (0..300).map(f64::from).collect();
     table.extra[0].values = vec!["long ".repeat(300); 300];
