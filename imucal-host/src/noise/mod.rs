@@ -27,6 +27,7 @@
 //! | [`blocked_cholesky`] | factor of a dense covariance |
 //! | [`interval`] | standard errors whose ±1.96 hold 95 % |
 //! | [`semiseparable`] | covariance of means over spans, whitened in the order of time |
+//! | [`state_space`] | covariance of rows that share such means, and other errors, whitened by a Kalman filter |
 //!
 //! Not modelled: axes that err alike, scatter whose size or direction depends on the pose, an error that repeats when a
 //! pose comes back.
@@ -64,6 +65,8 @@ pub mod blocked_cholesky;
 pub mod interval;
 
 pub mod semiseparable;
+
+pub mod state_space;
 
 pub use estimate::Residuals;
 

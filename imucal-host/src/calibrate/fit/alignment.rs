@@ -75,15 +75,15 @@ pub fn align_at_rests(
         let moves: Vec<Move> = (at_rest.iter().zip(model.pairs).enumerate())
             .map(|(row, (seen, pair))| Move { row, rest: seen.rest, by: rotation * pair.u_b })
             .collect();
-        let of_field = DVector::from_iterator(
-            at_rest.len(),
-            at_rest.iter().zip(model.pairs).zip(&pairs).map(|((seen, pair), (_, field))| {
-                let along = rotation.tr_mul(&pair.u_f);
-                let across = (along - pair.u_b * pair.u_b.dot(&along)) / field.norm();
-                triad.gain.tr_mul(&across).map(|x| x * x).dot(&seen.variance)
-            }),
-        );
-        let parts = [directions.propagated(at_rest.len(), &moves), DMatrix::from_diagonal(&of_field)];
+        let mut followed = directions.rows(at_rest.len(), &moves);
+        for (row, ((seen, pair), (_, field))) in
+            followed.iter_mut().zip(at_rest.iter().zip(model.pairs).zip(&pairs))
+        {
+            let along = rotation.tr_mul(&pair.u_f);
+            let across = (along - pair.u_b * pair.u_b.dot(&along)) / field.norm();
+            row.own = triad.gain.tr_mul(&across).map(|x| x * x).dot(&seen.variance);
+        }
+        let parts = directions.noise_of(followed, DMatrix::zeros(0, 0));
         let parts = Parts { parts: &parts, ratios: &RATIOS, scale: Scale::AtLeastOne, five: false };
         let rows = Rows::of(model, theta);
         let jacobian = rows.derivatives(at_rest.len(), &[0, 1, 2, 3]);

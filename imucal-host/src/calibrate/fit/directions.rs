@@ -13,9 +13,12 @@
 //! A norm fit uses the part of e along u and a direction the part across it, so both errors are taken as independent.
 
 use imucal_core::triad::Triad;
-use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
 
-use crate::noise::{Noise, Span};
+use crate::noise::{
+    Noise, Span,
+    state_space::{Row, StateSpace},
+};
 
 /// The accelerometer at every rest.
 #[derive(Clone, Debug)]
@@ -66,32 +69,24 @@ impl Directions {
         Matrix3xX::from_columns(&columns)
     }
 
-    /// Covariance of so many rows that follow from directions.
-    pub fn propagated(&self, rows: usize, moves: &[Move]) -> DMatrix<f64> {
-        let mut rests: Vec<usize> = moves.iter().map(|one| one.rest).collect();
-        rests.sort_unstable();
-        rests.dedup();
-        let spans: Vec<Span> = rests.iter().map(|rest| self.spans[*rest].clone()).collect();
-        let between = self.noise.covariance(&spans);
+    /// How so many rows that follow from directions err: with the rests' means, and with the calibration, which all share.
+    pub fn rows(&self, rows: usize, moves: &[Move]) -> Vec<Row> {
         let root = self.noise.density.map(f64::sqrt);
-        let by_entries: Vec<Matrix3xX<f64>> = rests.iter().map(|rest| self.by_entries(*rest)).collect();
-        let by_mean: Vec<Matrix3<f64>> = rests.iter().map(|rest| self.by_mean(*rest)).collect();
-        let mut common = DMatrix::zeros(rows, self.covariance_of.len());
-        // Row, rest, and how it moves with that rest's white noise at density one.
-        let mut moved: Vec<(usize, usize, Vector3<f64>)> = Vec::with_capacity(moves.len());
+        let count = self.covariance_of.len();
+        let none = || Row { shared: [DVector::zeros(count), DVector::zeros(0)], ..Row::default() };
+        let mut followed: Vec<Row> = (0..rows).map(|_| none()).collect();
         for one in moves {
-            let at = rests.partition_point(|rest| *rest < one.rest);
-            let mut row = common.row_mut(one.row);
-            row += one.by.transpose() * &by_entries[at];
-            moved.push((one.row, at, by_mean[at].tr_mul(&one.by).component_mul(&root)));
+            let row = &mut followed[one.row];
+            row.shared[0] += self.by_entries(one.rest).tr_mul(&one.by);
+            let by_mean = self.by_mean(one.rest).tr_mul(&one.by);
+            row.means.push((one.rest, by_mean.component_mul(&root)));
         }
-        let mut covariance = &common * &self.covariance * common.transpose();
-        for (row, at, by) in &moved {
-            for (other_row, other_at, other) in &moved {
-                covariance[(*other_row, *row)] += by.dot(other) * between[(*other_at, *at)];
-            }
-        }
-        covariance
+        followed
+    }
+
+    /// Noise of such rows, and of what else they follow from: errors of a covariance that all share.
+    pub fn noise_of(&self, rows: Vec<Row>, shared: DMatrix<f64>) -> StateSpace {
+        StateSpace::new(rows, self.spans.clone(), self.noise.clone(), [self.covariance.clone(), shared])
     }
 }
 
@@ -109,6 +104,7 @@ pub struct Move {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::noise::interval::Whitening;
 
     fn directions(triad: Triad<f64>, means: Vec<Vector3<f64>>) -> Directions {
         Directions {
@@ -158,7 +154,8 @@ mod tests {
             Move { row: 1, rest: 0, by: -Vector3::x() },
             Move { row: 0, rest: 1, by: Vector3::y() },
         ];
-        let covariance = found.propagated(2, &moves);
+        let noise = found.noise_of(found.rows(2, &moves), DMatrix::zeros(0, 0));
+        let [covariance, _] = noise.carried(&DMatrix::identity(2, 2));
         // 4e-4 over 4 s, over ten squared.
         let each = 4e-4 / 4.0 / 100.0;
         let expected = DMatrix::from_row_slice(2, 2, &[2.0 * each, -each, -each, each]);

@@ -16,8 +16,6 @@
 //! s and ρ come from the turns' own residuals ([`crate::noise::interval`]). Each turn is two rows, across the direction
 //! after it. Not modelled: noise of rates that differs by axis, drift within a turn beyond the bias path.
 
-use std::collections::BTreeMap;
-
 use imucal_core::{
     model::{
         parameterisation::FULL,
@@ -33,7 +31,10 @@ use crate::{
         directions::{Directions, Move},
         rows::{Rows, influence},
     },
-    noise::interval::{Errors, Parts, Scale},
+    noise::{
+        interval::{Errors, Parts, Scale},
+        state_space::{Row, StateSpace},
+    },
 };
 
 /// See ρ, with prior weights.
@@ -119,7 +120,7 @@ pub fn errors(
 
 /// V_a and V_g of turns, two rows each.
 #[derive(Clone, Debug)]
-pub struct TurnCovariance([DMatrix<f64>; 2]);
+pub struct TurnCovariance(StateSpace);
 
 impl TurnCovariance {
     /// Of turns near a gain.
@@ -130,7 +131,6 @@ impl TurnCovariance {
         rates: &RateNoise,
     ) -> Self {
         let turns: Vec<Linear> = turns.iter().map(|turn| linear(turn, gain)).collect();
-        let rows = 2 * turns.len();
         let of_ends = |(k, turn): (usize, &Linear)| {
             let ends = [(turn.rests.0, &turn.by_before), (turn.rests.1, &turn.by_after)];
             ends.map(|(rest, by)| {
@@ -138,7 +138,14 @@ impl TurnCovariance {
             })
         };
         let moves: Vec<Move> = turns.iter().enumerate().flat_map(of_ends).flatten().collect();
-        Self([directions.propagated(rows, &moves), of_rates(&turns, directions, rates)])
+        let mut rows = directions.rows(2 * turns.len(), &moves);
+        for (k, row) in rows.iter_mut().enumerate() {
+            follow_rates(row, &turns[k / 2], k % 2, directions, rates);
+        }
+        Self(
+            directions
+                .noise_of(rows, DMatrix::from_diagonal(&DVector::from_column_slice(rates.bias.as_slice()))),
+        )
     }
 
     /// Errors of what follows from the rows by `influence`; see [`Parts::errors`].
@@ -153,38 +160,23 @@ impl TurnCovariance {
     }
 }
 
-/// V_g.
-fn of_rates(turns: &[Linear], directions: &Directions, rates: &RateNoise) -> DMatrix<f64> {
-    let rows = 2 * turns.len();
-    let mut covariance = DMatrix::zeros(rows, rows);
-    let mut by_bias = MatrixXx3::zeros(rows);
-    for (k, turn) in turns.iter().enumerate() {
-        // An angle about an axis across the direction turns it by as much; the gain is near one.
-        covariance[(2 * k, 2 * k)] = rates.density * turn.duration;
-        covariance[(2 * k + 1, 2 * k + 1)] = rates.density * turn.duration;
-        by_bias.rows_mut(2 * k, 2).copy_from(&turn.by_bias);
-    }
-    covariance += &by_bias * Matrix3::from_diagonal(&rates.bias) * by_bias.transpose();
+/// Adds V_g of one of a turn's rows.
+fn follow_rates(row: &mut Row, turn: &Linear, which: usize, directions: &Directions, rates: &RateNoise) {
+    // An angle about an axis across the direction turns it by as much; the gain is near one.
+    row.own = rates.density * turn.duration;
+    let by_bias: Vector3<f64> = turn.by_bias.row(which).transpose();
+    row.shared[1] = DVector::from_column_slice(by_bias.as_slice());
     if !rates.interpolated {
-        return covariance;
+        return;
     }
     // Turns that end at a rest share half of its bias' error.
-    let mut at: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (k, turn) in turns.iter().enumerate() {
-        at.entry(turn.rests.0).or_default().push(k);
-        if turn.rests.1 != turn.rests.0 {
-            at.entry(turn.rests.1).or_default().push(k);
-        }
-    }
-    for (rest, sharing) in at {
+    let ends = [turn.rests.0, turn.rests.1];
+    let count = if ends[0] == ends[1] { 1 } else { 2 };
+    for rest in ends.into_iter().take(count) {
         let span = &directions.spans[rest];
         let variance = 0.25 * rates.density / (span.end - span.start);
-        for (k, l) in sharing.iter().flat_map(|k| sharing.iter().map(move |l| (*k, *l))) {
-            let mut there = covariance.view_mut((2 * k, 2 * l), (2, 2));
-            there += &turns[k].by_bias * turns[l].by_bias.transpose() * variance;
-        }
+        row.independent.push((rest, by_bias * variance.sqrt()));
     }
-    covariance
 }
 
 /// The errors' covariance as a matrix of fixed size.
