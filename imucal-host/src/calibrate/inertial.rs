@@ -1,6 +1,7 @@
 //! Accelerometer and gyroscope, which share the rests: found once, fitted one after the other.
 
 use imucal_core::{accept::Refusal, triad::Triad};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{
@@ -24,7 +25,10 @@ use super::{
 };
 use crate::{
     noise::Noise,
-    observe::rest::{RestDetector, Samples},
+    observe::{
+        quantum::quantum,
+        rest::{RestDetector, Samples},
+    },
     recording::{Recording, SensorKind, Triple, check::integrity::Integrity, unit::STANDARD_GRAVITY},
     simulator::place::EARTH_RATE,
 };
@@ -77,6 +81,7 @@ pub(crate) fn calibrate(
         recording,
         usable: &usable_gyr,
         interval: at_rest.interval,
+        step: wanted.map_or_else(Vector3::zeros, |gyr| quantum(&gyr.values, &usable_gyr)),
         directions: directions.as_ref(),
         thermometry: thermometry.as_ref(),
     };
@@ -162,7 +167,9 @@ impl<'a> Rests<'a> {
 
     fn noise(&self, chosen: &Cut) -> RestNoise {
         let (time, values) = (&self.recording.time, &self.acc.values);
-        AtRest { time, values, usable: &self.usable, interval: self.interval, rows: &chosen.rows }.noise()
+        let step = quantum(values, &self.usable);
+        AtRest { time, values, usable: &self.usable, interval: self.interval, rows: &chosen.rows, step }
+            .noise()
     }
 
     /// The accelerometer's outcome, on a rig or by its rests.
@@ -233,6 +240,8 @@ struct GyrShared<'a> {
     recording: &'a Recording,
     usable: &'a [bool],
     interval: f64,
+    /// Step of the gyroscope's converter.
+    step: Vector3<f64>,
     directions: Option<&'a Directions>,
     thermometry: Option<&'a Thermometry<'a>>,
 }
@@ -250,6 +259,7 @@ impl GyrShared<'_> {
             sensor: gyr,
             usable: self.usable,
             interval: self.interval,
+            step: self.step,
             rows: &cut.rows,
             rests: &cut.rests,
             used,

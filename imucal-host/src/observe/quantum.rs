@@ -6,12 +6,13 @@ use std::{
 };
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 /// Smallest difference between two values that an axis shows; zero for an axis that shows but one.
 ///
 /// Of samples that are not quantised it is far below their noise, so that nothing follows from it.
 pub fn quantum(values: &[Vector3<f64>], usable: &[bool]) -> Vector3<f64> {
-    Vector3::from_fn(|axis, _| {
+    let of_axis = |axis: usize| {
         let finite = values.iter().zip(usable).filter(|(v, usable)| **usable && v[axis].is_finite());
         let sorted = distinct(finite.map(|(v, _)| v[axis]));
         let extent = sorted.first().zip(sorted.last()).map_or(0.0, |(low, high)| high - low);
@@ -20,7 +21,10 @@ pub fn quantum(values: &[Vector3<f64>], usable: &[bool]) -> Vector3<f64> {
         let steps = sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > least);
         let step = steps.fold(f64::INFINITY, f64::min);
         if step.is_finite() { step } else { 0.0 }
-    })
+    };
+    let mut steps = Vector3::zeros();
+    steps.as_mut_slice().par_iter_mut().enumerate().for_each(|(axis, step)| *step = of_axis(axis));
+    steps
 }
 
 /// Each value once, ascending: a converter puts out few of them, so that they are found before they are sorted.

@@ -23,15 +23,35 @@ use super::quantum;
 /// Fewer samples are not halved.
 const LEAST: usize = 8;
 
-/// Variance of a rest's mean, an axis, at a κ of `slower`, and how many rests say so; `None` where none is long enough.
+/// Variance of a rest's mean, each axis.
+#[derive(Clone, Copy, Debug)]
+pub struct MeanVariance {
+    /// What the halves' differences come to.
+    within: Vector3<f64>,
+    /// q.
+    steps: Vector3<f64>,
+    /// Differences that say so.
+    pub count: usize,
+}
+
+impl MeanVariance {
+    /// s² for a κ.
+    pub fn with_slower(&self, slower: f64) -> Vector3<f64> {
+        self.within * slower + self.steps
+    }
+}
+
+/// Variance of a rest's mean; `None` where no rest is long enough.
 pub fn mean_variance(
     values: &[Vector3<f64>],
     usable: &[bool],
     rests: &[Range<usize>],
-    slower: f64,
-) -> Option<(Vector3<f64>, usize)> {
+) -> Option<MeanVariance> {
     let differences = differences(values, usable, rests, 2);
     let count = differences.len();
+    if count == 0 {
+        return None;
+    }
     let sum: Vector3<f64> = differences.iter().map(|d| d.map(|d| 0.25 * d * d)).sum();
     let step = quantum::quantum(values, usable);
     let of_axis = |axis: usize| {
@@ -39,10 +59,8 @@ pub fn mean_variance(
         let variances = quantum::variances_of_means(step[axis], rests.iter().map(samples));
         variances.iter().sum::<f64>() / variances.len() as f64
     };
-    (count > 0).then(|| {
-        let steps = Vector3::from_fn(|axis, _| of_axis(axis));
-        (sum * (slower / count as f64) + steps, count)
-    })
+    let steps = Vector3::from_fn(|axis, _| of_axis(axis));
+    Some(MeanVariance { within: sum / count as f64, steps, count })
 }
 
 /// Mean of each second part less that of the part before it, of rests cut into so many parts that are long enough.
@@ -78,15 +96,17 @@ mod tests {
         let mut random = Random::new(1, Purpose::Noise);
         let values: Vec<_> = (0..20_000).map(|_| random.normals() * 0.1).collect();
         let rests: Vec<_> = (0..200).map(|k| 100 * k..100 * (k + 1)).collect();
-        let (variance, count) = mean_variance(&values, &[true; 20_000], &rests, 1.0).unwrap();
-        assert_eq!(count, 200);
+        let found = mean_variance(&values, &[true; 20_000], &rests).unwrap();
+        assert_eq!(found.count, 200);
+        let variance = found.with_slower(1.0);
         assert!(variance.iter().all(|v| (v / 1e-4 - 1.0).abs() < 0.3), "{variance}");
     }
 
     #[test]
     fn a_mean_of_coarse_steps_is_no_finer_than_a_step() {
         let values: Vec<_> = (0..100).map(|k| Vector3::repeat(if k < 50 { 0.2 } else { 0.5 })).collect();
-        let (variance, _) = mean_variance(&values, &[true; 100], &[0..50, 50..100], 1.0).unwrap();
+        let found = mean_variance(&values, &[true; 100], &[0..50, 50..100]).unwrap();
+        let variance = found.with_slower(1.0);
         assert!((0.7..1.1).contains(&(variance.x / (0.09 / 12.0))), "{variance}");
     }
 }

@@ -9,7 +9,7 @@
 //! Source: ours. Not seen: what a fit takes wholly into its parameters; of a cloud, noise that is merely larger than
 //! that of its samples, as fields in buildings make it.
 
-use std::ops::Range;
+use std::{ops::Range, sync::OnceLock};
 
 use imucal_core::{
     model::{
@@ -41,7 +41,10 @@ use crate::{
         outcome::{Calibration, Evidence, FitSummary, KnownTurn, SensorOutcome},
         suspicion::{Follows, Status, Suspicion},
     },
-    observe::{held, rest_halves},
+    observe::{
+        held,
+        rest_halves::{self, MeanVariance},
+    },
     recording::{Recording, SensorKind, check::integrity::Integrity, unit::STANDARD_GRAVITY},
 };
 
@@ -70,7 +73,7 @@ const EARTH_RATE: f64 = 7.29e-5;
 /// Fills the suspicions of each fit that keeps its limits.
 pub fn examine(recording: &Recording, integrity: &Integrity, calibration: &mut Calibration) {
     let rests = calibration.segmentation.as_ref().map_or_else(Vec::new, |cut| cut.rests.clone());
-    let scene = Scene { recording, integrity, rests: &rests };
+    let scene = Scene { recording, integrity, rests: &rests, at_rest: [const { OnceLock::new() }; 3] };
     let accelerometer_rms =
         calibration.sensor(SensorKind::Acc).and_then(SensorOutcome::passed).map(|fit| fit.rms);
     let square = matches!(
@@ -114,9 +117,18 @@ struct Scene<'a> {
     recording: &'a Recording,
     integrity: &'a Integrity,
     rests: &'a [Range<usize>],
+    /// How well the means of rests are known, by sensor.
+    at_rest: [OnceLock<Option<MeanVariance>>; 3],
 }
 
 impl Scene<'_> {
+    fn at_rest(&self, kind: SensorKind) -> Option<MeanVariance> {
+        *self.at_rest[kind as usize].get_or_init(|| {
+            let values = &self.recording.sensor(kind)?.values;
+            rest_halves::mean_variance(values, self.usable(kind), self.rests)
+        })
+    }
+
     fn suspicions(&self, outcome: &SensorOutcome, accelerometer_rms: Option<f64>) -> Vec<Suspicion> {
         let Some(fit) = &outcome.fit else { return Vec::new() };
         match &outcome.evidence {
@@ -231,9 +243,8 @@ impl Scene<'_> {
         residuals: &[f64],
         parameters: usize,
     ) -> Option<Suspicion> {
-        let acc = self.recording.acc.as_ref()?;
-        let (variance, rests) =
-            rest_halves::mean_variance(&acc.values, self.usable(SensorKind::Acc), self.rests, SLOWER)?;
+        let at_rest = self.at_rest(SensorKind::Acc)?;
+        let (variance, rests) = (at_rest.with_slower(SLOWER), at_rest.count);
         let along =
             directions.iter().map(|u| u.map(|x| x * x).dot(&variance)).sum::<f64>() / directions.len() as f64;
         let freedom = residuals.len() as f64 - parameters as f64;
@@ -304,7 +315,7 @@ impl Scene<'_> {
         let at: Vec<usize> =
             turns.iter().map(|turn| turn.data.rows.start.midpoint(turn.data.rows.end)).collect();
         let columns = gyr_residual::columns(turns, rates, &theta, &rows, &self.courses(&at));
-        let at_rest = self.bias_errors(&gyr.values, fit);
+        let at_rest = self.bias_errors(fit);
         let scores: Vec<(&Columns, Score)> =
             columns.iter().filter_map(|columns| Some((columns, test.test(&columns.values, 3)?))).collect();
         // What the bias' own error explains, other columns explain in part.
@@ -331,9 +342,9 @@ impl Scene<'_> {
     }
 
     /// How well rests determine the bias: no better than a step of the converter allows, rad/s.
-    fn bias_errors(&self, values: &[Vector3<f64>], fit: &FitSummary) -> Vector3<f64> {
-        let noise = rest_halves::mean_variance(values, self.usable(SensorKind::Gyr), self.rests, 1.0);
-        let of_mean = noise.map_or_else(Vector3::zeros, |(variance, _)| variance);
+    fn bias_errors(&self, fit: &FitSummary) -> Vector3<f64> {
+        let noise = self.at_rest(SensorKind::Gyr);
+        let of_mean = noise.map_or_else(Vector3::zeros, |noise| noise.with_slower(1.0));
         fit.bias_std
             .zip_map(&of_mean, |std, variance| (std * std + variance + EARTH_RATE * EARTH_RATE).sqrt())
     }
@@ -346,11 +357,8 @@ impl Scene<'_> {
         residuals: &[f64],
         accelerometer_rms: Option<f64>,
     ) -> Option<Suspicion> {
-        let (acc, gyr) = (self.recording.acc.as_ref()?, self.recording.gyr.as_ref()?);
-        let (of_mean, rests) =
-            rest_halves::mean_variance(&acc.values, self.usable(SensorKind::Acc), self.rests, 1.0)?;
-        let (of_rate, _) =
-            rest_halves::mean_variance(&gyr.values, self.usable(SensorKind::Gyr), self.rests, 1.0)?;
+        let (acc, gyr) = (self.at_rest(SensorKind::Acc)?, self.at_rest(SensorKind::Gyr)?);
+        let [of_mean, of_rate] = [acc, gyr].map(|at_rest| at_rest.with_slower(1.0));
         let g = STANDARD_GRAVITY;
         let direction = of_mean.mean().max(accelerometer_rms.unwrap_or(0.0).powi(2)) / (g * g);
         let long = self.rests.iter().map(|r| self.duration(r)).sum::<f64>() / self.rests.len() as f64;
@@ -363,7 +371,7 @@ impl Scene<'_> {
         let expected = expected.sum::<f64>() / turns.len() as f64;
         let freedom = 2.0 * turns.len() as f64 - 9.0;
         let square = residuals.iter().map(|r| r * r).sum::<f64>() / freedom;
-        let chance = upper_tail(square / (SLOWER * expected), freedom, 2.0 * rests as f64)?;
+        let chance = upper_tail(square / (SLOWER * expected), freedom, 2.0 * acc.count as f64)?;
         (chance < CHANCE_OF_EXCESS).then(|| Suspicion {
             follows: Follows::Excess,
             detail: format!(

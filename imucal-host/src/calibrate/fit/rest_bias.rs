@@ -66,11 +66,10 @@ pub fn errors(rests: &[Rest<f64>], means: &[Vector3<f64>], at_rest: &AtRest<'_>)
     // One rest does not show how it differs from others: its own noise has to do.
     let alone = (0..count).map(|k| influence[k] * influence[k] / length(k)).sum::<f64>();
     let of_axis = |axis: usize| errors.as_ref().map_or(alone, |errors| errors[axis].covariance[(0, 0)]);
-    let step = quantum::quantum(at_rest.values, at_rest.usable);
     let resting =
         |axis: usize| at_rest.rows.iter().flat_map(move |rows| at_rest.samples(rows).map(move |v| v[axis]));
     let of_axis_steps =
-        |axis: usize| quantum::variances_of_means(step[axis], std::iter::once(resting(axis)))[0];
+        |axis: usize| quantum::variances_of_means(at_rest.step[axis], std::iter::once(resting(axis)))[0];
     let steps = Vector3::from_fn(|axis, _| of_axis_steps(axis));
     let std = Vector3::from_fn(|axis, _| (of_axis(axis) * density[axis] + steps[axis]).sqrt());
     BiasErrors { std, steps }
@@ -102,8 +101,15 @@ mod tests {
                 })
                 .collect();
             let means: Vec<_> = rests.iter().map(|rest| rest.gyr.mean()).collect();
-            let at_rest =
-                AtRest { time: &time, values: &values, usable: &[true; 3600], interval: 0.02, rows: &rows };
+            let (usable, steps) = ([true; 3600], quantum::quantum(&values, &[true; 3600]));
+            let at_rest = AtRest {
+                time: &time,
+                values: &values,
+                usable: &usable,
+                interval: 0.02,
+                rows: &rows,
+                step: steps,
+            };
             let found = errors(&rests, &means, &at_rest);
             assert!(found.std.min() > 0.0, "{found:?}");
             (mean(&rests, &means) - bias).component_div(&found.std).norm_squared() / 3.0

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use crate::{
     noise::{Span, flicker, interval::Parts, white, within::Within},
-    observe::quantum::{quantum, variances_of_means},
+    observe::quantum::variances_of_means,
 };
 
 /// An axis is no quieter than this share of what the axes are on average: rounding may have swallowed its noise.
@@ -25,6 +25,8 @@ pub struct AtRest<'a> {
     pub interval: f64,
     /// Rows of the rests.
     pub rows: &'a [Range<usize>],
+    /// Step of the converter on each axis ([`crate::observe::quantum`]).
+    pub step: Vector3<f64>,
 }
 
 /// Noise of the means of rests, each axis on its own.
@@ -86,8 +88,7 @@ impl AtRest<'_> {
     }
 
     fn noise_with_steps(&self, steps: impl Fn(f64, usize) -> Vec<f64>) -> RestNoise {
-        let step = quantum(self.values, self.usable);
-        let steps = [0, 1, 2].map(|axis| steps(step[axis], axis));
+        let steps = [0, 1, 2].map(|axis| steps(self.step[axis], axis));
         RestNoise {
             spans: self.rows.iter().map(|rows| self.span(rows)).collect(),
             density: self.density(),

@@ -19,6 +19,7 @@ use crate::{
     observe::{
         motion::{self, Attitudes, MotionData, MotionInput},
         pose,
+        quantum::quantum,
     },
     recording::{Recording, Triple, unit::STANDARD_GRAVITY},
     simulator::place::EARTH_RATE,
@@ -118,7 +119,7 @@ fn warm_bias(
         means: &stills.iter().map(|still| still.mean).collect::<Vec<_>>(),
         times: &stills.iter().map(Still::time).collect::<Vec<_>>(),
         temperatures: &temperatures,
-        noise: &AtRest { time, values: rates, usable, interval, rows }.noise(),
+        noise: &AtRest { time, values: rates, usable, interval, rows, step: quantum(rates, usable) }.noise(),
     };
     let kept = rest_rates::estimate(&rates, &mut finding);
     let growth = kept.map(|kept| temperatures.iter().map(|t| kept.terms.drift(*t)).collect());

@@ -42,10 +42,7 @@ use crate::{
             turns::{self as warm_turns, WarmTurns},
         },
     },
-    observe::{
-        quantum::quantum,
-        turn::{BiasPath, TurnData, compress},
-    },
+    observe::turn::{BiasPath, TurnData, compress},
     recording::{SensorKind, Triple, Unit},
 };
 
@@ -69,6 +66,8 @@ pub struct GyrInput<'a> {
     pub usable: &'a [bool],
     /// Usual interval, s.
     pub interval: f64,
+    /// Step of the converter on each axis ([`crate::observe::quantum`]), rad/s.
+    pub step: Vector3<f64>,
     /// Rows of the rests, with what was observed in each.
     pub rows: &'a [Range<usize>],
     /// The rests.
@@ -128,6 +127,7 @@ impl GyrInput<'_> {
             usable: self.usable,
             interval: self.interval,
             rows: self.rows,
+            step: self.step,
         }
     }
 
@@ -470,8 +470,7 @@ fn between<'a>(data: &[TurnData], known: &[Turn<'a, f64>]) -> Vec<Between<'a>> {
 
 fn rate_noise(input: &GyrInput<'_>, turns: &Turns, bias: &BiasErrors) -> RateNoise {
     // In motion the steps of the converter are noise, whatever they are at rest.
-    let rounding =
-        quantum(&input.sensor.values, input.usable).map(|step| step * step / 12.0) * input.interval;
+    let rounding = input.step.map(|step| step * step / 12.0) * input.interval;
     let interpolated = turns.wander.interpolated;
     RateNoise {
         density: input.at_rest().density().zip_map(&rounding, f64::max).mean(),

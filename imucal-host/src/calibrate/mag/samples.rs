@@ -24,7 +24,10 @@ use crate::{
         outcome::{Estimates, Evidence, FitSummary, Refused, SensorOutcome},
     },
     ellipsoid::{adjusted, sphere},
-    observe::cloud::{Cloud, cloud},
+    observe::{
+        cloud::{Cloud, cloud},
+        quantum::quantum,
+    },
     recording::{SensorKind, Triple, Unit},
 };
 
@@ -121,6 +124,7 @@ fn fit(cloud: &Cloud, input: &MagInput<'_>) -> Result<Judged, Refusal> {
         usable: input.usable,
         interval: input.interval,
         rows: input.rests,
+        step: quantum(&sensor.values, input.usable),
     };
     let errors = ShellErrors::of_cloud(&problem, &fit, &at, &at_rest.noise_of_cloud());
     let (bend, verdict) = problem.judge(&fit, &coverage, &errors.stated(&problem.form, &fit), false, &limits);
