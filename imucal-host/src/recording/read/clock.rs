@@ -46,12 +46,17 @@ impl Clock {
             Ok(value) if self.dated && !value.is_nan() => return Err(NotANumber::Unparsable),
             value => value?,
         };
+        Ok(self.take_parsed(value, field))
+    }
+
+    /// A number among numbers, and its text.
+    pub(crate) fn take_parsed(&mut self, value: f64, field: &[u8]) -> f64 {
         let unit = self.unit;
-        Ok(self.take(value, || {
+        self.take(value, || {
             let text = std::str::from_utf8(field.trim_ascii()).ok()?;
             // With an exponent it has no more digits than a double.
             Epoch::of_text(text, unit).or_else(|| Epoch::of_number(value, unit))
-        }))
+        })
     }
 
     fn take_date(&mut self, field: &[u8]) -> Result<f64, NotANumber> {

@@ -116,7 +116,13 @@ impl CsvReader<'_> {
         let mut table = self.layout.table(guess.min(length), Places::Lines(Vec::new()), self.clock.clone());
         let mut lines = Vec::with_capacity(guess.min(length));
         self.taken = 0;
+        let mut values = vec![0.0; self.names.len()];
         while lines.len() < length {
+            if self.push_numbers(rows, &mut values, &mut table)? {
+                lines.push(rows.line);
+                self.take(rows)?;
+                continue;
+            }
             if !rows.advance()? {
                 self.ended = true;
                 break;
@@ -147,13 +153,39 @@ impl CsvReader<'_> {
         Ok(table)
     }
 
+    /// Takes the next line where it consists of numbers; false, and nothing is read, where it does not.
+    fn push_numbers(
+        &self,
+        rows: &mut Rows<'_>,
+        values: &mut [f64],
+        table: &mut Table,
+    ) -> Result<bool, ReadError> {
+        if !self.layout.extra.is_empty() || table.clock.is_dated() {
+            return Ok(false);
+        }
+        let Some(line) = rows.numbers(values)? else { return Ok(false) };
+        for (column, (value, target)) in values.iter().zip(&self.layout.targets).enumerate() {
+            match *target {
+                Target::Known(TIME) => {
+                    let time = table.clock.take_parsed(*value, line.field(column));
+                    table.columns[TIME].push(time);
+                }
+                Target::Known(slot) => table.columns[slot].push(*value),
+                Target::Extra(_) => {}
+            }
+        }
+        Ok(true)
+    }
+
     /// Counts what a row takes in memory, its line included.
     fn take(&mut self, rows: &Rows<'_>) -> Result<(), ReadError> {
         let text = |(field, target): (&[u8], &Target)| match target {
             Target::Extra(_) => field.len(),
             Target::Known(_) => 0,
         };
-        let texts: usize = rows.fields().zip(&self.layout.targets).map(text).sum();
+        let has_texts = !self.layout.extra.is_empty();
+        let texts: usize =
+            if has_texts { rows.fields().zip(&self.layout.targets).map(text).sum() } else { 0 };
         self.taken += (self.layout.row_size() + size_of::<u64>() + texts) as u64;
         if self.taken > self.limit {
             let path = self.path.to_path_buf();
@@ -191,7 +223,8 @@ impl CsvReader<'_> {
         let foreign = |(field, target): (&[u8], &Target)| {
             matches!(target, Target::Extra(_)) && std::str::from_utf8(field).is_err()
         };
-        match rows.fields().zip(&self.layout.targets).any(foreign) {
+        let has_texts = !self.layout.extra.is_empty();
+        match has_texts && rows.fields().zip(&self.layout.targets).any(foreign) {
             true => Err(ReadError::NotUtf8 { path: self.path.to_path_buf(), line: rows.line }),
             false => Ok(()),
         }

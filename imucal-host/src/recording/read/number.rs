@@ -1,6 +1,6 @@
 //! Numbers of a text field.
 
-use std::{fmt::LowerExp, io::Write};
+use std::{fmt::LowerExp, io::Write, ops::Range};
 
 /// Why a field is not a number that a recording may hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,49 +12,16 @@ pub(crate) enum NotANumber {
 }
 
 /// Reads a field; empty and `NaN` give NaN, "not measured". Blanks around it do not count.
-///
-/// Short decimals, which recordings consist of, take a path without the general parser: mantissa and
-/// power of ten are exact in f64 there, so that the one division rounds as the general parser does.
 pub(crate) fn parse(field: &[u8]) -> Result<f64, NotANumber> {
-    match short_decimal(field) {
-        Some(value) => Ok(value),
+    match leading(field).filter(|(_, length)| *length == field.len()) {
+        Some((value, _)) => Ok(value),
         None => general(field.trim_ascii()),
     }
 }
 
-/// The powers of ten that an `f64` holds exactly.
-const POWERS: [f64; 23] = [
-    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18,
-    1e19, 1e20, 1e21, 1e22,
-];
-/// Below it an `f64` has halves.
-const HALVES: f64 = 4_503_599_627_370_496.0;
-
-fn short_decimal(field: &[u8]) -> Option<f64> {
-    let (negative, digits) = match field.split_first()? {
-        (b'-', rest) => (true, rest),
-        _ => (false, field),
-    };
-    // Up to 15 digits stay below 2^53.
-    if digits.is_empty() || digits.len() > 16 {
-        return None;
-    }
-    let mut mantissa: u64 = 0;
-    let mut point = None;
-    for (i, byte) in digits.iter().enumerate() {
-        match byte {
-            b'0'..=b'9' => mantissa = mantissa * 10 + u64::from(byte - b'0'),
-            b'.' if point.is_none() => point = Some(i),
-            _ => return None,
-        }
-    }
-    let decimals = point.map_or(0, |i| digits.len() - 1 - i);
-    let count = digits.len() - usize::from(point.is_some());
-    if count == 0 || count > 15 {
-        return None;
-    }
-    let value = mantissa as f64 / POWERS[decimals];
-    Some(if negative { -value } else { value })
+/// The finite number that a text begins with, and its length.
+pub(crate) fn leading(text: &[u8]) -> Option<(f64, usize)> {
+    fast_float2::parse_partial(text).ok().filter(|(value, _): &(f64, usize)| value.is_finite())
 }
 
 fn general(field: &[u8]) -> Result<f64, NotANumber> {
@@ -68,23 +35,27 @@ fn general(field: &[u8]) -> Result<f64, NotANumber> {
 
 /// The shortest text that reads back as `value`; NaN is the empty field.
 pub(crate) fn print(value: f64, out: &mut Vec<u8>) {
-    print_shortest(value, value.is_nan(), out);
+    print_shortest(value, value, out);
 }
 
 /// The shortest text that reads back as `value` when it is rounded to an `f32`; NaN is the empty field.
 pub(crate) fn print_single(value: f32, out: &mut Vec<u8>) {
-    print_shortest(value, value.is_nan(), out);
+    print_shortest(value, value.into(), out);
 }
 
-fn print_shortest(value: impl zmij::Float + LowerExp, missing: bool, out: &mut Vec<u8>) {
-    if missing {
+/// Sizes that need no power of ten.
+const PLAIN: Range<f64> = 1e-3..1e9;
+
+/// `size` is the same value.
+fn print_shortest(value: impl zmij::Float + LowerExp, size: f64, out: &mut Vec<u8>) {
+    if size.is_nan() {
         return;
     }
     let mut buffer = zmij::Buffer::new();
     let text = buffer.format(value).as_bytes();
     match text {
         // Writing to memory does not fail.
-        _ if text.contains(&b'e') => drop(write!(out, "{value:e}")),
+        _ if !PLAIN.contains(&size.abs()) && text.contains(&b'e') => drop(write!(out, "{value:e}")),
         [whole @ .., b'.', b'0'] => out.extend_from_slice(whole),
         text => out.extend_from_slice(text),
     }
@@ -98,6 +69,14 @@ pub(crate) fn round_to_digits(value: f64, digits: usize) -> f64 {
     round_by_one_product(value, digits)
         .unwrap_or_else(|| format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value))
 }
+
+/// The powers of ten that an `f64` holds exactly.
+const POWERS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18,
+    1e19, 1e20, 1e21, 1e22,
+];
+/// Below it an `f64` has halves.
+const HALVES: f64 = 4_503_599_627_370_496.0;
 
 /// The same, where one product shows the digits: the power of ten is exact, and the product is not near the middle between
 /// two integers, so that its own rounding does not matter.
@@ -174,9 +153,19 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_short_way_rounds_as_the_general_parser(mantissa in -999_999_999_999_999i64..999_999_999_999_999, decimals in 0usize..15) {
-            let text = format!("{:.*}", decimals, mantissa as f64 / 10f64.powi(decimals as i32));
-            prop_assert_eq!(parse(text.as_bytes()), Ok(text.parse::<f64>().unwrap()));
+        fn numbers_are_rounded_as_the_standard_library_rounds_them(
+            mantissa in proptest::num::i64::ANY, decimals in 0usize..20, power in -320i32..300, exponent in proptest::bool::ANY,
+        ) {
+            let digits = format!("{:020}", mantissa.unsigned_abs());
+            let (whole, part) = digits.split_at(20 - decimals);
+            let sign = if mantissa < 0 { "-" } else { "" };
+            let power = if exponent { format!("e{power}") } else { String::new() };
+            let text = format!("{sign}{whole}.{part}{power}");
+            let expected: f64 = text.parse().unwrap();
+            prop_assume!(expected.is_finite());
+            prop_assert_eq!(parse(text.as_bytes()).map(f64::to_bits), Ok(expected.to_bits()));
+            let (read, length) = leading(format!("{text},1").as_bytes()).unwrap();
+            prop_assert_eq!((read.to_bits(), length), (expected.to_bits(), text.len()));
         }
 
         #[test]

@@ -84,6 +84,11 @@ impl<'a> Text<'a> {
         }
     }
 
+    /// The bytes that were consumed last, so many of one [`Text::next`].
+    pub(crate) fn consumed(&self, count: usize) -> &[u8] {
+        &self.chunk[self.left.start - count..self.left.start]
+    }
+
     /// The next line without its end, of a text in which nothing but a line feed ends one; false at the end.
     pub(crate) fn line_into(
         &mut self,
