@@ -14,6 +14,7 @@ use crate::recording::order_statistics::std_of_median;
 use std::ops::Range;
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::{Conventions, Finding, SURE};
@@ -139,7 +140,8 @@ fn normalise(bends: &[Bend], windows: &mut [Window], moves: bool) -> Option<Vect
     if own.len() < WINDOWS / 4 {
         return None;
     }
-    let means: Vec<Vector3<f64>> = own.iter().map(|window| trimmed(&bends[window.bends.clone()])).collect();
+    let means: Vec<Vector3<f64>> =
+        own.par_iter().map(|window| trimmed(&bends[window.bends.clone()])).collect();
     let usual = [0, 1, 2].map(|axis| median(means.iter().map(|mean| mean[axis]).collect()).unwrap_or(0.0));
     let level = |mean: &Vector3<f64>| {
         let shares = usual
