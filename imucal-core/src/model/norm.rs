@@ -43,12 +43,12 @@ struct Shell<T: Scalar> {
     u: Vector3<T>,
     /// |A x| − F.
     outside: T,
-    /// |Aᵀu|: calibrated unit per raw unit along the normal.
-    slope: T,
+    /// 1/|Aᵀu|: raw unit per calibrated unit along the normal.
+    per_slope: T,
     /// Unit normal of the shell in raw axes.
     normal: Vector3<T>,
-    /// |A x|.
-    length: T,
+    /// 1/|A x|.
+    per_length: T,
 }
 
 impl<T: Scalar> Shell<T> {
@@ -57,33 +57,30 @@ impl<T: Scalar> Shell<T> {
         let x = point - triad.bias;
         let y = triad.gain * x;
         let length = y.dot(&y).root();
-        let u = y / length;
+        let per_length = T::one() / length;
+        let u = y * per_length;
         let pulled = triad.gain.tr_mul(&u);
-        let slope = pulled.dot(&pulled).root();
-        Self { x, u, outside: length - norm, slope, normal: pulled / slope, length }
+        let per_slope = T::one() / pulled.dot(&pulled).root();
+        Self { x, u, outside: length - norm, per_slope, normal: pulled * per_slope, per_length }
     }
 
-    /// Derivative of `outside / slope` by the gain's nine entries (rows) and the bias.
+    /// Derivative of `outside · per_slope` by the gain's nine entries (rows) and the bias.
     #[inline]
     fn gradient(&self, gain: &Matrix3<T>) -> SVector<T, ENTRIES> {
-        let per_slope = T::one() / self.slope;
+        let per_slope = self.per_slope;
         let ratio = self.outside * per_slope * per_slope;
         let stretched = gain * self.normal;
         // How the slope changes as u turns: the part of A·normal across u, by |y|.
-        let swing = (stretched - self.u * self.u.dot(&stretched)) / self.length;
+        let swing = (stretched - self.u * self.u.dot(&stretched)) * self.per_length;
         let by_y = self.u * per_slope - swing * ratio;
         let by_bias = -gain.tr_mul(&by_y);
-        let mut all = SVector::<T, ENTRIES>::zeros();
-        let mut slots = all.iter_mut();
-        for (by_y, u) in by_y.iter().zip(self.u.iter()) {
-            for ((x, n), slot) in self.x.iter().zip(self.normal.iter()).zip(&mut slots) {
-                *slot = *by_y * *x - *u * *n * ratio;
-            }
-        }
-        for (by_bias, slot) in by_bias.iter().zip(slots) {
-            *slot = *by_bias;
-        }
-        all
+        let curved = self.u * ratio;
+        let [one, two, three] = [(by_y.x, curved.x), (by_y.y, curved.y), (by_y.z, curved.z)]
+            .map(|(by_y, curved)| self.x * by_y - self.normal * curved);
+        SVector::from([
+            one.x, one.y, one.z, two.x, two.y, two.z, three.x, three.y, three.z, by_bias.x, by_bias.y,
+            by_bias.z,
+        ])
     }
 }
 
@@ -93,7 +90,7 @@ impl<T: Scalar, const P: usize> Model<T, P> for NormModel<'_, T, P> {
         let triad = self.form.triad(theta);
         for point in self.points {
             let shell = Shell::at(&triad, self.norm, &point.value);
-            let residual = shell.outside / shell.slope - point.excess;
+            let residual = shell.outside * shell.per_slope - point.excess;
             let jacobian =
                 if S::JACOBIAN { self.form.select(&shell.gradient(&triad.gain)) } else { SVector::zeros() };
             sink.row(residual, &jacobian);
@@ -115,7 +112,7 @@ pub fn curvature_excess<T: Scalar>(triad: &Triad<T>, norm: T, point: &Vector3<T>
     let shell = Shell::at(triad, norm, point);
     let trace = triad.gain.norm_squared();
     let along = (triad.gain * shell.normal).norm_squared();
-    (trace - along) / (norm * shell.slope) * variance * T::of(0.5)
+    (trace - along) / norm * shell.per_slope * variance * T::of(0.5)
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@
 //! | d, r_j | row k of the factor, its diagonal first |
 //! | a, a_j | columns k and j of the panel |
 //!
-//! The factor is that of [`Triangular`] but for rounding, its diagonal not negative either. A panel takes (P + 1) · `ROWS` numbers; its
+//! The factor is that of [`Triangular`] but for rounding, its diagonal not negative either. A panel takes (P + 1) · 32 numbers; its
 //! loops run over neighbours in memory, so that a processor with vector registers does several rows at once. Sums are in a fixed order.
 //! A device has few rows, and little memory: there, and wherever the host computes as the device does, [`Scalar::PANELS`] is false and
 //! rows are rotated in one by one. Source: Golub & Van Loan, *Matrix Computations*, 5.1 and 5.2.
@@ -40,12 +40,11 @@ pub fn triangularise<T: Scalar, const P: usize>(
     }
 }
 
-/// Rows of a panel.
-const ROWS: usize = 32;
-/// Sums that are added up next to each other.
+/// Rows that are added up next to each other, and how many times as many a panel has.
 const LANES: usize = 8;
+const PARTS: usize = 4;
 
-type Column<T> = [T; ROWS];
+type Column<T> = [[T; LANES]; PARTS];
 
 /// Gathers rows, and takes them into a factor whenever a panel is full and at its end.
 #[derive(Debug)]
@@ -59,26 +58,29 @@ pub(super) struct Panel<'a, T: Scalar, const P: usize> {
 impl<'a, T: Scalar, const P: usize> Panel<'a, T, P> {
     /// An empty panel on top of a factor.
     pub(super) fn new(factor: &'a mut Triangular<T, P>) -> Self {
-        Self { factor, columns: [[T::zero(); ROWS]; P], residuals: [T::zero(); ROWS], filled: 0 }
+        let empty = [[T::zero(); LANES]; PARTS];
+        Self { factor, columns: [empty; P], residuals: empty, filled: 0 }
     }
 
     /// Takes in what is left.
     pub(super) fn end(mut self) {
         for column in self.columns.iter_mut().chain(core::iter::once(&mut self.residuals)) {
-            column.iter_mut().skip(self.filled).for_each(|entry| *entry = T::zero());
+            column.as_flattened_mut().iter_mut().skip(self.filled).for_each(|entry| *entry = T::zero());
         }
         self.reflect();
     }
 
     fn reflect(&mut self) {
+        // Parts that no row is in say nothing.
+        let parts = self.filled.div_ceil(LANES);
         let (r, q, squared_sum) = self.factor.parts();
-        for residual in &self.residuals {
+        for residual in self.residuals.as_flattened() {
             *squared_sum += *residual * *residual;
         }
         let mut columns = self.columns.as_mut_slice();
         for (k, q_k) in q.iter_mut().enumerate() {
             let Some((column, others)) = columns.split_first_mut() else { return };
-            reflect_column(r, k, (column, others), (q_k, &mut self.residuals));
+            reflect_column(r, k, (column, others), (q_k, &mut self.residuals), parts);
             columns = others;
         }
         self.filled = 0;
@@ -90,34 +92,35 @@ impl<T: Scalar, const P: usize> RowSink<T, P> for Panel<'_, T, P> {
 
     #[inline]
     fn row(&mut self, residual: T, jacobian: &SVector<T, P>) {
-        for (column, value) in self.columns.iter_mut().zip(jacobian.iter()) {
-            if let Some(entry) = column.get_mut(self.filled) {
-                *entry = *value;
+        let (part, lane) = (self.filled / LANES, self.filled % LANES);
+        let entry = |column: &mut Column<T>, value: T| {
+            if let Some(entry) = column.get_mut(part).and_then(|part| part.get_mut(lane)) {
+                *entry = value;
             }
-        }
-        if let Some(entry) = self.residuals.get_mut(self.filled) {
-            *entry = residual;
-        }
+        };
+        self.columns.iter_mut().zip(jacobian.iter()).for_each(|(column, value)| entry(column, *value));
+        entry(&mut self.residuals, residual);
         self.filled += 1;
-        if self.filled == ROWS {
+        if self.filled == LANES * PARTS {
             self.reflect();
         }
     }
 }
 
-/// Eliminates a column of the panel against row k of the factor.
+/// Eliminates a column of the panel, so many parts of it, against row k of the factor.
 #[inline]
 fn reflect_column<T: Scalar>(
     r: &mut [T],
     k: usize,
-    (column, others): (&mut Column<T>, &mut [Column<T>]),
+    (column, others): (&Column<T>, &mut [Column<T>]),
     (q_k, residuals): (&mut T, &mut Column<T>),
+    parts: usize,
 ) {
     let size = k + 1 + others.len();
     // Row k of R from its diagonal on.
     let mut above = r.iter_mut().skip(k * size + k).step_by(size);
     let Some(diagonal) = above.next() else { return };
-    let square = product(column, column);
+    let square = product(column, column, parts);
     let length = (*diagonal * *diagonal + square).root();
     // Nothing to eliminate, or all squares underflowed: below every rounding here.
     if square == T::zero() || length == T::zero() {
@@ -126,22 +129,28 @@ fn reflect_column<T: Scalar>(
     let beta = -length;
     let per_head = T::one() / (*diagonal - beta);
     let tau = (beta - *diagonal) / beta;
-    column.iter_mut().for_each(|entry| *entry *= per_head);
+    // A copy: nothing that is written below can be in it, so that loops take several rows at once.
+    let mut v = [[T::zero(); LANES]; PARTS];
+    for (v, column) in v.iter_mut().zip(column).take(parts) {
+        v.iter_mut().zip(column).for_each(|(v, entry)| *v = *entry * per_head);
+    }
     // With the row's sign changed, so that its diagonal stays positive.
     *diagonal = length;
     let below = others.iter_mut().chain(core::iter::once(residuals));
     for (above, below) in above.chain(core::iter::once(q_k)).zip(below) {
-        let part = tau * (*above + product(column, below));
-        *above = part - *above;
-        below.iter_mut().zip(column.iter()).for_each(|(entry, v)| *entry -= part * *v);
+        let share = tau * (*above + product(&v, below, parts));
+        *above = share - *above;
+        for (below, v) in below.iter_mut().zip(&v).take(parts) {
+            below.iter_mut().zip(v).for_each(|(entry, v)| *entry -= share * *v);
+        }
     }
 }
 
-/// x · y, summed in [`LANES`] parts.
+/// x · y over so many parts, summed by lanes.
 #[inline]
-fn product<T: Scalar>(x: &Column<T>, y: &Column<T>) -> T {
+fn product<T: Scalar>(x: &Column<T>, y: &Column<T>, parts: usize) -> T {
     let mut sums = [T::zero(); LANES];
-    for (x, y) in x.chunks_exact(LANES).zip(y.chunks_exact(LANES)) {
+    for (x, y) in x.iter().zip(y).take(parts) {
         for ((sum, x), y) in sums.iter_mut().zip(x).zip(y) {
             *sum += *x * *y;
         }
