@@ -19,7 +19,7 @@ use super::{
     gimbal::{Pose, direction, pose},
     place::Place,
     recent::{Recent, nearest},
-    swing_fit::{SwingFit, swing, window},
+    swing_fit::{Readings, SwingFit, window},
     truth::{Motion, Recorded, at_pose, on_rig},
 };
 use crate::{
@@ -256,12 +256,13 @@ fn swings(
     let interval = (time[time.len() - 1] - time[0]) / (time.len().max(2) - 1) as f64;
     // What hardly moves does so slowly: more readings give its rate.
     let patient = ((WINDOW / interval).round() as usize).max(reach);
+    let readings = Readings::new(time, angles);
     let of = |row: usize| {
         if !moving[row] {
-            return (swing(time, angles, row, patient), false);
+            return (readings.swing(row, patient), false);
         }
         let (narrow, wide) = (window(time.len(), row, reach), window(time.len(), row, reach + 1));
-        let mut fit = SwingFit::of(time, angles, row, narrow.clone());
+        let mut fit = SwingFit::of(&readings, row, narrow.clone());
         let near = fit.swing();
         (wide.start..narrow.start).chain(narrow.end..wide.end).for_each(|k| fit.add(k));
         let wide = fit.swing();
