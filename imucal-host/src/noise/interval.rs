@@ -286,8 +286,24 @@ fn upper_point(spreads: &[(f64, f64)], distribution: &impl ContinuousCDF<f64, f6
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+
+    /// Whitens, and carries, as V₀ and V₁ written out do.
+    pub fn assert_is_as_written_out(of: &dyn Whitening, [first, second]: &[DMatrix<f64>; 2]) {
+        let x = DMatrix::from_fn(first.nrows(), 3, |i, k| ((i * 3 + 7 * k) as f64).sin());
+        for ratio in [0.0, 1e-3, 1.0, 40.0] {
+            let factor = (first + second * ratio).cholesky().unwrap();
+            let ([one, other], log) = of.whitened(ratio, [x.clone(), x.columns(0, 1).into_owned()]).unwrap();
+            let expected = x.tr_mul(&factor.solve(&x));
+            assert!((one.tr_mul(&one) - &expected).amax() < 1e-11 * expected.amax(), "{ratio}");
+            assert!((other.tr_mul(&one) - expected.rows(0, 1)).amax() < 1e-11 * expected.amax(), "{ratio}");
+            assert!((log - factor.ln_determinant()).abs() < 1e-11, "{ratio}");
+        }
+        for (found, part) in of.carried(&x).iter().zip([first, second]) {
+            assert!((found - x.tr_mul(&(part * &x))).amax() < 1e-12);
+        }
+    }
     use crate::simulator::random::{Purpose, Random};
 
     /// The share of means of `count` numbers, `step` of drift in them, whose 95 % interval holds.

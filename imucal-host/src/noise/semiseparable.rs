@@ -154,7 +154,10 @@ impl Whitening for Semiseparable {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::flicker, *};
+    use super::{
+        super::{flicker, interval::tests::assert_is_as_written_out},
+        *,
+    };
 
     /// Means of two chains, out of order in their rows.
     fn means() -> Semiseparable {
@@ -188,26 +191,9 @@ mod tests {
     }
 
     #[test]
-    fn products_and_determinant_are_those_of_the_matrix_written_out() {
-        let (means, x) = (means(), DMatrix::from_fn(10, 3, |i, k| ((i * 3 + 7 * k) as f64).sin()));
-        let [white, drift] = dense(&means);
-        for ratio in [0.0, 1e-3, 1.0, 40.0] {
-            let factor = (&white + &drift * ratio).cholesky().unwrap();
-            let ([one, other], log) =
-                means.whitened(ratio, [x.clone(), x.columns(0, 1).into_owned()]).unwrap();
-            let expected = x.tr_mul(&factor.solve(&x));
-            assert!((one.tr_mul(&one) - &expected).amax() < 1e-11 * expected.amax(), "{ratio}");
-            assert!((other.tr_mul(&one) - expected.rows(0, 1)).amax() < 1e-11 * expected.amax(), "{ratio}");
-            assert!((log - factor.ln_determinant()).abs() < 1e-11, "{ratio}");
-        }
-    }
-
-    #[test]
-    fn what_is_carried_is_that_of_the_matrix_written_out() {
-        let (means, x) = (means(), DMatrix::from_fn(10, 3, |i, k| ((i * 3 + 7 * k) as f64).cos()));
-        for (found, part) in means.carried(&x).iter().zip(dense(&means)) {
-            assert!((found - x.tr_mul(&(&part * &x))).amax() < 1e-12);
-        }
+    fn whitening_and_what_is_carried_are_those_of_the_matrix_written_out() {
+        let means = means();
+        assert_is_as_written_out(&means, &dense(&means));
     }
 
     #[test]

@@ -165,7 +165,7 @@ fn places(rows: &[Row], order: &[usize], spans: usize) -> Vec<Option<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::interval::tests::assert_is_as_written_out, *};
 
     /// Rows between neighbouring spans, one of a span alone, and one that goes back by several; out of order.
     fn rows() -> StateSpace {
@@ -223,28 +223,9 @@ mod tests {
     }
 
     #[test]
-    fn products_and_determinant_are_those_of_the_matrix_written_out() {
+    fn whitening_and_what_is_carried_are_those_of_the_matrix_written_out() {
         let rows = rows();
-        let x = DMatrix::from_fn(rows.rows.len(), 3, |i, k| ((i * 3 + 7 * k) as f64).sin());
-        let [first, second] = dense(&rows);
-        for ratio in [0.0, 1e-3, 1.0, 40.0] {
-            let factor = (&first + &second * ratio).cholesky().unwrap();
-            let ([one, other], log) =
-                rows.whitened(ratio, [x.clone(), x.columns(0, 1).into_owned()]).unwrap();
-            let expected = x.tr_mul(&factor.solve(&x));
-            assert!((one.tr_mul(&one) - &expected).amax() < 1e-10 * expected.amax(), "{ratio}");
-            assert!((other.tr_mul(&one) - expected.rows(0, 1)).amax() < 1e-10 * expected.amax(), "{ratio}");
-            assert!((log - factor.ln_determinant()).abs() < 1e-10, "{ratio}");
-        }
-    }
-
-    #[test]
-    fn what_is_carried_is_that_of_the_matrix_written_out() {
-        let rows = rows();
-        let x = DMatrix::from_fn(rows.rows.len(), 3, |i, k| ((i * 3 + 7 * k) as f64).cos());
-        for (found, part) in rows.carried(&x).iter().zip(dense(&rows)) {
-            assert!((found - x.tr_mul(&(&part * &x))).amax() < 1e-12);
-        }
+        assert_is_as_written_out(&rows, &dense(&rows));
     }
 
     #[test]

@@ -183,3 +183,56 @@ fn follow_rates(row: &mut Row, turn: &Linear, which: usize, directions: &Directi
 pub fn fixed(errors: &Errors) -> SMatrix<f64, 9, 9> {
     SMatrix::from_fn(|i, j| errors.covariance[(i, j)])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::{Noise, interval::Whitening};
+
+    fn turn(rests: (usize, usize), seed: f64) -> Linear {
+        let by = |k: f64| MatrixXx3::from_fn(2, |i, j| (seed + k + (3 * i + j) as f64).sin());
+        Linear {
+            rests,
+            duration: 2.0 + seed,
+            residual: [0.0; 2],
+            by_gain: DMatrix::zeros(2, 9),
+            by_bias: by(0.0),
+            by_before: by(1.0),
+            by_after: by(2.0),
+        }
+    }
+
+    #[test]
+    fn rates_err_by_turn_by_the_bias_and_by_the_rests_that_turns_share() {
+        let directions = Directions {
+            triad: Triad::identity(),
+            covariance: DMatrix::zeros(0, 0),
+            covariance_of: Vec::new(),
+            means: vec![Vector3::z(); 3],
+            spans: (0..3).map(|k| 10.0 * f64::from(k)).map(|from| from..from + 4.0).collect(),
+            noise: Noise { density: Vector3::repeat(1.0), white: 1.0, drift: 0.0 },
+        };
+        let turns = [turn((0, 1), 0.0), turn((1, 2), 5.0)];
+        for interpolated in [false, true] {
+            let rates = RateNoise { density: 0.2, bias: Vector3::new(0.1, 0.4, 0.3), interpolated };
+            let mut rows = directions.rows(4, &[]);
+            for (k, row) in rows.iter_mut().enumerate() {
+                follow_rates(row, &turns[k / 2], k % 2, &directions, &rates);
+            }
+            let noise = directions
+                .noise_of(rows, DMatrix::from_diagonal(&DVector::from_column_slice(&[0.1, 0.4, 0.3])));
+            let [_, found] = noise.carried(&DMatrix::identity(4, 4));
+            let expected = DMatrix::from_fn(4, 4, |i, j| {
+                let (one, other) = (&turns[i / 2], &turns[j / 2]);
+                let [by, by_other] =
+                    [(one, i), (other, j)].map(|(turn, k)| turn.by_bias.row(k % 2).transpose());
+                // One rest of each turn is the other's too; each has half of the bias' error, over 4 s.
+                let shared = if i / 2 == j / 2 { 2.0 } else { 1.0 };
+                let of_rests = if interpolated { shared * 0.25 * 0.2 / 4.0 * by.dot(&by_other) } else { 0.0 };
+                let own = if i == j { 0.2 * one.duration } else { 0.0 };
+                own + by.component_mul(&rates.bias).dot(&by_other) + of_rests
+            });
+            assert!((found - expected).amax() < 1e-14, "{interpolated}");
+        }
+    }
+}

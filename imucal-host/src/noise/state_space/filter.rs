@@ -11,8 +11,9 @@ pub(super) struct Filter<'a> {
     ratio: f64,
     covariance: DMatrix<f64>,
     states: [DMatrix<f64>; 2],
-    /// End of the last span that was entered, and the one after it.
+    /// End of the last span that was entered, s.
     time: f64,
+    /// Index of the span that is looked at next.
     next: usize,
 }
 
