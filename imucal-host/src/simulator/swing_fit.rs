@@ -27,6 +27,7 @@ const LONG: usize = 3 * BLOCK;
 /// Powers of times whose sums a cubic needs, and those that are multiplied with angles.
 const POWERS: usize = 7;
 const TERMS: usize = 4;
+
 /// Readings of three encoders, rad, in the order of time, s, and sums over blocks of them.
 pub(super) struct Readings<'a> {
     time: &'a [f64],

@@ -153,6 +153,11 @@ impl CsvReader<'_> {
         Ok(table)
     }
 
+    /// Unknown columns are kept as text.
+    fn has_texts(&self) -> bool {
+        !self.layout.extra.is_empty()
+    }
+
     /// Takes the next line where it consists of numbers; false, and nothing is read, where it does not.
     fn push_numbers(
         &self,
@@ -160,7 +165,7 @@ impl CsvReader<'_> {
         values: &mut [f64],
         table: &mut Table,
     ) -> Result<bool, ReadError> {
-        if !self.layout.extra.is_empty() || table.clock.is_dated() {
+        if self.has_texts() || table.clock.is_dated() {
             return Ok(false);
         }
         let Some(line) = rows.numbers(values)? else { return Ok(false) };
@@ -183,9 +188,8 @@ impl CsvReader<'_> {
             Target::Extra(_) => field.len(),
             Target::Known(_) => 0,
         };
-        let has_texts = !self.layout.extra.is_empty();
-        let texts: usize =
-            if has_texts { rows.fields().zip(&self.layout.targets).map(text).sum() } else { 0 };
+        let texts =
+            if self.has_texts() { rows.fields().zip(&self.layout.targets).map(text).sum() } else { 0 };
         self.taken += (self.layout.row_size() + size_of::<u64>() + texts) as u64;
         if self.taken > self.limit {
             let path = self.path.to_path_buf();
@@ -223,8 +227,7 @@ impl CsvReader<'_> {
         let foreign = |(field, target): (&[u8], &Target)| {
             matches!(target, Target::Extra(_)) && std::str::from_utf8(field).is_err()
         };
-        let has_texts = !self.layout.extra.is_empty();
-        match has_texts && rows.fields().zip(&self.layout.targets).any(foreign) {
+        match self.has_texts() && rows.fields().zip(&self.layout.targets).any(foreign) {
             true => Err(ReadError::NotUtf8 { path: self.path.to_path_buf(), line: rows.line }),
             false => Ok(()),
         }
