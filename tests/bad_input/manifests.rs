@@ -34,7 +34,12 @@ fn a_misspelt_key_is_told_with_the_one_meant() {
     let mut bad = Bad::new();
     bad.manifest("[units]", "[unit]");
     // Then the samples cannot be understood either, and both are told.
-    bad.calibrate().with(2).telling(&["small.csv, sensor acc", "small.toml, line", "`unit`", "`units`"]);
+    bad.calibrate().with(2).telling(&[
+        "small.csv, from line 2 on, sensor acc",
+        "small.toml, line",
+        "`unit`",
+        "`units`",
+    ]);
 }
 
 #[test]

@@ -54,7 +54,12 @@ fn a_gap_is_reported_and_the_rest_calibrates() {
 fn times_in_another_unit_than_the_manifest_says_are_noticed() {
     let mut bad = Bad::new();
     bad.map(TIME, |t| (t * 1e6).round());
-    bad.calibrate().with(2).telling(&["small.csv, column `t`", "median interval", "t = \"us\"", "[units]"]);
+    bad.calibrate().with(2).telling(&[
+        "small.csv, from line 2 on, column `t`",
+        "median interval",
+        "t = \"us\"",
+        "[units]",
+    ]);
 }
 
 #[test]
@@ -63,7 +68,11 @@ fn times_that_nothing_samples_at_are_refused() {
         let mut bad = Bad::new();
         bad.rows.truncate(60);
         bad.map(TIME, |t| t * interval);
-        bad.calibrate().with(2).telling(&["small.csv, column `t`", "median interval", "correct the times"]);
+        bad.calibrate().with(2).telling(&[
+            "small.csv, from line 2 on, column `t`",
+            "median interval",
+            "correct the times",
+        ]);
     }
 }
 

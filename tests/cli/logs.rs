@@ -235,7 +235,7 @@ fn another_definition_an_unknown_container_and_options_of_other_files_are_bad_us
     folder.run("calibrate run.mcap --map acc=x,y,z").with(2).telling(&["--map", "choose topics"]);
     folder.run("calibrate run.mcap --topic /imu/data").with(2).telling(&["such as imu=/imu/data"]);
     folder.run("calibrate run.mcap --max-size 20K").with(2).telling(&["20 KiB", "--max-size"]);
-    folder.run("import rows.csv --out made.mcap").with(2).telling(&[".mcap", "expected .csv"]);
+    folder.run("import rows.csv --out made.db3").with(2).telling(&["`.db3`", "expected .csv"]);
 }
 
 #[test]
@@ -319,6 +319,38 @@ fn apply_noise_and_diagnose_take_logs_and_a_simulator_s_topic_of_the_same_one() 
             .fold(folder.text(name), |text, other| text.replace(other, "NAME"))
     };
     assert_eq!(nameless("log.json"), nameless("rows.json"));
+}
+
+#[test]
+fn calibrated_data_are_written_as_a_log_that_has_the_numbers_of_csv() {
+    let folder = folder();
+    folder.run("calibrate rows.csv --out cal.toml").with(0);
+    let apply =
+        |out: &str| folder.run(&format!("apply run.mcap --calibration cal.toml {TOPICS} --out {out}"));
+    apply("si.csv").with(0);
+    apply("log.mcap").with(0).printing(&["log.mcap"]);
+    assert!(folder.text("log.toml").contains("[site]") && !folder.text("log.toml").contains("[units]"));
+    folder
+        .run("import log.mcap --out back.csv")
+        .with(0)
+        .telling(&["took /imu/data_raw (sensor_msgs/msg/Imu"]);
+    let [si, back] = ["si.csv", "back.csv"].map(|name| folder.text(name));
+    assert!(si.lines().count() > 1000 && si.lines().count() == back.lines().count());
+    for (a, b) in si.lines().zip(back.lines()).skip(1) {
+        let of = |line: &str| -> Vec<f64> {
+            line.split(',').map(|field| field.parse().unwrap_or(f64::NAN)).collect()
+        };
+        let (a, b) = (of(a), of(b));
+        assert_eq!(a.len(), b.len());
+        // The field went to T and back.
+        let same = |(a, b): (&f64, &f64)| (a.is_nan() && b.is_nan()) || *a as f32 == *b as f32;
+        assert!(a.iter().zip(&b).all(same), "{a:?} {b:?}");
+    }
+    let said = ["less.mcap: left out `note`", "write CSV"];
+    let rows = folder.text("rows.csv").lines().fold(String::new(), |text, line| text + line + ",note\n");
+    folder.write("noted.csv", rows);
+    folder.write("noted.toml", folder.bytes("rows.toml"));
+    folder.run("apply noted.csv --calibration cal.toml --out less.mcap").with(0).telling(&said);
 }
 
 /// Rows of six numbers in SI as messages of a topic.

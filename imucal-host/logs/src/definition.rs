@@ -51,6 +51,11 @@ impl MessageType {
         }
     }
 
+    /// Its name in ROS 2.
+    pub(crate) fn name_in_ros2(self) -> String {
+        self.name().replace('/', "/msg/")
+    }
+
     /// Sum of its definition in ROS 1.
     fn md5(self) -> &'static str {
         match self {
@@ -94,28 +99,61 @@ impl MessageType {
     }
 }
 
-/// The types that those above use.
+/// The types that those above use, by their names in ROS 1.
 const USED: [(&str, &str); 7] = [
-    ("Vector3", "float64 x\nfloat64 y\nfloat64 z"),
-    ("Point", "float64 x\nfloat64 y\nfloat64 z"),
-    ("Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w"),
-    ("Pose", "Point position\nQuaternion orientation"),
-    ("PoseWithCovariance", "Pose pose\nfloat64[36] covariance"),
-    ("Twist", "Vector3 linear\nVector3 angular"),
-    ("TwistWithCovariance", "Twist twist\nfloat64[36] covariance"),
+    ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z"),
+    ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z"),
+    ("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w"),
+    ("geometry_msgs/Pose", "Point position\nQuaternion orientation"),
+    ("geometry_msgs/PoseWithCovariance", "Pose pose\nfloat64[36] covariance"),
+    ("geometry_msgs/Twist", "Vector3 linear\nVector3 angular"),
+    ("geometry_msgs/TwistWithCovariance", "Twist twist\nfloat64[36] covariance"),
 ];
-const TIME: (&str, &str) = ("Time", "int32 sec\nuint32 nanosec");
+const TIME: (&str, &str) = ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec");
+/// What separates a definition from one that it uses.
+const RULE: &str = "================================================================================";
 
 fn header(encoding: Encoding) -> (&'static str, &'static str) {
-    match encoding {
-        Encoding::Ros1 => ("Header", "uint32 seq\ntime stamp\nstring frame_id"),
-        Encoding::Cdr => ("Header", "builtin_interfaces/Time stamp\nstring frame_id"),
+    let definition = match encoding {
+        Encoding::Ros1 => "uint32 seq\ntime stamp\nstring frame_id",
+        Encoding::Cdr => "builtin_interfaces/Time stamp\nstring frame_id",
+    };
+    ("std_msgs/Header", definition)
+}
+
+/// The types that messages of an encoding use, each by the last part of its name.
+fn used(encoding: Encoding) -> impl Iterator<Item = (&'static str, (&'static str, &'static str))> {
+    let all = USED.into_iter().chain([TIME, header(encoding)]);
+    all.map(|(name, definition)| (last(name), (name, definition)))
+}
+
+/// The last part of a type's name.
+fn last(name: &str) -> &str {
+    name.rsplit('/').next().unwrap_or(name)
+}
+
+/// The definition of a type in CDR and of all those that it uses, in the language `ros2msg`.
+pub(crate) fn text(known: MessageType) -> String {
+    let used: BTreeMap<_, _> = used(Encoding::Cdr).collect();
+    let mut parts = vec![("", known.definition())];
+    let mut at = 0;
+    while let Some((_, definition)) = parts.get(at).copied() {
+        let of_line = |line: &str| used.get(last(line.split_whitespace().next()?)).copied();
+        for part in definition.lines().filter_map(of_line) {
+            if !parts.contains(&part) {
+                parts.push(part);
+            }
+        }
+        at += 1;
     }
+    let trimmed = |text: &str| text.lines().map(|line| format!("{}\n", line.trim())).collect::<String>();
+    let used = |(name, text): &(&str, &str)| format!("{RULE}\nMSG: {name}\n{}", trimmed(text));
+    trimmed(known.definition()) + &parts.iter().skip(1).map(used).collect::<String>()
 }
 
 /// Whether a log's definition is that of a type, as messages of an encoding have it; an error names the first difference.
 pub(crate) fn check(known: MessageType, encoding: Encoding, definition: &str) -> Result<(), Refusal> {
-    let used = USED.into_iter().chain([TIME, header(encoding)]).collect();
+    let used = used(encoding).map(|(name, (_, definition))| (name, definition)).collect();
     let expected = fields(known.definition(), &used);
     let (main, used) = parts(definition);
     let found = fields(main, &used);
@@ -148,9 +186,9 @@ pub(crate) fn check_sum(known: MessageType, md5: &str) -> Result<(), Refusal> {
 fn parts(definition: &str) -> (&str, BTreeMap<&str, &str>) {
     let mut sections = definition.split("\nMSG:");
     let main = sections.next().unwrap_or_default();
-    let named = sections.filter_map(|section| {
+    let named = sections.map(|section| {
         let (name, body) = section.split_once('\n').unwrap_or((section, ""));
-        Some((name.trim().rsplit('/').next()?, body))
+        (last(name.trim()), body)
     });
     (main, named.collect())
 }
@@ -174,7 +212,7 @@ fn flatten(definition: &str, used: &BTreeMap<&str, &str>, path: &str, depth: usi
             return;
         }
         let name = format!("{path}{name}");
-        match used.get(kind.rsplit('/').next().unwrap_or(kind)) {
+        match used.get(last(kind)) {
             Some(inner) if depth < DEEPEST => {
                 flatten(inner, used, &format!("{name}."), depth + 1, all);
             }
@@ -241,6 +279,19 @@ mod tests {
         // ROS 1's header in a message of ROS 2.
         let error = check(MessageType::Imu, Encoding::Cdr, IMU).unwrap_err().to_string();
         assert!(error.contains("`uint32 header.seq` where `int32 header.stamp.sec`"), "{error}");
+    }
+
+    #[test]
+    fn a_definition_that_is_written_is_the_one_that_is_read() {
+        for known in MessageType::ALL {
+            assert_eq!(check(known, Encoding::Cdr, &text(known)), Ok(()), "{}", text(known));
+        }
+        let field = text(MessageType::MagneticField);
+        assert!(
+            field.starts_with("std_msgs/Header header\ngeometry_msgs/Vector3 magnetic_field\n"),
+            "{field}"
+        );
+        assert_eq!(field.matches("\nMSG: ").count(), 3, "{field}");
     }
 
     #[test]

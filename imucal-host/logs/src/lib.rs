@@ -27,6 +27,8 @@
 //! the header, and a crate for each would be two ways to say what six messages are. Bags are read here too, since the crate
 //! `rosbag` maps the whole file, which a bag that was cut does not survive.
 //!
+//! [`LogWriter`] writes the same messages, as ROS 2 has them, into MCAP.
+//!
 //! Not read: messages that IDL defines, and parameter lists and delimited types of XCDR.
 
 #![forbid(unsafe_code)]
@@ -60,9 +62,12 @@ mod order;
 
 mod log;
 
+mod log_writer;
+
 pub use self::{
     error::LogError,
     log::{Log, Reading, Stream, Topic},
+    log_writer::{LogWriteError, LogWriter, TopicId},
     message::Kind,
     place::Place,
     split::{files_of, is_bag_folder},

@@ -2,7 +2,7 @@
 
 use crate::{
     definition::MessageType,
-    wire::{Encoding, Wire, WireFault},
+    wire::{Cdr, Encoding, Wire, WireFault},
 };
 
 const PER_S: i64 = 1_000_000_000;
@@ -34,6 +34,16 @@ impl Kind {
 }
 
 impl MessageType {
+    /// The message that is written of a kind.
+    pub(crate) fn written(kind: Kind) -> Self {
+        match kind {
+            Kind::Imu => Self::Imu,
+            Kind::MagneticField => Self::MagneticField,
+            Kind::Temperature => Self::Temperature,
+            Kind::Pose => Self::PoseStamped,
+        }
+    }
+
     pub(crate) fn kind(self) -> Kind {
         match self {
             Self::Imu => Kind::Imu,
@@ -88,6 +98,37 @@ pub(crate) fn decode(known: MessageType, encoding: Encoding, data: &[u8]) -> Res
     };
     wire.end()?;
     Ok(Decoded { stamp_ns, frame, child, values })
+}
+
+/// A message in CDR of numbers as [`Kind::columns`] has them; none where they are not so many, or no message has the stamp.
+/// What is NaN as a whole is said to be unknown.
+pub(crate) fn encode(kind: Kind, stamp_ns: i64, frame: &str, values: &[f64]) -> Option<Vec<u8>> {
+    let mut cdr = Cdr::new();
+    cdr.u32(i32::try_from(stamp_ns.div_euclid(PER_S)).ok()?.cast_unsigned());
+    cdr.u32(u32::try_from(stamp_ns.rem_euclid(PER_S)).ok()?);
+    cdr.text(frame);
+    match (kind, values) {
+        (Kind::Imu, [a_x, a_y, a_z, w_x, w_y, w_z, q_w, q_x, q_y, q_z]) => {
+            put_known(&mut cdr, &[*q_x, *q_y, *q_z, *q_w]);
+            put_known(&mut cdr, &[*w_x, *w_y, *w_z]);
+            put_known(&mut cdr, &[*a_x, *a_y, *a_z]);
+        }
+        (Kind::MagneticField, [_, _, _]) => put_known(&mut cdr, values),
+        (Kind::Temperature, [temperature]) => cdr.f64s(&[*temperature, 0.0]),
+        (Kind::Pose, [p_x, p_y, p_z, q_w, q_x, q_y, q_z]) => {
+            cdr.f64s(&[*p_x, *p_y, *p_z, *q_x, *q_y, *q_z, *q_w]);
+        }
+        _ => return None,
+    }
+    Some(cdr.bytes())
+}
+
+/// Numbers with a covariance of zeros, which is an unknown one, or of a measurement that there is not.
+fn put_known(cdr: &mut Cdr, values: &[f64]) {
+    let known = !values.iter().all(|value| value.is_nan());
+    values.iter().for_each(|value| cdr.f64s(&[if known { *value } else { 0.0 }]));
+    cdr.f64s(&[if known { 0.0 } else { -1.0 }]);
+    cdr.f64s(&[0.0; 8]);
 }
 
 fn stamp(wire: &mut Wire<'_>) -> Result<i64, WireFault> {
@@ -166,6 +207,33 @@ mod tests {
         let found = imu_of([0.1, 0.2, 0.3, 0.9], [0.0; 3]);
         assert_eq!(found, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.9, 0.1, 0.2, 0.3]);
         assert_eq!(found.len(), Kind::Imu.columns().len());
+    }
+
+    #[test]
+    fn what_is_written_is_read_and_what_is_nan_as_a_whole_is_unknown() {
+        let nan = f64::NAN;
+        let all: [(Kind, &[f64]); 5] = [
+            (Kind::Imu, &[1.0, nan, 3.0, 4.0, 5.0, 6.0, 0.5, -0.5, 0.5, -0.5]),
+            (Kind::Imu, &[nan, nan, nan, 4.0, 5.0, 6.0, nan, nan, nan, nan]),
+            (Kind::MagneticField, &[1e-5, 2e-5, -3e-5]),
+            (Kind::Temperature, &[21.5]),
+            (Kind::Pose, &[1.0, 2.0, 3.0, 0.5, -0.5, 0.5, -0.5]),
+        ];
+        for (kind, values) in all {
+            // Frames of several lengths pad the numbers after them.
+            for (stamp, frame) in
+                [(0, ""), (5_000_000_007, "imu"), (i64::from(i32::MAX) * PER_S, "imu_link_ned")]
+            {
+                let bytes = encode(kind, stamp, frame, values).unwrap();
+                let found = decode(MessageType::written(kind), Encoding::Cdr, &bytes).unwrap();
+                assert_eq!((found.stamp_ns, found.frame), (stamp, frame));
+                let same = |(a, b): (&f64, &f64)| a == b || (a.is_nan() && b.is_nan());
+                assert_eq!(found.values.len(), values.len());
+                assert!(found.values.iter().zip(values).all(same), "{:?} {values:?}", found.values);
+            }
+            assert_eq!(encode(kind, 0, "", &[]), None);
+            assert_eq!(encode(kind, (i64::from(i32::MAX) + 1) * PER_S, "", values), None);
+        }
     }
 
     #[test]

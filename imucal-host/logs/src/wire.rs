@@ -21,6 +21,45 @@ pub(crate) struct Wire<'a> {
     encoding: Encoding,
 }
 
+/// A message under way in CDR, its numbers little-endian.
+#[derive(Debug)]
+pub(crate) struct Cdr {
+    bytes: Vec<u8>,
+}
+
+impl Cdr {
+    const HEAD: [u8; 4] = [0, 1, 0, 0];
+
+    pub(crate) fn new() -> Self {
+        Self { bytes: Self::HEAD.to_vec() }
+    }
+
+    fn put<const N: usize>(&mut self, number: [u8; N]) {
+        let body = self.bytes.len() - Self::HEAD.len();
+        self.bytes.resize(Self::HEAD.len() + body.next_multiple_of(N), 0);
+        self.bytes.extend(number);
+    }
+
+    pub(crate) fn u32(&mut self, value: u32) {
+        self.put(value.to_le_bytes());
+    }
+
+    pub(crate) fn f64s(&mut self, values: &[f64]) {
+        values.iter().for_each(|value| self.put(value.to_le_bytes()));
+    }
+
+    /// A text shorter than 4 GiB.
+    pub(crate) fn text(&mut self, text: &str) {
+        self.u32(u32::try_from(text.len() + 1).unwrap_or(u32::MAX));
+        self.bytes.extend(text.as_bytes());
+        self.bytes.push(0);
+    }
+
+    pub(crate) fn bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+}
+
 /// What is wrong with a message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct WireFault {

@@ -6,12 +6,13 @@ m/s², rad/s, °C, rad, m), fields in µT. A sensor that cannot be calibrated is
 """
 
 from ._calibration import Calibration, Sensor, calibrate
-from ._correction import ImucalWarning, apply
+from ._correction import apply
 from ._diagnosis import Cause, Diagnosis, diagnose
 from ._native import ImucalError, MismatchError, OptionError, ReadError, WriteError
 from ._noise import Noise, SensorNoise, noise
 from ._recording import Recording, read
 from ._simulation import simulate
+from ._warning import ImucalWarning
 
 __all__ = [
     "Calibration",

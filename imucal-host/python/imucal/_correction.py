@@ -12,10 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _native
 from ._calibration import Calibration
 from ._recording import Recording
-
-
-class ImucalWarning(UserWarning):
-    """What stops nothing and should be known."""
+from ._warning import ImucalWarning
 
 
 @overload

@@ -7,11 +7,13 @@ import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Optional, TypedDict, Union
+from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
+from ._warning import ImucalWarning
 
 Path = Union[str, "os.PathLike[str]"]
 #: ``{"acc": ["ax", "ay", "az"]}``, or as the program's option: ``["acc=ax,ay,az"]``.
@@ -155,8 +157,11 @@ class Recording:
         return self._columns("position")
 
     def write(self, path: Path) -> None:
-        """Writes the samples (``.csv``, ``.csv.gz``, ``.parquet``) and the manifest, over a former recording of this name."""
-        self._native.write(os.fspath(path))
+        """Writes the samples (``.csv``, ``.csv.gz``, ``.parquet``, ``.mcap``) and the manifest, over a former recording of
+        this name; :class:`ImucalWarning` where MCAP does not hold all columns."""
+        left_out = self._native.write(os.fspath(path))
+        if left_out is not None:
+            warn(left_out, ImucalWarning, stacklevel=2)
 
     def __len__(self) -> int:
         return self._native.rows

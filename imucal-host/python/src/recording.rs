@@ -98,8 +98,8 @@ impl Recording {
         rows.map(|rows| shaped(py, rows, self.0.rows())).transpose()
     }
 
-    /// Writes samples and manifest, over a former recording of this name.
-    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+    /// Writes samples and manifest, over a former recording of this name; what the file's format does not hold.
+    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<Option<String>> {
         let beside = Manifest::path_beside(&path).filter(|beside| beside.exists());
         if let Some(beside) = beside.filter(|beside| !Manifest::is_manifest(beside)) {
             return Err(failure::unwritten(format!(
@@ -109,7 +109,8 @@ impl Recording {
             )));
         }
         let recording = Arc::clone(&self.0);
-        py.detach(move || recording.write(&path)).map_err(failure::unwritten)
+        let written = py.detach(move || recording.write(&path)).map_err(failure::unwritten)?;
+        Ok(written.left_out.map(|warning| warning.to_string()))
     }
 }
 

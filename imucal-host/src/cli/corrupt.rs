@@ -68,7 +68,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             }
         }
     }
-    read.write_into(&arguments.out, &mut files)?;
+    let written = read.write_into(&arguments.out, &mut files)?;
+    written.left_out.iter().for_each(|warning| warn(warning));
     files.commit()?;
     say!("{}: {} rows corrupted into {}", ideal.name, read.rows(), arguments.out.display());
     Ok(Ending::Done)

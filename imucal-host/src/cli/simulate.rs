@@ -10,7 +10,7 @@ use super::{
     Ending,
     output::{self, say},
     overwrite::{Overwrite, Planned},
-    own_effects, robot,
+    own_effects, robot, warn,
 };
 use crate::{
     blind::{
@@ -210,7 +210,8 @@ pub(super) fn say_doses(doses: &[Dose]) -> anyhow::Result<()> {
 fn write(simulation: &Simulation, out: &Path, files: &mut OutputSet) -> anyhow::Result<String> {
     let name = out.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let recording = simulation.record(&name)?;
-    recording.write_into(out, files)?;
+    let written = recording.write_into(out, files)?;
+    written.left_out.iter().for_each(|warning| warn(warning));
     Ok(format!(
         "{}: {} rows, {:.0} s of the programme {}, unit {}",
         out.display(),

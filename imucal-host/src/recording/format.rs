@@ -28,6 +28,11 @@ pub(crate) enum Format {
     Log,
 }
 
+/// Whether a name is that of an MCAP file.
+pub(crate) fn is_mcap(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"))
+}
+
 impl Format {
     /// Format by the ending, case aside; else the ending found.
     pub(crate) fn of(path: &Path) -> Result<Self, String> {

@@ -313,6 +313,13 @@ impl Manifest {
         toml::to_string(self)
     }
 
+    /// The same of a log, without units: its messages have those of ROS.
+    pub(crate) fn to_toml_of_log(&self) -> Result<String, toml::ser::Error> {
+        let mut sections = toml::Table::try_from(self)?;
+        sections.retain(|section, _| section != "units" && section != "counts");
+        toml::to_string(&sections)
+    }
+
     /// Conversion between a sensor's columns and the SI side.
     ///
     /// # Errors

@@ -45,6 +45,7 @@ pub use self::{
     triple::{Nominal, Triple},
     unit::Unit,
     warning::Warning,
+    write::writer::Written,
     write_error::WriteError,
 };
 use crate::file::{Limits, OutputSet};
@@ -209,10 +210,11 @@ impl Recording {
     /// # Errors
     ///
     /// [`WriteError`], when the recording contradicts itself or the system refuses.
-    pub fn write(&self, path: &Path) -> Result<(), WriteError> {
+    pub fn write(&self, path: &Path) -> Result<Written, WriteError> {
         let mut files = OutputSet::default();
-        self.write_into(path, &mut files)?;
-        Ok(files.commit()?)
+        let written = self.write_into(path, &mut files)?;
+        files.commit()?;
+        Ok(written)
     }
 
     /// As [`Recording::write`], but as part of a set of files that is to be committed.
@@ -220,12 +222,11 @@ impl Recording {
     /// # Errors
     ///
     /// As [`Recording::write`].
-    pub fn write_into(&self, path: &Path, files: &mut OutputSet) -> Result<(), WriteError> {
-        write::writer::write([self], path, files).map(|_| ())
+    pub fn write_into(&self, path: &Path, files: &mut OutputSet) -> Result<Written, WriteError> {
+        write::writer::write([self], path, files)
     }
 
-    /// As [`Recording::write_into`], of consecutive parts in constant memory; gives the number of rows. The files are those
-    /// that the whole would give.
+    /// As [`Recording::write_into`], of consecutive parts in constant memory. The files are those that the whole would give.
     ///
     /// # Errors
     ///
@@ -234,7 +235,7 @@ impl Recording {
         parts: impl IntoIterator<Item = Self>,
         path: &Path,
         files: &mut OutputSet,
-    ) -> Result<usize, WriteError> {
+    ) -> Result<Written, WriteError> {
         write::writer::write(parts, path, files)
     }
 

@@ -185,10 +185,11 @@ pub enum ReadError {
 
     /// The samples cannot be in the unit the manifest says, and another unit explains them.
     #[error(
-        "{path}, sensor {sensor}: the median length is {median_norm:.4} {si} when read as `{unit}`, expected {expected}; the samples look like `{suggestion}`: write {sensor} = \"{suggestion}\" below [units] in the manifest"
+        "{path}, from {from} on, sensor {sensor}: the median length is {median_norm:.4} {si} when read as `{unit}`, expected {expected}; the samples look like `{suggestion}`: write {sensor} = \"{suggestion}\" below [units] in the manifest"
     )]
     UnitImplausible {
         path: PathBuf,
+        from: Place,
         sensor: SensorKind,
         unit: Unit,
         median_norm: f64,
@@ -198,17 +199,31 @@ pub enum ReadError {
     },
     /// The times cannot be in the unit the manifest says, or in none.
     #[error(
-        "{path}, column `t`: the median interval is {found:e} s when read as `{unit}`, {lasting:.3} s in all, expected 2.5e-5 to 0.2 s and some minutes (up to 2 s without a gyroscope); {remedy}"
+        "{path}, from {from} on, column `t`: the median interval is {found:e} s when read as `{unit}`, {lasting:.3} s in all, expected 2.5e-5 to 0.2 s and some minutes (up to 2 s without a gyroscope); {remedy}"
     )]
-    IntervalImplausible { path: PathBuf, unit: TimeUnit, found: f64, lasting: f64, remedy: String },
+    IntervalImplausible {
+        path: PathBuf,
+        from: Place,
+        unit: TimeUnit,
+        found: f64,
+        lasting: f64,
+        remedy: String,
+    },
     /// A key of the manifest that was not understood may be the cause.
     #[error("{error}. First look at the manifest: {warning}")]
     Misled { error: Box<ReadError>, warning: Box<Warning> },
     /// One axis is in another unit than its neighbours.
     #[error(
-        "{path}, column `{column}`: found samples that look like `{found}` while the other axes are in `{expected}` (then the length is steady at {median_norm:.3} m/s², and else it is not); convert the column to `{expected}`"
+        "{path}, from {from} on, column `{column}`: found samples that look like `{found}` while the other axes are in `{expected}` (then the length is steady at {median_norm:.3} m/s², and else it is not); convert the column to `{expected}`"
     )]
-    MixedUnits { path: PathBuf, column: &'static str, found: Unit, expected: Unit, median_norm: f64 },
+    MixedUnits {
+        path: PathBuf,
+        from: Place,
+        column: &'static str,
+        found: Unit,
+        expected: Unit,
+        median_norm: f64,
+    },
 }
 
 impl ReadError {

@@ -8,7 +8,7 @@ use std::{
     thread,
 };
 
-use super::{ReadError, Recording, Source, Warning, WriteError};
+use super::{ReadError, Recording, Source, Warning, WriteError, Written};
 use crate::file::OutputSet;
 
 /// Parts that wait for the writer.
@@ -51,8 +51,10 @@ pub fn transfer(
         let read = read(source, parts, alter);
         (read, writer.join().unwrap_or_else(|panicked| panic::resume_unwind(panicked)))
     });
-    let warnings = read?;
-    Ok(Transferred { rows: written?, warnings })
+    let mut warnings = read?;
+    let Written { rows, left_out } = written?;
+    warnings.extend(left_out);
+    Ok(Transferred { rows, warnings })
 }
 
 /// Sends what `alter` makes of each part, until it makes nothing of one or nobody takes it any more.

@@ -85,11 +85,13 @@ pub enum Warning {
     },
     /// The samples' size is unusual for the sensor, and no other unit explains it.
     #[error(
-        "{path}, sensor {sensor}: the median length is {found:.4} {si} when read as `{unit}`, expected {expected}; check {key} in the manifest"
+        "{path}, from {from} on, sensor {sensor}: the median length is {found:.4} {si} when read as `{unit}`, expected {expected}; check {key} in the manifest"
     )]
     SizeUnusual {
         /// Samples file.
         path: PathBuf,
+        /// First of the samples.
+        from: Place,
         /// The sensor.
         sensor: SensorKind,
         /// Its unit in the manifest.
@@ -105,11 +107,13 @@ pub enum Warning {
     },
     /// The samples' interval is unusual, which a wrong unit of `t` causes.
     #[error(
-        "{path}, column `t`: the median interval is {found:e} s when read as `{unit}`, expected 2.5e-5 to 2 s; check t of [units] in the manifest"
+        "{path}, from {from} on, column `t`: the median interval is {found:e} s when read as `{unit}`, expected 2.5e-5 to 2 s; check t of [units] in the manifest"
     )]
     IntervalUnusual {
         /// Samples file.
         path: PathBuf,
+        /// First of the rows.
+        from: Place,
         /// Unit of `t`.
         unit: TimeUnit,
         /// Median interval, s.
@@ -117,11 +121,13 @@ pub enum Warning {
     },
     /// A gyroscope faster than any, which a wrong unit causes.
     #[error(
-        "{path}, sensor gyr: one sample in two hundred is faster than {found:.0} rad/s when read as `{unit}`, expected below 70 rad/s (4000 °/s); {remedy}"
+        "{path}, from {from} on, sensor gyr: one sample in two hundred is faster than {found:.0} rad/s when read as `{unit}`, expected below 70 rad/s (4000 °/s); {remedy}"
     )]
     RateUnusual {
         /// Samples file.
         path: PathBuf,
+        /// First of the samples.
+        from: Place,
         /// The gyroscope's unit.
         unit: Unit,
         /// The rate, rad/s.
@@ -184,6 +190,16 @@ pub enum Warning {
         rows: usize,
         /// Each with what it is.
         others: Vec<String>,
+    },
+    /// Columns that the messages of a log do not hold.
+    #[error(
+        "{path}: left out {}, which messages of sensors, temperatures and poses do not hold; write CSV or Parquet to keep all columns", .columns.join(", ")
+    )]
+    NotInLog {
+        /// The log.
+        path: PathBuf,
+        /// Their names.
+        columns: Vec<String>,
     },
     /// Something odd in a log.
     #[error("{path}: {found}")]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::manifest::fault::ManifestFault;
+use super::{manifest::fault::ManifestFault, sensor_kind::SensorKind, unit::Unit};
 use crate::file::OutputError;
 
 /// A failure to write a recording; its text names the file, what was found, what was expected and
@@ -16,9 +16,24 @@ pub enum WriteError {
     Output(#[from] OutputError),
     /// The name says no format there is a writer for.
     #[error(
-        "{path}: found the ending `{found}`, expected .csv, .csv.gz or .parquet; give the file such a name"
+        "{path}: found the ending `{found}`, expected .csv, .csv.gz, .parquet or .mcap; give the file such a name"
     )]
     UnknownFormat { path: PathBuf, found: String },
+    /// Logs are not built in.
+    #[error(
+        "{path}: found the ending .mcap, expected .csv, .csv.gz or .parquet since this build is without logs; build with `--features logs` or write CSV"
+    )]
+    LogsNotBuilt { path: PathBuf },
+    /// A sensor in a unit that messages of ROS have no size for.
+    #[error(
+        "{path}: found {sensor} in {unit}, expected a unit of SI, which messages of ROS are in; correct it by `imucal apply` with a calibration of {sensor}, or write CSV or Parquet"
+    )]
+    NotOfRos { path: PathBuf, sensor: SensorKind, unit: Unit },
+    /// A time that no message has.
+    #[error(
+        "{path}, row {row}, column `t`: found {found} s, expected 0 to 2^31 s, each row a nanosecond or more after the one before, as stamps of ROS are; write CSV or Parquet"
+    )]
+    Stamp { path: PathBuf, row: usize, found: f64 },
     /// Parquet is not built in.
     #[error(
         "{path}: found the ending .parquet, expected .csv or .csv.gz since this build is without Parquet; build with `--features parquet` or write CSV"

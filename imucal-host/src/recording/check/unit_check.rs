@@ -4,7 +4,13 @@
 //! and then a warning is all that can be said.
 
 use crate::recording::{
-    Recording, read_error::ReadError, sensor_kind::SensorKind, triple::Triple, unit::Unit, warning::Warning,
+    Recording,
+    place::{Place, Places},
+    read_error::ReadError,
+    sensor_kind::SensorKind,
+    triple::Triple,
+    unit::Unit,
+    warning::Warning,
 };
 
 /// Gyroscopes for hand or vehicle end at 4000 °/s, rad/s.
@@ -35,21 +41,27 @@ fn usual(kind: SensorKind) -> Usual {
 }
 
 /// Refuses samples that are clearly in another unit and notes those that are merely unusual.
-pub(crate) fn check(recording: &mut Recording) -> Result<(), ReadError> {
-    check_of(recording, &SensorKind::ALL)
+pub(crate) fn check(recording: &mut Recording, places: &Places) -> Result<(), ReadError> {
+    check_of(recording, places, &SensorKind::ALL)
 }
 
 /// The same of some sensors.
-pub(crate) fn check_of(recording: &mut Recording, kinds: &[SensorKind]) -> Result<(), ReadError> {
+pub(crate) fn check_of(
+    recording: &mut Recording,
+    places: &Places,
+    kinds: &[SensorKind],
+) -> Result<(), ReadError> {
     for kind in kinds.iter().copied() {
         let Some(triple) = recording.sensor(kind) else {
             continue;
         };
+        let measured = |value: &nalgebra::Vector3<f64>| value.iter().any(|value| !value.is_nan());
+        let from = places.of(triple.values.iter().position(measured).unwrap_or(0));
         if kind == SensorKind::Acc {
-            check_axes(recording, triple)?;
+            check_axes(recording, from, triple)?;
         }
-        let fast = (kind == SensorKind::Gyr).then(|| check_rate(recording, triple)).flatten();
-        let size = check_size(recording, kind, triple)?;
+        let fast = (kind == SensorKind::Gyr).then(|| check_rate(recording, from, triple)).flatten();
+        let size = check_size(recording, from, kind, triple)?;
         recording.warnings.extend(size.or(fast));
     }
     Ok(())
@@ -57,6 +69,7 @@ pub(crate) fn check_of(recording: &mut Recording, kinds: &[SensorKind]) -> Resul
 
 fn check_size(
     recording: &Recording,
+    from: Place,
     kind: SensorKind,
     triple: &Triple,
 ) -> Result<Option<Warning>, ReadError> {
@@ -69,6 +82,7 @@ fn check_size(
     match better.filter(|_| kind != SensorKind::Mag) {
         Some(suggestion) => Err(ReadError::UnitImplausible {
             path: recording.path.clone(),
+            from,
             sensor: kind,
             unit: triple.unit,
             median_norm: found,
@@ -79,6 +93,7 @@ fn check_size(
         None if kind == SensorKind::Mag && better.is_none() => Ok(None),
         None => Ok(Some(Warning::SizeUnusual {
             path: recording.path.clone(),
+            from,
             sensor: kind,
             unit: triple.unit,
             found,
@@ -94,13 +109,14 @@ fn check_size(
 }
 
 /// A gyroscope is at rest for most of a calibration, and its fastest rates show the unit.
-fn check_rate(recording: &Recording, triple: &Triple) -> Option<Warning> {
+fn check_rate(recording: &Recording, from: Place, triple: &Triple) -> Option<Warning> {
     let mut rates: Vec<f64> =
         triple.values.iter().map(|rate| rate.norm()).filter(|rate| rate.is_finite()).collect();
     rates.sort_unstable_by(f64::total_cmp);
     let found = *rates.get(rates.len().saturating_sub(1 + rates.len() / 200))?;
     (found > FASTEST).then(|| Warning::RateUnusual {
         path: recording.path.clone(),
+        from,
         unit: triple.unit,
         found,
         remedy: match triple.unit {
@@ -141,7 +157,7 @@ fn looks_like_counts(triple: &Triple, median: f64) -> bool {
 
 /// Looks for one axis in `g` or `mg` next to others in m/s² or the like: only if rescaling that axis
 /// makes a length that varies steady, and steady at gravity.
-fn check_axes(recording: &Recording, triple: &Triple) -> Result<(), ReadError> {
+fn check_axes(recording: &Recording, from: Place, triple: &Triple) -> Result<(), ReadError> {
     let Some(own) = triple.unit.per_si() else {
         return Ok(());
     };
@@ -163,6 +179,7 @@ fn check_axes(recording: &Recording, triple: &Triple) -> Result<(), ReadError> {
             {
                 return Err(ReadError::MixedUnits {
                     path: recording.path.clone(),
+                    from,
                     column,
                     found: *unit,
                     expected: triple.unit,
@@ -227,7 +244,12 @@ mod tests {
         let found = "the median length is 1.0000 m/s² when read as `m/s^2`";
         assert_says(
             &message,
-            &["run.csv, sensor acc", found, "expected about 9.8", "write acc = \"g\" below [units]"],
+            &[
+                "run.csv, from line 2 on, sensor acc",
+                found,
+                "expected about 9.8",
+                "write acc = \"g\" below [units]",
+            ],
         );
     }
 
@@ -250,7 +272,7 @@ mod tests {
         let fixture = fixture("acc = \"m/s^2\"", &attitudes("acc", [55.0; 3], 4));
         assert_says(
             &fixture.warnings()[0],
-            &["sensor acc", "55.0000 m/s²", "expected about 9.8", "acc of [units]"],
+            &["run.csv, from line 2 on, sensor acc", "55.0000 m/s²", "expected about 9.8", "acc of [units]"],
         );
     }
 
@@ -258,13 +280,19 @@ mod tests {
     fn counts_with_a_wrong_nominal_conversion_are_warned_about() {
         let sections = "acc = \"counts\"\n[counts]\nacc = { offset = 0, per_unit = 16384 }";
         let fixture = fixture(sections, &attitudes("acc", [16384.0; 3], 0));
-        assert_says(&fixture.warnings()[0], &["read as `counts`", "check acc of [counts]"]);
+        assert_says(
+            &fixture.warnings()[0],
+            &["run.csv, from line 2 on, sensor acc", "read as `counts`", "check acc of [counts]"],
+        );
     }
 
     #[test]
     fn degrees_called_radians_are_refused_when_they_are_beyond_any_gyroscope() {
         let message = fixture("gyr = \"rad/s\"", &attitudes("gyr", [400.0; 3], 3)).error();
-        assert_says(&message, &["sensor gyr", "read as `rad/s`", "look like `deg/s`"]);
+        assert_says(
+            &message,
+            &["run.csv, from line 2 on, sensor gyr", "read as `rad/s`", "look like `deg/s`"],
+        );
     }
 
     #[test]
@@ -275,7 +303,10 @@ mod tests {
             text + &format!("{},{rate},0.1,0.2\n", f64::from(k) * 0.01)
         });
         let warnings = fixture("gyr = \"rad/s\"", &rows).warnings();
-        assert_says(&warnings[0], &["sensor gyr", "120 rad/s", "look like `deg/s`", "gyr = \"deg/s\""]);
+        assert_says(
+            &warnings[0],
+            &["run.csv, from line 2 on, sensor gyr", "120 rad/s", "look like `deg/s`", "gyr = \"deg/s\""],
+        );
         assert!(fixture("gyr = \"deg/s\"", &rows).warnings().is_empty());
     }
 
@@ -288,7 +319,10 @@ mod tests {
     #[test]
     fn one_axis_in_g_beside_two_in_metres_is_named() {
         let message = fixture("acc = \"m/s^2\"", &attitudes("acc", [9.81, 1.0, 9.81], 6)).error();
-        assert_says(&message, &["run.csv, column `acc_y`", "look like `g`", "`m/s^2`", "convert the column"]);
+        assert_says(
+            &message,
+            &["run.csv, from line 2 on, column `acc_y`", "look like `g`", "`m/s^2`", "convert the column"],
+        );
     }
 
     #[test]

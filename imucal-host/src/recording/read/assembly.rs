@@ -34,8 +34,8 @@ pub(crate) fn assemble(path: &Path, manifest: Manifest, table: Table) -> Result<
 
 /// A recording whose intervals and sizes can be in the units of its manifest; numbers that nothing measures are masked.
 pub(crate) fn checked(mut recording: Recording, places: &Places) -> Result<Recording, ReadError> {
-    interval::check(&mut recording)?;
-    unit_check::check(&mut recording)?;
+    interval::check(&mut recording, places.of(0))?;
+    unit_check::check(&mut recording, places)?;
     absurd::mask(&mut recording, places);
     Ok(recording)
 }
@@ -49,7 +49,7 @@ pub(crate) fn continued(
     begins: &[SensorKind],
 ) -> Result<Recording, ReadError> {
     let (mut recording, places) = converted(path, manifest, table)?;
-    unit_check::check_of(&mut recording, begins)?;
+    unit_check::check_of(&mut recording, &places, begins)?;
     absurd::mask(&mut recording, &places);
     Ok(recording)
 }

@@ -3,7 +3,7 @@
 //! Wrong by a thousand they turn a stream of samples into shots taken one by one, each for a rest; wrong the other
 //! way they make windows of a second longer than any memory.
 
-use crate::recording::{Recording, read_error::ReadError, unit::TimeUnit, warning::Warning};
+use crate::recording::{Recording, place::Place, read_error::ReadError, unit::TimeUnit, warning::Warning};
 
 /// Intervals, s, that need no explanation: sampled, at 32 kHz at the most, or shot by shot.
 const USUAL: std::ops::RangeInclusive<f64> = 2.5e-5..=2.0;
@@ -28,7 +28,7 @@ pub(crate) fn is_unusual(seconds: f64) -> bool {
 }
 
 /// Refuses times that are clearly in another unit, and notes those that are merely unusual.
-pub(crate) fn check(recording: &mut Recording) -> Result<(), ReadError> {
+pub(crate) fn check(recording: &mut Recording, from: Place) -> Result<(), ReadError> {
     let Some(found) = recording.median_interval() else { return Ok(()) };
     let unit = recording.manifest.units.t;
     let in_unit = |other: &TimeUnit| found * unit.per_si() / other.per_si();
@@ -42,6 +42,7 @@ pub(crate) fn check(recording: &mut Recording) -> Result<(), ReadError> {
     if !(SHORTEST..=LONGEST).contains(&found) || (odd && sampled && suggestion.is_some()) {
         return Err(ReadError::IntervalImplausible {
             path: recording.path.clone(),
+            from,
             unit,
             found,
             lasting: lasting(&recording.time),
@@ -56,7 +57,7 @@ pub(crate) fn check(recording: &mut Recording) -> Result<(), ReadError> {
         });
     }
     if is_unusual(found) {
-        recording.warnings.push(Warning::IntervalUnusual { path: recording.path.clone(), unit, found });
+        recording.warnings.push(Warning::IntervalUnusual { path: recording.path.clone(), from, unit, found });
     }
     Ok(())
 }
@@ -91,7 +92,10 @@ mod tests {
     #[test]
     fn steady_times_that_another_unit_explains_are_refused_with_that_unit() {
         let message = csv(samples(200, |k| k as f64 * 10.0)).error();
-        assert_says(&message, &["run.csv, column `t`", "1e1 s", "`s`", "t = \"ms\"", "[units]"]);
+        assert_says(
+            &message,
+            &["run.csv, from line 2 on, column `t`", "1e1 s", "`s`", "t = \"ms\"", "[units]"],
+        );
         assert_says(&csv(samples(200, |k| k as f64 * 1e4)).error(), &["t = \"us\""]);
         let seconds = samples(200, |k| k as f64 * 0.01);
         let fixture = Fixture::new("run.csv", "[units]\nt = \"us\"\n", seconds);
@@ -112,7 +116,7 @@ mod tests {
         for unit in ["s", "ms", "us"] {
             let fixture =
                 Fixture::new("run.csv", format!("[units]\nt = \"{unit}\"\n").as_str(), samples(1200, jitter));
-            assert_says(&fixture.error(), &["run.csv, column `t`", "t = \"ns\""]);
+            assert_says(&fixture.error(), &["run.csv, from line 2 on, column `t`", "t = \"ns\""]);
         }
         let named = Fixture::new("run.csv", "[units]\nt = \"ns\"\n", samples(1200, jitter));
         assert!(named.warnings().is_empty() && (named.read().time[1199] - 11.99).abs() < 0.01);
@@ -138,7 +142,7 @@ mod tests {
     fn times_that_nothing_samples_at_are_refused() {
         assert_says(
             &csv(samples(3, |k| k as f64 * 1e-300)).error(),
-            &["run.csv, column `t`", "1e-300 s", "correct"],
+            &["run.csv, from line 2 on, column `t`", "1e-300 s", "correct"],
         );
     }
 }

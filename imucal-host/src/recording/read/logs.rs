@@ -28,7 +28,7 @@ use crate::{
 };
 
 /// A frame of which the z axis points down already ends so (REP 103).
-const DOWN: &str = "_ned";
+pub(crate) const DOWN: &str = "_ned";
 
 /// Reads the topics that are asked for, or those that there is no choice of. A field whose unit is `stated` elsewhere is left as the
 /// log has it.

@@ -1,18 +1,21 @@
 //! The samples file of each format, part after part.
 
-use std::{io, path::Path};
+use std::path::Path;
 
 use flate2::{Compression, write::GzEncoder};
 
+#[cfg(feature = "logs")]
+use super::mcap_writer::McapWriter;
 #[cfg(feature = "parquet")]
 use super::parquet_writer::ParquetWriter;
-use super::{csv_writer::CsvWriter, file_units::singles_of};
+use super::{csv_writer::CsvWriter, failed, file_units::singles_of};
 use crate::{
-    file::{Output, OutputError},
+    file::Output,
     recording::{
         Recording,
-        format::Format,
+        format::{Format, is_mcap},
         read::columns::{TIME, Table},
+        warning::Warning,
         write_error::WriteError,
     },
 };
@@ -31,6 +34,8 @@ enum Sink<'a> {
     CsvGz(Box<CsvWriter<GzEncoder<&'a mut Output>>>),
     #[cfg(feature = "parquet")]
     Parquet(Box<ParquetWriter<&'a mut Output>>),
+    #[cfg(feature = "logs")]
+    Mcap(Box<McapWriter<&'a mut Output>>),
 }
 
 impl<'a> Samples<'a> {
@@ -56,6 +61,12 @@ impl<'a> Samples<'a> {
             }
             #[cfg(not(feature = "parquet"))]
             Format::Parquet => return Err(WriteError::ParquetNotBuilt { path: path.to_path_buf() }),
+            #[cfg(feature = "logs")]
+            Format::Log if is_mcap(path) => Sink::Mcap(Box::new(McapWriter::begin(file, first, path)?)),
+            #[cfg(not(feature = "logs"))]
+            Format::Log if is_mcap(path) => {
+                return Err(WriteError::LogsNotBuilt { path: path.to_path_buf() });
+            }
             Format::Mat | Format::Log => {
                 let found = path.extension().unwrap_or_default().to_string_lossy();
                 return Err(WriteError::UnknownFormat {
@@ -67,8 +78,8 @@ impl<'a> Samples<'a> {
         Ok(Self { path, sink, columns: columns_of(table), rows: 0 })
     }
 
-    /// Appends a part in file units.
-    pub(crate) fn append(&mut self, table: &Table) -> Result<(), WriteError> {
+    /// Appends a part; `table` is that part in file units.
+    pub(crate) fn append(&mut self, part: &Recording, table: &Table) -> Result<(), WriteError> {
         let rows = table.columns[TIME].len();
         if rows == 0 {
             return Ok(());
@@ -81,18 +92,22 @@ impl<'a> Samples<'a> {
             Sink::CsvGz(writer) => writer.append(table, rows),
             #[cfg(feature = "parquet")]
             Sink::Parquet(writer) => writer.append(table, self.path, self.rows)?,
+            #[cfg(feature = "logs")]
+            Sink::Mcap(writer) => writer.append(part, self.path, self.rows)?,
         };
         self.rows += rows;
         written.map_err(|cause| failed(self.path, cause))
     }
 
-    /// Ends the file.
-    pub(crate) fn finish(self) -> Result<(), WriteError> {
+    /// Ends the file; what its format does not hold.
+    pub(crate) fn finish(self) -> Result<Option<Warning>, WriteError> {
         let ended = match self.sink {
-            Sink::Csv(_) => Ok(()),
-            Sink::CsvGz(writer) => writer.finish().finish().map(|_| ()),
+            Sink::Csv(_) => Ok(None),
+            Sink::CsvGz(writer) => writer.finish().finish().map(|_| None),
             #[cfg(feature = "parquet")]
-            Sink::Parquet(writer) => writer.finish(),
+            Sink::Parquet(writer) => writer.finish().map(|()| None),
+            #[cfg(feature = "logs")]
+            Sink::Mcap(writer) => writer.finish(),
         };
         ended.map_err(|cause| failed(self.path, cause))
     }
@@ -101,8 +116,4 @@ impl<'a> Samples<'a> {
 fn columns_of(table: &Table) -> (Vec<usize>, Vec<String>) {
     let there = table.columns.iter().enumerate().filter(|(_, column)| !column.is_empty());
     (there.map(|(slot, _)| slot).collect(), table.extra.iter().map(|column| column.name.clone()).collect())
-}
-
-fn failed(path: &Path, cause: io::Error) -> WriteError {
-    OutputError::System { path: path.to_path_buf(), cause }.into()
 }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::{Cell, Hand, cell::Rests, fault::Fault, score::in_gauge_of};
 use crate::{
     calibrate::{Calibration, FitSummary, Options, Status, calibrate},
-    recording::{SensorKind, read::interval},
+    recording::{Place, SensorKind, read::interval},
     simulator::random::{Purpose, Random},
 };
 
@@ -83,7 +83,7 @@ pub fn lines(faults: &[Fault], seeds: std::ops::Range<u64>) -> Vec<Line> {
                 let (hand, mut recording) =
                     fault.draw(hand.clone(), &mut Random::new(*seed, Purpose::Effect));
                 // A file with such times is not read.
-                if interval::check(&mut recording).is_err() {
+                if interval::check(&mut recording, Place::Row(1)).is_err() {
                     return vec![Fate::Refused; fault.sensors.len()];
                 }
                 let with = calibrate(&recording, &Options::default(), &|_| ());
