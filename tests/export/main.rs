@@ -9,6 +9,7 @@ use imucal_host::store::{
 
 mod code;
 mod corrupted;
+mod fed_back;
 mod parameters;
 
 fn triad(unit_in: Unit, unit_out: Unit, scale: f64, bias: [f64; 3]) -> StoredTriad {
