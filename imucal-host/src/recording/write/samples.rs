@@ -79,6 +79,10 @@ impl<'a> Samples<'a> {
     }
 
     /// Appends a part; `table` is that part in file units.
+    #[cfg_attr(
+        not(feature = "logs"),
+        expect(unused_variables, reason = "a log alone is written from the part")
+    )]
     pub(crate) fn append(&mut self, part: &Recording, table: &Table) -> Result<(), WriteError> {
         let rows = table.columns[TIME].len();
         if rows == 0 {
