@@ -97,7 +97,7 @@ fn samples_in_g_that_the_manifest_calls_si_are_refused() {
         bad.map(ACC + axis, |value| value / 9.80665);
     }
     bad.calibrate().with(2).telling(&[
-        "small.csv, sensor acc",
+        "small.csv, from line 2 on, sensor acc",
         "when read as `m/s^2`",
         "about 9.8",
         "acc = \"g\"",
@@ -110,14 +110,22 @@ fn one_axis_in_g_beside_others_in_si_is_refused() {
     let mut bad = Bad::new();
     in_si(&mut bad);
     bad.map(ACC + 2, |value| value / 9.80665);
-    bad.calibrate().with(2).telling(&["small.csv, column `acc_z`", "look like `g`", "convert the column"]);
+    bad.calibrate().with(2).telling(&[
+        "small.csv, from line 2 on, column `acc_z`",
+        "look like `g`",
+        "convert the column",
+    ]);
 }
 
 #[test]
 fn counts_that_the_manifest_calls_si_are_refused() {
     let mut bad = Bad::new();
     bad.manifest("acc = \"counts\"", "acc = \"m/s^2\"");
-    bad.calibrate().with(2).telling(&["small.csv, sensor acc", "look like `counts`", "[units]"]);
+    bad.calibrate().with(2).telling(&[
+        "small.csv, from line 2 on, sensor acc",
+        "look like `counts`",
+        "[units]",
+    ]);
 }
 
 #[test]
@@ -216,7 +224,7 @@ fn nanoseconds_declared_microseconds_are_refused() {
     // Seconds since 1970, as a logger stamps them.
     bad.map(TIME, |t| ((1.75e9 + t) * 1e9).round());
     bad.manifest("t = \"s\"", "t = \"us\"");
-    bad.calibrate().with(2).telling(&["small.csv, column `t`", "t = \"ns\""]);
+    bad.calibrate().with(2).telling(&["small.csv, from line 2 on, column `t`", "t = \"ns\""]);
     bad.manifest("t = \"us\"", "t = \"ns\"");
     bad.calibrate().with(0);
     assert_as_clean(&bad, &ALL);
