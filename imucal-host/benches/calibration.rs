@@ -1,9 +1,9 @@
-//! How long a calibration takes: `imucal calibrate` by rests and by samples of a magnetometer, and the fit of an accelerometer alone by
-//! the core, next to the crate `levenberg-marquardt` and to SciPy where Python has it. Prints the tables of
-//! docs/performance.md; figures are ratios within one run.
+//! How long a calibration takes: `imucal calibrate` by rests and by samples of a magnetometer; all of it next to the crate `imu-calib`;
+//! and the fit of an accelerometer alone by the core, next to the crate `levenberg-marquardt` and to SciPy where Python has it. Prints
+//! the tables of docs/performance.md; figures are ratios within one run.
 //!
-//! `IMUCAL_PYTHON=PROGRAM` names the Python that has SciPy. The crate is compiled by this Cargo, with its own lock file. Where one of
-//! them is missing, its column is empty, and that is said.
+//! `IMUCAL_PYTHON=PROGRAM` names the Python that has SciPy, `IMUCAL_DATA` the folder of real recordings. The crates are compiled by this
+//! Cargo, with their own lock files. Where one of them is missing, its column is empty, and that is said.
 
 use std::{
     env,
@@ -11,6 +11,7 @@ use std::{
     fmt::Write,
     fs,
     hint::black_box,
+    iter,
     path::{Path, PathBuf},
     process::Command,
     time::Instant,
@@ -22,10 +23,13 @@ use imucal_core::{
     solver::{LevenbergMarquardt, lm::Settings},
     triad::Triad,
 };
-use imucal_host::simulator::{
-    SimulatedUnit, Tumble,
-    random::{Purpose, Random},
-    record,
+use imucal_host::{
+    recording::{Nominal, Recording, SensorKind, Unit},
+    simulator::{
+        SimulatedUnit, Tumble,
+        random::{Purpose, Random},
+        record,
+    },
 };
 use nalgebra::{Matrix3, Vector3};
 
@@ -55,6 +59,8 @@ fn main() {
         cloud(&path, samples);
         (path, samples)
     });
+    println!("\nAccelerometer and gyroscope, from a file to the answer, and the time of another over it:\n");
+    beside_imu_calib(folder.path());
     println!(
         "\nAn accelerometer's nine parameters by the core in f64, and the time of others over its own:\n"
     );
@@ -84,6 +90,59 @@ fn table(what: &str, counts: &[usize], made: impl Fn(usize) -> (PathBuf, usize))
         let growth = each / *first.get_or_insert(each);
         println!("| {count} | {rows} | {:.2} | {growth:.2} | {:.0} |", run.seconds, run.mebibytes);
     }
+}
+
+/// Of the same files, with two sensors in SI units and without gaps.
+fn beside_imu_calib(folder: &Path) {
+    let built = built("imu_calib");
+    let path = folder.join("both.csv");
+    println!("| recording | rows | s | crate imu-calib |\n| --- | --- | --- | --- |");
+    let real = env::var_os("IMUCAL_DATA").unwrap_or_else(|| OsString::from("../../shared/data"));
+    let real = Path::new(&real).join("real/xsens-mti.csv.gz");
+    let recordings = iter::once(("xsens-mti".to_owned(), Recording::read(&real).map_err(|e| e.to_string())))
+        .chain(RESTS.map(|rests| {
+            let unit = SimulatedUnit { interval: 0.02, ..SimulatedUnit::mtx() };
+            (format!("{rests} rests"), Ok(record("both.csv", &Tumble::new(rests, 1), &unit, 1)))
+        }));
+    for (name, recording) in recordings {
+        let Ok(recording) = recording.inspect_err(|fault| eprintln!("*** SKIPPED: {name}: {fault} ***"))
+        else {
+            continue;
+        };
+        let recording = inertial(recording);
+        recording.write(&path).expect("room");
+        let ours = quickest(Command::new(env!("CARGO_BIN_EXE_imucal")).arg("calibrate").arg(&path));
+        let gravity = recording.manifest.site.gravity.unwrap_or(9.80665).to_string();
+        let theirs = built.as_ref().map(|program| quickest(Command::new(program).arg(&path).arg(&gravity)));
+        let ratio = theirs.map_or_else(|| "–".to_owned(), |theirs| format!("{:.2}", theirs / ours));
+        println!("| {name} | {} | {ours:.3} | {ratio} |", recording.rows());
+    }
+}
+
+/// What a crate that knows accelerometers and gyroscopes alone takes of a recording.
+fn inertial(mut recording: Recording) -> Recording {
+    // The default is SI.
+    (recording.manifest.units, recording.manifest.counts) = Default::default();
+    for (kind, triple) in [(SensorKind::Acc, &mut recording.acc), (SensorKind::Gyr, &mut recording.gyr)] {
+        let triple = triple.as_mut().expect("both sensors");
+        (triple.unit, triple.nominal) = (Unit::si(kind), Nominal::IDENTITY);
+    }
+    Recording {
+        mag: None,
+        temperature: None,
+        gimbal: None,
+        reference: None,
+        position: None,
+        simulated: None,
+        segment: None,
+        extra: Vec::new(),
+        ..recording
+    }
+}
+
+/// Seconds of a program's quickest run of five.
+fn quickest(command: &mut Command) -> f64 {
+    (0..5).map(|_| process::run(command).seconds).fold(f64::INFINITY, f64::min)
 }
 
 /// Points near a sphere of a length, as a sensor with errors and noise gives them.
@@ -144,12 +203,23 @@ fn scipy() -> Command {
     python
 }
 
-/// MINPACK's algorithm in Rust, with derivatives.
+/// MINPACK's algorithm in Rust, with derivatives; a program that says it is missing where it cannot be built.
 fn levenberg_marquardt() -> Command {
+    Command::new(built("levenberg_marquardt").unwrap_or_else(|| PathBuf::from("peer-levenberg-marquardt")))
+}
+
+/// A crate's program, if it can be built.
+fn built(name: &str) -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["run", "--quiet", "--release", "--locked", "--target-dir", env!("CARGO_TARGET_TMPDIR")]);
-    cargo.arg("--manifest-path").arg(peers().join("levenberg_marquardt/Cargo.toml")).arg("--");
-    cargo
+    cargo.args(["build", "--quiet", "--release", "--locked", "--target-dir"]).arg(folder);
+    cargo.arg("--manifest-path").arg(peers().join(name).join("Cargo.toml"));
+    let ended = cargo.output().expect("Cargo runs");
+    if !ended.status.success() {
+        eprintln!("*** SKIPPED: {} ***", String::from_utf8_lossy(&ended.stderr).trim());
+    }
+    let program = folder.join("release").join(format!("peer-{}", name.replace('_', "-")));
+    ended.status.success().then_some(program)
 }
 
 /// What a program says that it took, if it runs.
