@@ -24,7 +24,7 @@ use imucal_core::{
     triad::Triad,
 };
 use imucal_host::{
-    recording::{Nominal, Recording, SensorKind, Unit},
+    recording::{Nominal, Recording, SensorKind, Triple, Unit},
     simulator::{
         SimulatedUnit, Tumble,
         random::{Purpose, Random},
@@ -120,23 +120,17 @@ fn beside_imu_calib(folder: &Path) {
 }
 
 /// What a crate that knows accelerometers and gyroscopes alone takes of a recording.
-fn inertial(mut recording: Recording) -> Recording {
+fn inertial(recording: Recording) -> Recording {
+    let Recording { name, mut manifest, time, acc, gyr, .. } = recording;
     // The default is SI.
-    (recording.manifest.units, recording.manifest.counts) = Default::default();
-    for (kind, triple) in [(SensorKind::Acc, &mut recording.acc), (SensorKind::Gyr, &mut recording.gyr)] {
-        let triple = triple.as_mut().expect("both sensors");
-        (triple.unit, triple.nominal) = (Unit::si(kind), Nominal::IDENTITY);
-    }
+    (manifest.units, manifest.counts) = Default::default();
+    let in_si = |kind, triple: Option<Triple>| {
+        triple.map(|triple| Triple { unit: Unit::si(kind), nominal: Nominal::IDENTITY, ..triple })
+    };
     Recording {
-        mag: None,
-        temperature: None,
-        gimbal: None,
-        reference: None,
-        position: None,
-        simulated: None,
-        segment: None,
-        extra: Vec::new(),
-        ..recording
+        acc: in_si(SensorKind::Acc, acc),
+        gyr: in_si(SensorKind::Gyr, gyr),
+        ..Recording::new(name, manifest, time)
     }
 }
 

@@ -143,7 +143,8 @@ impl Recording {
     }
 
     /// Reads `NAME.csv`, `NAME.csv.gz`, `NAME.mat` or, when built with the features `parquet` and `logs`, `NAME.parquet`, `NAME.mcap`,
-    /// `NAME.bag`, `NAME.db3` and the folder `NAME` of a ROS 2 bag, and the manifest `NAME.toml` next to it, which a log needs not have. What is odd but harmless is in [`Recording::warnings`].
+    /// `NAME.bag`, `NAME.db3` and the folder `NAME` of a ROS 2 bag, and the manifest `NAME.toml` next to it, which a log needs not
+    /// have. What is odd but harmless is in [`Recording::warnings`].
     ///
     /// # Errors
     ///
