@@ -24,7 +24,7 @@ use imucal_core::{
     triad::Triad,
 };
 use imucal_host::{
-    recording::{Nominal, Recording, SensorKind, Triple, Unit},
+    recording::{Nominal, Recording, SensorKind, Triple, Unit, unit::STANDARD_GRAVITY},
     simulator::{
         SimulatedUnit, Tumble,
         random::{Purpose, Random},
@@ -60,7 +60,7 @@ fn main() {
         (path, samples)
     });
     println!("\nAccelerometer and gyroscope, from a file to the answer, and the time of another over it:\n");
-    beside_imu_calib(folder.path());
+    compare_with_imu_calib(folder.path());
     println!(
         "\nAn accelerometer's nine parameters by the core in f64, and the time of others over its own:\n"
     );
@@ -92,8 +92,8 @@ fn table(what: &str, counts: &[usize], made: impl Fn(usize) -> (PathBuf, usize))
     }
 }
 
-/// Of the same files, with two sensors in SI units and without gaps.
-fn beside_imu_calib(folder: &Path) {
+/// Prints the time of `imucal calibrate` and of the crate `imu-calib` for the same files: two sensors, SI units, no gaps.
+fn compare_with_imu_calib(folder: &Path) {
     let built = built("imu_calib");
     let path = folder.join("both.csv");
     println!("| recording | rows | s | crate imu-calib |\n| --- | --- | --- | --- |");
@@ -112,7 +112,7 @@ fn beside_imu_calib(folder: &Path) {
         let recording = inertial(recording);
         recording.write(&path).expect("room");
         let ours = quickest(Command::new(env!("CARGO_BIN_EXE_imucal")).arg("calibrate").arg(&path));
-        let gravity = recording.manifest.site.gravity.unwrap_or(9.80665).to_string();
+        let gravity = recording.manifest.site.gravity().unwrap_or(STANDARD_GRAVITY).to_string();
         let theirs = built.as_ref().map(|program| quickest(Command::new(program).arg(&path).arg(&gravity)));
         let ratio = theirs.map_or_else(|| "–".to_owned(), |theirs| format!("{:.2}", theirs / ours));
         println!("| {name} | {} | {ours:.3} | {ratio} |", recording.rows());
@@ -197,7 +197,7 @@ fn scipy() -> Command {
     python
 }
 
-/// MINPACK's algorithm in Rust, with derivatives; a program that says it is missing where it cannot be built.
+/// MINPACK's algorithm in Rust, with derivatives; a command that fails where the crate cannot be built.
 fn levenberg_marquardt() -> Command {
     Command::new(built("levenberg_marquardt").unwrap_or_else(|| PathBuf::from("peer-levenberg-marquardt")))
 }
