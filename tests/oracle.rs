@@ -17,7 +17,7 @@ use imucal_host::{
     ellipsoid::{adjusted, sphere},
     observe::{
         cloud::cloud,
-        turn::{BiasPath, TurnData, compress},
+        turn::{BiasPath, Rates, TurnData, compress},
     },
     recording::{Nominal, Recording},
 };
@@ -284,6 +284,7 @@ fn turns(recording: &Recording, golden: &Value, exact: bool) -> Vec<TurnData> {
     let gyr = recording.gyr.as_ref().expect("a gyroscope");
     let usable = vec![true; recording.rows()];
     let interval = recording.median_interval().expect("rows");
+    let rates = Rates { time: &recording.time, values: &gyr.values, usable: &usable, interval };
     let rests = intervals(&golden["intervals"]);
     let (means, times) = (vectors(&golden["rest_mean_rate"]), numbers(&golden["rest_mid_time"]));
     intervals(&golden["turns_first_last_row"])
@@ -297,9 +298,7 @@ fn turns(recording: &Recording, golden: &Value, exact: bool) -> Vec<TurnData> {
             } else {
                 (rests[k].0..rests[k].1, rests[k + 1].0..rests[k + 1].1)
             };
-            let data =
-                compress(&recording.time, &gyr.values, &usable, interval, (k, &before, k + 1, &after), &path)
-                    .expect("no gaps");
+            let data = compress(rates, (k, &before, k + 1, &after), &path).expect("no gaps");
             // Half-open against closed rows, and a margin counted from the last row against one from the end.
             let slack = if exact { 0 } else { 2 };
             assert!(data.rows.start.abs_diff(first) <= slack && data.rows.end.abs_diff(last + 1) <= slack);

@@ -143,10 +143,10 @@ pub fn fit_motions(motions: &[MotionData], weights: &[f64], start: &[f64]) -> Op
         let sensitivity = if theta.len() > 12 { by_rows(12) } else { Matrix3::zeros() };
         let errors = motions.iter().zip(weights).flat_map(|(motion, weight)| {
             let [before, after] = motion.ends().map(UnitQuaternion::from_quaternion);
-            let carried = motion.samples.iter().fold(before, |attitude, (rate, held, block)| {
-                let (earth, force) = motion.surroundings(*block);
-                let rate = gain * (rate - bias - sensitivity * force) - earth;
-                attitude * UnitQuaternion::from_scaled_axis(rate * *held)
+            let carried = motion.samples.iter().fold(before, |attitude, sample| {
+                let (earth, force) = motion.surroundings(sample.block);
+                let rate = gain * (sample.rate - bias - sensitivity * force) - earth;
+                attitude * UnitQuaternion::from_scaled_axis(rate * sample.held)
             });
             let r = (after.inverse() * carried).scaled_axis() * *weight;
             [r.x, r.y, r.z]

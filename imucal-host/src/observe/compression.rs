@@ -17,8 +17,17 @@ pub struct Compressed {
     pub durations: Vec<f64>,
     /// First row of each, and the one after its last.
     pub rows: Vec<Range<usize>>,
-    /// Each sample's rate, rad/s, how long it is held, s, and the block it is in.
-    pub samples: Vec<(Vector3<f64>, f64, usize)>,
+}
+
+/// A sample in its block.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample {
+    /// Its rate, rad/s.
+    pub rate: Vector3<f64>,
+    /// How long it is held, s.
+    pub held: f64,
+    /// Index of the block it is in.
+    pub block: usize,
 }
 
 /// The block of the same rates multiplied by a matrix M: M s0, M s1, and cof(M) c.
@@ -39,14 +48,19 @@ pub fn jump(time: &[f64], rows: &[usize], interval: f64) -> Option<usize> {
 }
 
 /// Compresses rows to blocks of `size` samples. `rate` gives that of a row, rad/s; it is held from half-way to the
-/// sample before it to half-way to the one after (the trapezoidal rule).
-pub fn compress(time: &[f64], rows: &[usize], size: u16, rate: impl Fn(usize) -> Vector3<f64>) -> Compressed {
+/// sample before it to half-way to the one after (the trapezoidal rule). `each` is called with each sample in its turn.
+pub fn compress(
+    time: &[f64],
+    rows: &[usize],
+    size: u16,
+    rate: impl Fn(usize) -> Vector3<f64>,
+    mut each: impl FnMut(Sample),
+) -> Compressed {
     let count = rows.len() / usize::from(size) + 1;
     let mut all = Compressed {
         blocks: Vec::with_capacity(count),
         durations: Vec::with_capacity(count),
         rows: Vec::with_capacity(count),
-        samples: Vec::with_capacity(rows.len()),
     };
     let mut builder = BlockBuilder::default();
     let mut first = 0;
@@ -55,7 +69,7 @@ pub fn compress(time: &[f64], rows: &[usize], size: u16, rate: impl Fn(usize) ->
         let to = rows.get(index + 1).map_or(time[row], |next| time[*next]);
         let (rate, held) = (rate(row), 0.5 * (to - from));
         builder.push(&rate, held);
-        all.samples.push((rate, held, all.blocks.len()));
+        each(Sample { rate, held, block: all.blocks.len() });
         if builder.count() < size && index + 1 < rows.len() {
             continue;
         }
@@ -75,10 +89,12 @@ mod tests {
     #[test]
     fn seven_samples_are_two_blocks_that_last_as_long_as_they() {
         let time: Vec<f64> = (0..8).map(f64::from).collect();
-        let all = compress(&time, &[0, 1, 2, 4, 5, 6, 7], 5, |row| Vector3::x() * row as f64);
-        assert_eq!((all.rows, all.samples[5].2), (vec![0..6, 6..8], 1));
+        let mut samples = Vec::new();
+        let rate = |row| Vector3::x() * row as f64;
+        let all = compress(&time, &[0, 1, 2, 4, 5, 6, 7], 5, rate, |sample| samples.push(sample));
+        assert_eq!((all.rows, samples[5].block), (vec![0..6, 6..8], 1));
         assert!((all.durations.iter().sum::<f64>() - 7.0).abs() < 1e-12);
-        let turned: f64 = all.samples.iter().map(|(rate, held, _)| rate.x * held).sum();
+        let turned: f64 = samples.iter().map(|sample| sample.rate.x * sample.held).sum();
         assert!((turned - 24.5).abs() < 1e-12, "{turned}");
     }
 

@@ -12,7 +12,11 @@ use imucal_core::{
 };
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
-use super::{compression, compression::jump, turn::TurnGap};
+use super::{
+    compression,
+    compression::{Sample, jump},
+    turn::TurnGap,
+};
 use crate::{noise::Span, recording::Recording};
 
 /// A block lasts about this long, s: five samples at 100 Hz.
@@ -107,8 +111,8 @@ pub struct MotionData {
     pub rows: Range<usize>,
     /// When, s.
     pub span: Span,
-    /// Each sample's rate less the wander, rad/s, how long it is held, s, and the block it is in.
-    pub samples: Vec<(Vector3<f64>, f64, usize)>,
+    /// Samples, their rates less the wander.
+    pub samples: Vec<Sample>,
     blocks: Vec<Block<f64>>,
     durations: Vec<f64>,
     earth: Vec<Vector3<f64>>,
@@ -131,7 +135,7 @@ impl MotionData {
             let still = compression::shifted(block, &-bias, *duration);
             *block = compression::shifted(&compression::stretched(&still, stretch), bias, *duration);
         }
-        self.samples.iter_mut().for_each(|(rate, _, _)| *rate = stretch * (*rate - bias) + bias);
+        self.samples.iter_mut().for_each(|sample| sample.rate = stretch * (sample.rate - bias) + bias);
         self
     }
 
@@ -228,8 +232,9 @@ impl MotionInput<'_> {
             return Err(TurnGap::Jump { row });
         }
         let size = (BLOCK / self.interval).round().clamp(1.0, MOST_SAMPLES) as u16;
-        let compressed =
-            compression::compress(self.time, &all, size, |k| self.rates[k] - wander(self.time[k]));
+        let rate = |k: usize| self.rates[k] - wander(self.time[k]);
+        let mut samples = Vec::with_capacity(all.len());
+        let compressed = compression::compress(self.time, &all, size, rate, |sample| samples.push(sample));
         let at = |rows: &Range<usize>| {
             self.attitude_near(rows.clone()).ok_or(TurnGap::NoAttitude { row: rows.start })
         };
@@ -238,7 +243,7 @@ impl MotionInput<'_> {
         Ok(MotionData {
             span: self.time[rows.start]..self.time[rows.end - 1],
             rows,
-            samples: compressed.samples,
+            samples,
             after: [u32::try_from(compressed.blocks.len()).unwrap_or(u32::MAX)],
             blocks: compressed.blocks,
             durations: compressed.durations,

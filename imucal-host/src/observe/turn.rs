@@ -19,6 +19,19 @@ pub const BLOCK: u16 = 5;
 /// How far into a rest a turn reaches, s; a quarter of the rest where that is shorter.
 pub const MARGIN: f64 = 0.25;
 
+/// A gyroscope's samples as turns are made of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Rates<'a> {
+    /// Time, s.
+    pub time: &'a [f64],
+    /// Rates, nominal rad/s.
+    pub values: &'a [Vector3<f64>],
+    /// Rows in which they are usable.
+    pub usable: &'a [bool],
+    /// Usual interval, s.
+    pub interval: f64,
+}
+
 /// A turn's blocks, owned.
 #[derive(Clone, Debug)]
 pub struct TurnData {
@@ -119,40 +132,28 @@ fn turn_rows(time: &[f64], before: &Range<usize>, after: &Range<usize>) -> Range
 /// # Errors
 /// [`TurnGap`], with the row, where the motion was not wholly recorded.
 pub fn compress(
-    time: &[f64],
-    gyr: &[Vector3<f64>],
-    usable: &[bool],
-    interval: f64,
-    rests: (usize, &Range<usize>, usize, &Range<usize>),
+    rates: Rates<'_>,
+    (rest_before, before, rest_after, after): (usize, &Range<usize>, usize, &Range<usize>),
     bias: &BiasPath,
 ) -> Result<TurnData, TurnGap> {
-    let (rest_before, before, rest_after, after) = rests;
-    compress_rows(
-        time,
-        gyr,
-        usable,
-        interval,
-        turn_rows(time, before, after),
-        (rest_before, rest_after),
-        bias,
-    )
+    let rows = turn_rows(rates.time, before, after);
+    compress_rows(rates, rows, (rest_before, rest_after), bias, |rate| rate)
 }
 
-/// Compresses the rows of a turn between two rests, by their indices. Rates are taken less the bias path.
+/// Compresses the rows of a turn between two rests, by their indices. Rates are taken less the bias path, and what `altered` makes
+/// of them is integrated.
 ///
 /// # Errors
 /// [`TurnGap`], with the row, where the motion was not wholly recorded.
 pub fn compress_rows(
-    time: &[f64],
-    gyr: &[Vector3<f64>],
-    usable: &[bool],
-    interval: f64,
+    Rates { time, values, usable, interval }: Rates<'_>,
     rows: Range<usize>,
     (rest_before, rest_after): (usize, usize),
     bias: &BiasPath,
+    altered: impl Fn(Vector3<f64>) -> Vector3<f64>,
 ) -> Result<TurnData, TurnGap> {
     // A dropout is bridged by its neighbours; what was clipped or stuck is not what was turned.
-    let measured: Vec<usize> = rows.clone().filter(|k| gyr[*k].iter().all(|w| w.is_finite())).collect();
+    let measured: Vec<usize> = rows.clone().filter(|k| values[*k].iter().all(|w| w.is_finite())).collect();
     if let Some(row) = measured.iter().find(|k| !usable[**k]) {
         return Err(TurnGap::Unusable { row: *row });
     }
@@ -162,8 +163,9 @@ pub fn compress_rows(
     if let Some(row) = jump(time, &measured, interval) {
         return Err(TurnGap::Jump { row });
     }
-    let Compressed { blocks, durations, .. } =
-        compression::compress(time, &measured, BLOCK, |k| gyr[k] - bias.at(time[k]));
+    let rate = |k: usize| altered(values[k] - bias.at(time[k]));
+    let Compressed { blocks, durations, rows: _ } =
+        compression::compress(time, &measured, BLOCK, rate, |_| ());
     Ok(TurnData { rest_before, rest_after, rows, bias: *bias, blocks, durations })
 }
 
@@ -190,7 +192,8 @@ mod tests {
         // The rests as a coarse threshold would find them: the turn's ends are cut off.
         let (before, after) = (0..215, 385..600);
         let path = BiasPath { before: (1.0, bias), after: (5.0, bias) };
-        let data = compress(&time, &gyr, &usable, dt, (0, &before, 1, &after), &path).unwrap();
+        let rates = Rates { time: &time, values: &gyr, usable: &usable, interval: dt };
+        let data = compress(rates, (0, &before, 1, &after), &path).unwrap();
         let turn = data.between(Vector3::z(), Vector3::y());
         let c = attitude(&Triad::identity(), &turn);
         assert!((c.tr_mul(&Vector3::z()) - Vector3::y()).norm() < 2e-4, "{c}");
@@ -203,7 +206,8 @@ mod tests {
         let mut usable = vec![true; 300];
         usable[150] = false;
         let path = BiasPath { before: (0.5, Vector3::zeros()), after: (2.5, Vector3::zeros()) };
-        let result = compress(&time, &gyr, &usable, 0.01, (0, &(0..100), 1, &(200..300)), &path);
+        let rates = Rates { time: &time, values: &gyr, usable: &usable, interval: 0.01 };
+        let result = compress(rates, (0, &(0..100), 1, &(200..300)), &path);
         assert_eq!(result.unwrap_err(), TurnGap::Unusable { row: 150 });
     }
 }

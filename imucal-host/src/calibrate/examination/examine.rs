@@ -24,9 +24,7 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::{
-    gyr_residual,
-    gyr_residual::Rates,
-    norm_residual,
+    gyr_residual, norm_residual,
     norm_residual::Columns,
     residual_driver::Course,
     tested::{Tested, judged},
@@ -44,6 +42,7 @@ use crate::{
     observe::{
         held,
         rest_halves::{self, MeanVariance},
+        turn::Rates,
     },
     recording::{Recording, SensorKind, check::integrity::Integrity, unit::STANDARD_GRAVITY},
 };

@@ -24,24 +24,11 @@ use crate::{
         outcome::KnownTurn,
         suspicion::Follows,
     },
-    observe::turn::{TurnData, compress_rows},
+    observe::turn::{Rates, TurnData, compress_rows},
 };
 
 /// Rates are altered by this share of the largest.
 const SHARE: f64 = 1e-3;
-
-/// A gyroscope's samples as turns are made of them.
-#[derive(Clone, Copy, Debug)]
-pub struct Rates<'a> {
-    /// Time, s.
-    pub time: &'a [f64],
-    /// Rates, nominal rad/s.
-    pub values: &'a [Vector3<f64>],
-    /// Rows in which they are usable.
-    pub usable: &'a [bool],
-    /// Usual interval, s.
-    pub interval: f64,
-}
 
 /// How a rate is altered, and what a residual with it follows.
 type Alteration = (&'static str, fn(f64) -> f64);
@@ -76,28 +63,23 @@ fn largest(turns: &[KnownTurn], rates: Rates<'_>) -> f64 {
     turns.iter().map(of).fold(0.0, f64::max)
 }
 
-/// Residuals with altered rates, less those without, by the alteration's size; `None` where nothing moves.
+/// Residuals with altered rates, less those without, by the alteration's size; `None` where nothing moves. `most` is the largest rate
+/// of any turn, rad/s.
 fn column(
     turns: &[KnownTurn],
     rates: Rates<'_>,
-    theta: &SVector<f64, 9>,
-    as_is: &[f64],
+    (theta, as_is): (&SVector<f64, 9>, &[f64]),
+    most: f64,
     (axis, of): (usize, fn(f64) -> f64),
 ) -> Option<Vec<f64>> {
-    let most = largest(turns, rates);
     let size = SHARE * most / of(most);
-    let mut values = rates.values.to_vec();
-    for turn in turns {
-        for k in turn.data.rows.clone() {
-            let was = rates.values[k][axis];
-            values[k][axis] = was + size * of(was - turn.data.bias.at(rates.time[k])[axis]);
-        }
-    }
     let again = |turn: &KnownTurn| {
         let ends = (turn.data.rest_before, turn.data.rest_after);
-        let rows = turn.data.rows.clone();
-        let data =
-            compress_rows(rates.time, &values, rates.usable, rates.interval, rows, ends, &turn.data.bias);
+        let altered = |mut rate: Vector3<f64>| {
+            rate[axis] += size * of(rate[axis]);
+            rate
+        };
+        let data = compress_rows(rates, turn.data.rows.clone(), ends, &turn.data.bias, altered);
         Some(data.ok()?.stretched(&turn.stretch))
     };
     let data: Option<Vec<TurnData>> = turns.iter().map(again).collect();
@@ -115,10 +97,10 @@ pub fn columns(
     courses: &[Course],
 ) -> Vec<Columns> {
     let count = rows.residuals.len();
+    let most = largest(turns, rates);
     let altered = ALTERATIONS.par_iter().filter_map(|(name, of)| {
-        let axes: Option<Vec<_>> =
-            (0..3).map(|axis| column(turns, rates, theta, &rows.residuals, (axis, *of))).collect();
-        let axes = axes?;
+        let of_axis = |axis| column(turns, rates, (theta, &rows.residuals), most, (axis, *of));
+        let axes: Vec<_> = (0..3).into_par_iter().map(of_axis).collect::<Option<_>>()?;
         let values = DMatrix::from_fn(count, 3, |row, axis| axes[axis][row]);
         Some(Columns { follows: Follows::Rate, name: (*name).into(), values })
     });

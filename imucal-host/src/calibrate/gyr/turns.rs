@@ -42,7 +42,7 @@ use crate::{
             turns::{self as warm_turns, WarmTurns},
         },
     },
-    observe::turn::{BiasPath, TurnData, compress},
+    observe::turn::{BiasPath, Rates, TurnData, compress},
     recording::{SensorKind, Triple, Unit},
 };
 
@@ -112,12 +112,17 @@ impl GyrInput<'_> {
             let path =
                 BiasPath { before: (self.rests[i].time, mean(i)), after: (self.rests[j].time, mean(j)) };
             let ends = (i, &self.rows[i], j, &self.rows[j]);
-            match compress(self.time, &self.sensor.values, self.usable, self.interval, ends, &path) {
+            match compress(self.rates(), ends, &path) {
                 Ok(data) => turns.data.push(data),
                 Err(gap) => turns.left_out.push(format!("turn from rest {} to {}: {gap}", i + 1, j + 1)),
             }
         }
         turns
+    }
+
+    fn rates(&self) -> Rates<'_> {
+        let Self { time, usable, interval, .. } = *self;
+        Rates { time, values: &self.sensor.values, usable, interval }
     }
 
     fn at_rest(&self) -> AtRest<'_> {

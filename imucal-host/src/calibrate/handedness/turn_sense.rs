@@ -26,7 +26,7 @@ use crate::{
     effect::axis_swap,
     observe::{
         rest::{RestDetector, Samples},
-        turn::{BiasPath, TurnData, compress},
+        turn::{BiasPath, Rates, TurnData, compress},
     },
     recording::{Recording, median},
 };
@@ -125,6 +125,7 @@ fn turns(recording: &Recording, rests: &[Range<usize>], acc: &Triad<f64>) -> Opt
         })
         .collect();
     let step = moved.len().div_ceil(TURNS.1).max(1);
+    let rates = Rates { time: &recording.time, values: &gyr.values, usable: &usable, interval };
     let turns: Turns = moved
         .into_iter()
         .step_by(step)
@@ -132,7 +133,7 @@ fn turns(recording: &Recording, rests: &[Range<usize>], acc: &Triad<f64>) -> Opt
             let [before, after] = [&still[k - 1], &still[k]];
             let path = BiasPath { before: (before.2, before.1), after: (after.2, after.1) };
             let ends = (k - 1, &rests[k - 1], k, &rests[k]);
-            let data = compress(&recording.time, &gyr.values, &usable, interval, ends, &path).ok()?;
+            let data = compress(rates, ends, &path).ok()?;
             Some((data, [before.0, after.0]))
         })
         .unzip();
