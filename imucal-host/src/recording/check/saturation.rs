@@ -1,8 +1,9 @@
 //! Stretches in which an axis is at its limit.
 
-use std::ops::Range;
+use std::{cell::OnceCell, ops::Range};
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use crate::recording::{order_statistics::median, triple::Triple, unit::Unit};
 
@@ -38,7 +39,7 @@ const WITNESSES: usize = 10;
 
 /// Saturated stretches of all axes, in order of axis and row.
 pub(crate) fn find(triple: &Triple) -> Vec<Saturation> {
-    (0..3).flat_map(|axis| AxisSamples::new(triple, axis).saturated()).collect()
+    (0..3).into_par_iter().flat_map_iter(|axis| AxisSamples::new(triple, axis).saturated()).collect()
 }
 
 /// One axis in SI units.
@@ -46,14 +47,18 @@ struct AxisSamples<'a> {
     triple: &'a Triple,
     axis: usize,
     values: Vec<f64>,
-    runs: Vec<Range<usize>>,
+    /// Found when they are first asked for: of noise an extreme is seldom seen often enough.
+    runs: OnceCell<Vec<Range<usize>>>,
 }
 
 impl<'a> AxisSamples<'a> {
     fn new(triple: &'a Triple, axis: usize) -> Self {
         let values: Vec<f64> = triple.values.iter().map(|value| value[axis]).collect();
-        let runs = runs(&values);
-        Self { triple, axis, values, runs }
+        Self { triple, axis, values, runs: OnceCell::new() }
+    }
+
+    fn runs(&self) -> &[Range<usize>] {
+        self.runs.get_or_init(|| runs(&self.values))
     }
 
     fn saturated(&self) -> Vec<Saturation> {
@@ -93,17 +98,19 @@ impl<'a> AxisSamples<'a> {
 
     /// Whether an extreme is a clip and not where a quantised rest happens to lie.
     fn is_clipped(&self, extreme: f64, extremes: [f64; 2]) -> bool {
+        if self.values.iter().filter(|value| **value == extreme).count() < PILE {
+            return false;
+        }
         let at = |run: &&Range<usize>| self.values[run.start] == extreme;
-        let piled: usize = self.runs.iter().filter(at).map(Range::len).sum();
         let inner =
-            || self.runs.iter().filter(|run| !extremes.contains(&self.values[run.start])).map(Range::len);
-        if piled < PILE || inner().count() < WITNESSES {
+            || self.runs().iter().filter(|run| !extremes.contains(&self.values[run.start])).map(Range::len);
+        if inner().count() < WITNESSES {
             return false;
         }
         let longest_inner = inner().max().unwrap_or(1);
         let usual = median(inner().map(|length| length as f64).collect()).unwrap_or(1.0) as usize;
         let step = self.usual_step();
-        self.runs.iter().filter(at).any(|run| {
+        self.runs().iter().filter(at).any(|run| {
             let stays = run.len() >= LONG.max(LONGER * longest_inner) && self.others_move(run);
             let steep = run.len() >= SHORT * usual.max(1) && run.len() >= SHORT && self.is_steep(run, step);
             stays || steep

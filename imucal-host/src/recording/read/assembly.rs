@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use super::{
     clock::Clock,
@@ -62,10 +63,10 @@ fn converted(path: &Path, manifest: Manifest, mut table: Table) -> Result<(Recor
     }
     check_time(path, &time, (&table.places, &table.clock), manifest.units.t)?;
     let segment = segments(path, &table)?;
-    let mut sensors = Vec::with_capacity(3);
-    for kind in SensorKind::ALL {
-        sensors.push(triple(path, &manifest, &table, kind)?);
-    }
+    // All before the first fault is looked for: which one is reported does not depend on threads.
+    let of = |kind: &SensorKind| triple(path, &manifest, &table, *kind);
+    let sensors: Vec<_> = SensorKind::ALL.par_iter().map(of).collect();
+    let sensors = sensors.into_iter().collect::<Result<Vec<_>, _>>()?;
     let [acc, gyr, mag] = <[Option<Triple>; 3]>::try_from(sensors).unwrap_or_default();
     let angle = 1.0 / manifest.units.gimbal.per_si();
     let mut recording = Recording {
