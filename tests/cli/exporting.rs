@@ -121,6 +121,27 @@ fn covariances_of_another_calibration_or_for_another_target_are_refused() {
 }
 
 #[test]
+fn a_covariance_that_is_none_is_refused_with_its_fault() {
+    let faults: [(fn(&mut Value), &str); 5] = [
+        (|acc| acc["covariance_of"][1] = "gain_99".into(), "an unknown entry `gain_99`"),
+        (|acc| acc["covariance_of"][1] = acc["covariance_of"][0].clone(), "twice"),
+        (|acc| acc["covariance"][2] = serde_json::json!([1.0]), "a row of 1 numbers for 9 entries"),
+        (|acc| drop(acc["covariance"].as_array_mut().and_then(Vec::pop)), "8 rows for 9 entries"),
+        (|acc| acc["covariance"][4][4] = Value::Null, "null in place of a number"),
+    ];
+    let folder = Folder::with_recording();
+    folder.run("calibrate small.csv --out cal.toml --json cal.json").with(0);
+    let whole: Value = serde_json::from_str(&folder.text("cal.json")).expect("JSON");
+    for (damage, fault) in faults {
+        let mut damaged = whole.clone();
+        damage(&mut damaged["sensors"]["acc"]);
+        folder.write("cal.json", &damaged.to_string());
+        let run = folder.run("export cal.toml --covariance cal.json --to python").with(2);
+        run.telling(&["cal.json", fault, "covariance of acc", "a square matrix of numbers"]);
+    }
+}
+
+#[test]
 fn what_a_diagnosis_found_is_listed_with_its_sizes() {
     let folder = Folder::with_calibration();
     let rig = folder.path("rig.csv");

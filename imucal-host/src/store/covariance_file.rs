@@ -66,6 +66,19 @@ pub enum CovarianceFileError {
         /// What was found.
         found: String,
     },
+    /// A sensor's covariance is not one.
+    #[error(
+        "{path}: found {found} in the covariance of {sensor}, expected a square matrix of numbers, with a row for each entry that \
+         covariance_of names; give the file as `imucal calibrate --json` wrote it"
+    )]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// Which sensor.
+        sensor: SensorKind,
+        /// What was found.
+        found: String,
+    },
     /// The file is of another calibration.
     #[error(
         "{path}: found another {what} of {sensor} than the calibration's, expected the same; give the file that the same \
@@ -98,18 +111,30 @@ struct Sensor {
 }
 
 impl Sensor {
-    fn read(self) -> Option<EntryCovariance> {
-        let place = |name: &String| (0..ENTRIES).find(|entry| entry_name(*entry) == *name);
-        let entries: Vec<u8> = self.covariance_of?.iter().map(place).collect::<Option<_>>()?;
-        let rows: Vec<Vec<f64>> =
-            self.covariance?.into_iter().map(|row| row.into_iter().collect()).collect::<Option<_>>()?;
-        let repeated = entries.iter().enumerate().any(|(at, entry)| entries[..at].contains(entry));
-        if repeated {
-            return None;
+    /// `None` where the sensor was not fitted. The error says what is found in place of a covariance.
+    fn read(self) -> Result<Option<EntryCovariance>, String> {
+        let (Some(names), Some(rows)) = (self.covariance_of, self.covariance) else { return Ok(None) };
+        let (Some(gain), Some(bias)) = (self.gain, self.bias) else { return Ok(None) };
+        let mut entries: Vec<u8> = Vec::with_capacity(names.len());
+        for name in names {
+            let place = (0..ENTRIES).find(|entry| entry_name(*entry) == name);
+            let entry = place.ok_or_else(|| format!("an unknown entry `{name}`"))?;
+            if entries.contains(&entry) {
+                return Err(format!("the entry `{name}` twice"));
+            }
+            entries.push(entry);
         }
-        let square = rows.len() == entries.len() && rows.iter().all(|row| row.len() == entries.len());
-        let covariance = square.then(|| DMatrix::from_fn(entries.len(), entries.len(), |i, j| rows[i][j]))?;
-        Some(EntryCovariance { entries, covariance, gain: self.gain?, bias: self.bias? })
+        let count = entries.len();
+        if let Some(row) = rows.iter().find(|row| row.len() != count) {
+            return Err(format!("a row of {} numbers for {count} entries", row.len()));
+        }
+        if rows.len() != count {
+            return Err(format!("{} rows for {count} entries", rows.len()));
+        }
+        let numbers: Option<Vec<f64>> = rows.into_iter().flatten().collect();
+        let numbers = numbers.ok_or("null in place of a number")?;
+        let covariance = DMatrix::from_row_slice(count, count, &numbers);
+        Ok(Some(EntryCovariance { entries, covariance, gain, bias }))
     }
 }
 
@@ -136,8 +161,15 @@ impl CovarianceFile {
             return Err(foreign(format!("`{}`", document.format)));
         }
         let mut found = document.sensors;
-        let of = |kind: SensorKind| Some((kind, found.remove(kind.prefix())?.read()?));
-        let file = Self { sensors: SensorKind::ALL.into_iter().filter_map(of).collect() };
+        let mut sensors = Vec::new();
+        for kind in SensorKind::ALL {
+            // A sensor that the calibration lacks was refused, and nothing uses its covariance.
+            let wanted = calibration.triad(kind).and_then(|_| found.remove(kind.prefix()));
+            let unusable = |found| CovarianceFileError::Unusable { path: path.into(), sensor: kind, found };
+            let covariance = wanted.map(Sensor::read).transpose().map_err(unusable)?.flatten();
+            sensors.extend(covariance.map(|covariance| (kind, covariance)));
+        }
+        let file = Self { sensors };
         for (sensor, own) in &file.sensors {
             if let Some(what) = own.differs(calibration, *sensor) {
                 return Err(CovarianceFileError::Other { path: path.into(), sensor: *sensor, what });
