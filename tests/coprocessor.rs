@@ -110,7 +110,7 @@ fn the_loop_of_the_readme_ends_where_it_began_after_each_power_cycle() {
         for (option, path) in paths {
             arguments.extend([(*option).to_owned(), path.display().to_string()]);
         }
-        // Each call starts the co-processor anew, with nothing but its flash.
+        // Each call starts the co-processor again, with nothing but its flash.
         arguments.extend(["--device".into(), device.clone(), "--flash".into(), flash.display().to_string()]);
         program::run(PROGRAM, &[], &arguments)
     };

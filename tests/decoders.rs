@@ -1,5 +1,5 @@
 //! The decoders of frames and records, fed with damaged ones by a seed: the fuzzer's questions where there is no
-//! fuzzer. `tests/run` fuzzes besides, where there is one.
+//! fuzzer. `tests/run` also fuzzes, where there is one.
 
 use firmware_example::{RECORD, drill, scene::Noise};
 use imucal_core::{

@@ -1,5 +1,5 @@
 //! A delay that is put between the sensor and its reference is reported with its sign and size, from 2 ms to 50 ms, along a
-//! real optical reference and beside a robot's simulator.
+//! real optical reference and with a robot's simulator.
 
 use imucal_host::{
     diagnosis::{Diagnosis, Options, diagnose},
@@ -63,7 +63,7 @@ fn a_delay_of_a_simulator_s_stream_is_reported() {
         RobotScene { kind: RobotKind::Wheeled, duration: 60.0, real_rate: 100.0, ..RobotScene::default() };
     let pair = scene.record("drive").expect("a scene");
     DELAYS.par_iter().for_each(|delay| {
-        let mut stream = Stream::beside(&pair.simulated, &pair.real).expect("a stream");
+        let mut stream = Stream::of_pair(&pair.simulated, &pair.real).expect("a stream");
         // The row of t then shows the stream of t + delay.
         stream.time.iter_mut().for_each(|time| *time += delay);
         let options = Options { stream: Some(stream), ..Options::default() };

@@ -52,7 +52,7 @@ const IN_INTEGERS: f64 = 200.0;
 /// Flash that reading a record, correcting, and fitting, judging and packing every model may take on the board with a
 /// floating-point unit, bytes.
 const FLASH_WITH_FITS: u64 = 52 * 1024;
-/// RAM of a fit of 64 rests, and of a swarm of 40 in twelve parameters beside its blocks, bytes.
+/// RAM of a fit of 64 rests, and of a swarm of 40 in twelve parameters without its blocks, bytes.
 const RAM: [usize; 2] = [4096, 8192];
 /// Stack, bytes; and no image may need more than it has.
 const STACK: u32 = 8 * 1024;

@@ -178,7 +178,7 @@ fn a_lone_episode_is_placed_where_it_began_and_ended_despite_drift() {
 
 #[test]
 fn what_a_fit_does_not_keep_is_not_asserted() {
-    // An episode that a quiet noise promises beside the true cause, and that its own fit would rather be without.
+    // An episode that a quiet noise promises next to the true cause, and that its own fit would rather be without.
     let (_, diagnosis) = drawn(OTHERS, 526);
     assert_eq!(named(&diagnosis), ["mag.temp_scale"]);
 }

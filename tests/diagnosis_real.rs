@@ -204,8 +204,8 @@ fn two_parts_of_one_recording_seldom_differ() {
             let own: Vec<&str> = own.iter().flat_map(names).collect();
             for (direction, calibrated, diagnosed) in [("forth", &one, &other), ("back", &other, &one)] {
                 let model = model(calibrated);
-                let told = if HAND.contains(&name) { SensorKind::Acc } else { SensorKind::Gyr };
-                assert!(model.triad(told).is_some(), "{name} {how} {direction}: no model");
+                let modelled = if HAND.contains(&name) { SensorKind::Acc } else { SensorKind::Gyr };
+                assert!(model.triad(modelled).is_some(), "{name} {how} {direction}: no model");
                 let diagnosis = against(diagnosed, &model);
                 let differing: Vec<&str> =
                     names(&diagnosis).into_iter().filter(|id| !own.contains(id)).collect();
@@ -227,12 +227,12 @@ fn added(recording: &Recording, calm: impl Fn(f64) -> bool, during: impl Fn(f64)
     let attitudes = of_reference(recording.reference.as_deref().expect("an optical reference"));
     let samples = &recording.mag.as_ref().expect("a magnetometer").values;
     let rows = || recording.time.iter().zip(attitudes.iter().zip(samples));
-    let told = || {
+    let known = || {
         rows().filter_map(|(time, (c_t_n, b))| Some((*time, (*c_t_n)?, *b))).filter(|(.., b)| b.x.is_finite())
     };
     let mean = |each: Vec<Vector3<f64>>| each.iter().sum::<Vector3<f64>>() / each.len() as f64;
-    let field = mean(told().filter(|(time, ..)| calm(*time)).map(|(_, c_t_n, b)| c_t_n * b).collect());
-    mean(told().filter(|(time, ..)| during(*time)).map(|(_, c_t_n, b)| b - c_t_n.tr_mul(&field)).collect())
+    let field = mean(known().filter(|(time, ..)| calm(*time)).map(|(_, c_t_n, b)| c_t_n * b).collect());
+    mean(known().filter(|(time, ..)| during(*time)).map(|(_, c_t_n, b)| b - c_t_n.tr_mul(&field)).collect())
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! A robot's recordings beside its simulator's streams, both by an independent simulator whose effects are known: the
+//! A robot's recordings with its simulator's streams, both by an independent simulator whose effects are known: the
 //! diagnosis names them with their sizes, and no others.
 
 use std::{path::PathBuf, sync::OnceLock};
@@ -25,7 +25,7 @@ fn folder() -> Option<PathBuf> {
 fn pair(name: &str) -> Option<(Recording, Stream)> {
     let read = |path: String| Some(Recording::read(&folder()?.join(path)).expect("a good recording"));
     let (real, simulated) = (read(format!("{name}-real.csv.gz"))?, read(format!("{name}-sim.csv.gz"))?);
-    let stream = Stream::beside(&simulated, &real).expect("a stream");
+    let stream = Stream::of_pair(&simulated, &real).expect("a stream");
     Some((real, stream))
 }
 
@@ -53,7 +53,7 @@ fn amount<'d>(diagnosis: &'d Diagnosis, effect: &str, parameter: &str) -> Option
     cause.parameters.iter().find(|amount| amount.name == parameter)
 }
 
-/// The truth and nothing besides; an effect of no catalogue is called unknown and nothing is asserted.
+/// The truth and nothing else; an effect of no catalogue is called unknown and nothing is asserted.
 fn is_right(diagnosis: &Diagnosis, label: &Value) -> bool {
     let effects = label["effects"].as_object().expect("a map");
     let (outside, inside): (Vec<&str>, Vec<&str>) =

@@ -65,7 +65,7 @@ fn the_dip_of_pairs_left_out_is_that_of_the_others() {
             })
             .collect();
         let held_out = rms(&errors).to_degrees();
-        let reported = alignment.held_out_rms.expect("told").to_degrees();
+        let reported = alignment.held_out_rms.expect("reported").to_degrees();
         println!(
             "{file}: held out {held_out:.3}°, reported {reported:.3}°, dip {:.2}°",
             alignment.dip.0.to_degrees()

@@ -36,7 +36,7 @@ fn every_image_links_without_panic_or_allocator_and_runs() {
 }
 
 #[test]
-fn each_end_of_a_run_is_told_to_the_next_with_its_address() {
+fn each_end_of_a_run_is_reported_to_the_next_with_its_address() {
     if !ready() {
         return;
     }

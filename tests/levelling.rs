@@ -165,7 +165,7 @@ fn poses_that_cannot_separate_tilt_from_k_keep_the_level_base() {
     let exact = poses(&draw.triad(DOWN, 0.5), ZYX, &at, 0.0, &mut draw);
     let held = fitted("I14", &exact).fit.held;
     assert_eq!(held.iter().map(|(entry, _)| *entry).collect::<Vec<_>>(), [12], "{held:?}");
-    // Noise tips the last digits, so that nothing is told by the others to the last: but with an error of degrees.
+    // Noise tips the last digits, so that nothing follows from the others to the last: but with an error of degrees.
     let noisy = fitted("I14", &poses(&draw.triad(DOWN, 0.5), ZYX, &at, SIGMA, &mut draw)).fit;
     assert!(noisy.held.iter().any(|(entry, _)| *entry == 12) || noisy.std(12).is_some_and(|std| std > 0.03));
 

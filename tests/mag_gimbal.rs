@@ -1,4 +1,4 @@
-//! Hard iron on the gimbals: what it leaves in a fit that does not know it, what of it can be told, and which of its
+//! Hard iron on the gimbals: what it leaves in a fit that does not know it, what of it can be observed, and which of its
 //! entries are held for any order of the rig's axes.
 
 use imucal_core::model::{
@@ -90,7 +90,7 @@ fn gimbal_sources_are_large_in_twelve_parameters_and_gone_in_eighteen() {
 }
 
 #[test]
-fn with_a_known_field_sixteen_of_eighteen_are_told_whatever_the_axes() {
+fn with_a_known_field_sixteen_of_eighteen_are_observable_whatever_the_axes() {
     for axes in AXES {
         let mut draw = Draw::new(40);
         let truth = on_gimbals(&mut draw);
@@ -176,7 +176,7 @@ fn sources_are_off_by_their_standard_errors() {
             (truth.outer_source[inner], 17 + inner),
             (truth.middle_source[outer], 20 + outer),
         ] {
-            let std = fit.std(entry as u8).filter(|std| *std > 0.0).expect("told by the poses");
+            let std = fit.std(entry as u8).filter(|std| *std > 0.0).expect("observable");
             scores.push((fit.parameters.to_vector()[entry] - expected) / std);
         }
     }

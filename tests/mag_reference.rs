@@ -154,7 +154,7 @@ fn mounting_and_field_are_found_and_errors_are_as_large_as_stated() {
         let field = fit.rig.as_ref().and_then(|rig| rig.field_n).expect("estimated");
         let direction = frame() * Vector3::new(25.3, 2.6, 40.1);
         assert!(field.angle(&direction).to_degrees() < 0.05, "{field} {direction}");
-        // 89 of 4500 rows hold no attitude: those that were lost, and with a lag those beside them.
+        // 89 of 4500 rows hold no attitude: those that were lost, and with a lag their neighbours.
         let samples = fit.observations;
         assert!((4400..4470).contains(&samples), "{samples}");
         let notes = fit.rig.as_ref().map(|rig| rig.notes.join("; ")).unwrap_or_default();

@@ -11,17 +11,17 @@ use imucal_host::{
 const RECORDINGS: u64 = 200;
 const FIRST: u64 = 1000;
 /// Parameters of each group that a recording tells, in the order of the groups.
-const TOLD: [usize; GROUPS.len()] = [9, 3, 2, 9, 3, 9, 3, 4];
+const OBSERVABLE: [usize; GROUPS.len()] = [9, 3, 2, 9, 3, 9, 3, 4];
 /// Groups of biases.
 const BIASES: [usize; 3] = [1, 4, 6];
 
 fn pooled(noise: Noise, base: Base) -> Scores {
     let scores = recovery::pooled(FIRST, RECORDINGS, noise, base).expect("possible recordings");
     println!("{noise:?}, {base:?}:");
-    for ((name, values), told) in GROUPS.into_iter().zip(&scores).zip(TOLD) {
+    for ((name, values), observable) in GROUPS.into_iter().zip(&scores).zip(OBSERVABLE) {
         let (mean, std) = moments(values);
         println!("  {name}: mean {mean:.3}, standard deviation {std:.3} of {}", values.len());
-        assert_eq!(values.len(), told * RECORDINGS as usize, "{name}: every one of every recording");
+        assert_eq!(values.len(), observable * RECORDINGS as usize, "{name}: every one of every recording");
     }
     scores
 }

@@ -91,7 +91,7 @@ fn gimbal_sources_close_what_twelve_parameters_leave() {
             findings(&calibration, SensorKind::Mag).sources.expect("estimated");
         let of_outer = labelled(&label, "mag.gimbal_hard_iron_outer");
         let of_middle = labelled(&label, "mag.gimbal_hard_iron_middle");
-        // Axes z, y, x: along y only the sum is told, and the middle gimbal's x is bias.
+        // Axes z, y, x: along y only the sum is observable, and the middle gimbal's x is bias.
         for (what, found, std, expected) in [
             ("outer x", outer.x, outer_std.x, of_outer.x),
             ("y of both", outer.y + middle.y, outer_std.y.hypot(middle_std.y), of_outer.y + of_middle.y),

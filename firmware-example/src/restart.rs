@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_run_ended_by_is_told_to_the_next_and_to_no_other() {
+    fn what_a_run_ended_by_is_reported_to_the_next_and_to_no_other() {
         let mut words = [0xA5A5_A5A5; 5];
         let power_on = LastReset { cause: ResetCause::PowerOn, address: 0, resets: 0 };
         assert_eq!(begin(&mut words), power_on);

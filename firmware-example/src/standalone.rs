@@ -31,10 +31,12 @@ pub const HEADER: usize = 56;
 /// Bytes of a sample.
 pub const SAMPLE: usize = 48;
 
-/// The session that there is memory for: 38 poses, turns of four blocks, 64 places of the field.
-pub type Standalone = Session<POSES, 4, 64>;
+/// The session that there is memory for: its poses, its turns by their blocks, and 64 places of the field.
+pub type Standalone = Session<POSES, BLOCKS, 64>;
 /// Rests that it keeps.
 pub const POSES: usize = 38;
+/// Blocks of a turn.
+pub const BLOCKS: usize = 4;
 
 /// Gives bytes of the tape, from an offset on.
 pub trait Tape {

@@ -103,7 +103,7 @@ fn the_gate_reaches_every_public_function_of_the_core() {
 }
 
 #[test]
-fn public_functions_are_told_from_private_and_from_tests() {
+fn public_functions_are_distinguished_from_private_and_from_tests() {
     let source = "pub fn free<T>() {\n}\nfn own() {\n}\nimpl<T: Into<f32>> Shell<T> {\n    pub const fn new() {\n    }\n    \
                   fn own() {}\n}\nmod inner {\n    impl Key {\n        pub const fn of() {\n        }\n    }\n}\n\
                   impl Shown for Shell<f32> {\n    fn show() {}\n}\nmod tests {\npub fn tested() {}\n";

@@ -6,7 +6,7 @@
 //! | record | corrector | a sample |
 //! | --- | --- | --- |
 //! | of [`FirstOrder`] | [`Corrector`] | subtractions and a product |
-//! | of [`HigherOrder`] | [`FullCorrector`] | the same, and what the record has besides |
+//! | of [`HigherOrder`] | [`FullCorrector`] | the same, and what else the record has |
 //!
 //! The types keep the two apart: a [`Corrector`] is not made from a record of higher order, whose terms it would leave
 //! out. The cost of a sample is asserted by `tests/firmware_link.rs` and `tests/device_cost.rs`.

@@ -14,7 +14,7 @@ use imucal_host::{
     },
 };
 
-/// The data's folder, or nothing, told loudly; a failure where the data must be there.
+/// The data's folder, or nothing, which is said loudly; a failure where the data must be there.
 fn data(folder: &str) -> Option<PathBuf> {
     let root = std::env::var_os("IMUCAL_DATA")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);

@@ -16,12 +16,12 @@ fn a_missing_axis_is_named_with_its_neighbours() {
 }
 
 #[test]
-fn a_misspelt_column_is_told_from_an_unknown_one() {
+fn a_misspelt_column_is_distinguished_from_an_unknown_one() {
     for (found, meant) in [("acc_X", "acc_x"), ("accx", "acc_x"), ("Acc_x", "acc_x"), ("acc-x", "acc_x")] {
         let mut bad = Bad::new();
         bad.line(1)[ACC] = found.into();
-        let told = [format!("`{found}`"), format!("`{meant}`")];
-        bad.calibrate().with(2).telling(&["small.csv, line 1", &told[0], &told[1]]);
+        let parts = [format!("`{found}`"), format!("`{meant}`")];
+        bad.calibrate().with(2).telling(&["small.csv, line 1", &parts[0], &parts[1]]);
     }
 }
 
@@ -36,16 +36,16 @@ fn all_columns_are_named_at_once_with_what_they_probably_are() {
     bad.rows.iter_mut().for_each(|row| drop(row.remove(MAG + 1)));
     bad.line(1).push("temp_c".into());
     bad.rows[1..].iter_mut().for_each(|row| row.push("20".into()));
-    let told = [
+    let parts = [
         "small.csv, line 1",
         "`timestamp` for `t`, `ax` for `acc_x`, `ay` for `acc_y`, `az` for `acc_z`",
         "`gyro_x (deg/s)` for `gyr_x`, `wy` for `gyr_y`, `wz` for `gyr_z`, `temp_c` for `temp`",
         "column `mag_y` is missing",
         "[units]",
     ];
-    bad.calibrate().with(2).telling(&told);
+    bad.calibrate().with(2).telling(&parts);
     let semicolons = bad.text().replace(',', ";");
-    bad.calibrate_bytes("small.csv", semicolons.as_bytes()).with(2).telling(&told).telling(&["semicolons"]);
+    bad.calibrate_bytes("small.csv", semicolons.as_bytes()).with(2).telling(&parts).telling(&["semicolons"]);
 }
 
 #[test]
@@ -63,7 +63,7 @@ fn a_file_without_time_is_refused() {
 }
 
 #[test]
-fn another_separator_is_told() {
+fn another_separator_is_reported() {
     let bad = Bad::new();
     let semicolons = bad.text().replace(',', ";");
     bad.calibrate_bytes("small.csv", semicolons.as_bytes())
@@ -106,7 +106,7 @@ fn samples_in_g_that_the_manifest_calls_si_are_refused() {
 }
 
 #[test]
-fn one_axis_in_g_beside_others_in_si_is_refused() {
+fn one_axis_in_g_among_others_in_si_is_refused() {
     let mut bad = Bad::new();
     in_si(&mut bad);
     bad.map(ACC + 2, |value| value / 9.80665);
@@ -265,7 +265,7 @@ fn a_part_of_a_reference_or_of_a_simulator_s_sensor_is_named_with_the_rest() {
 }
 
 #[test]
-fn misspelt_columns_of_a_reference_and_of_a_simulator_are_told() {
+fn misspelt_columns_of_a_reference_and_of_a_simulator_are_reported() {
     let mut bad = Bad::new();
     with(&mut bad, &["ref_p_x", "ref_py", "ref_pz", "sim_accx", "sim_acc_y", "sim_acc_z"], |_| "0".into());
     bad.calibrate().with(2).telling(&[

@@ -26,14 +26,14 @@ fn another_format_is_refused() {
 }
 
 #[test]
-fn a_misspelt_key_is_told_with_the_one_meant() {
+fn a_misspelt_key_is_reported_with_the_one_meant() {
     let mut bad = Bad::new();
     bad.manifest("gravity = ", "gravty = ");
     let ended = bad.calibrate();
     ended.telling(&["small.toml, line", "gravty", "gravity"]);
     let mut bad = Bad::new();
     bad.manifest("[units]", "[unit]");
-    // Then the samples cannot be understood either, and both are told.
+    // Then the samples cannot be understood either, and both are reported.
     bad.calibrate().with(2).telling(&[
         "small.csv, from line 2 on, sensor acc",
         "small.toml, line",

@@ -77,7 +77,7 @@ fn names(diagnosis: &Diagnosis) -> Vec<&str> {
 }
 
 #[track_caller]
-fn assert_told(diagnosis: &Diagnosis, words: &[&str]) {
+fn assert_reported(diagnosis: &Diagnosis, words: &[&str]) {
     let has_all = |remark: &String| words.iter().all(|word| remark.contains(word));
     assert!(diagnosis.remarks.iter().any(has_all), "{words:?} in {:?}", diagnosis.remarks);
 }
@@ -99,7 +99,7 @@ fn a_frame_with_z_or_y_up_is_turned() {
     ] {
         let turn = UnitQuaternion::from_axis_angle(&axis, angle);
         let diagnosis = diagnosed(|recording| turned(recording, &turn));
-        assert_told(&diagnosis, &[words, "where z down was expected"]);
+        assert_reported(&diagnosis, &[words, "where z down was expected"]);
         assert_eq!(names(&diagnosis), names(&plain));
     }
 }
@@ -110,12 +110,12 @@ fn inverse_and_reordered_quaternions_are_refused() {
     let last = diagnosed(|recording| each(recording, |q| Quaternion::new(q.i, q.j, q.k, q.w)));
     for (diagnosis, words) in [(inverse, "inverse"), (last, "in the order x, y, z, w")] {
         assert_eq!(diagnosis.verdict, Verdict::NotTestable, "{:?}", names(&diagnosis));
-        assert_told(&diagnosis, &["the reference attitudes are", words]);
+        assert_reported(&diagnosis, &["the reference attitudes are", words]);
     }
 }
 
 #[test]
-fn positions_in_another_unit_are_refused_and_jumps_and_steps_told() {
+fn positions_in_another_unit_are_refused_and_jumps_and_steps_reported() {
     let position = |change: fn(usize, f64) -> f64| {
         diagnosed(|recording| {
             for (row, p) in recording.position.iter_mut().flatten().enumerate() {
@@ -125,12 +125,12 @@ fn positions_in_another_unit_are_refused_and_jumps_and_steps_told() {
     };
     let millimetres = position(|_, value| 1e3 * value);
     assert_eq!(millimetres.verdict, Verdict::NotTestable);
-    assert_told(&millimetres, &["looks like millimetres", "write ref_p* in metres"]);
-    assert_told(
+    assert_reported(&millimetres, &["looks like millimetres", "write ref_p* in metres"]);
+    assert_reported(
         &position(|row, value| if row > 3000 { value + 0.4 } else { value }),
         &["jumps 1 times", "30.01 s"],
     );
-    assert_told(&position(|_, value| (100.0 * value).round() / 100.0), &["steps of 10.0 mm"]);
+    assert_reported(&position(|_, value| (100.0 * value).round() / 100.0), &["steps of 10.0 mm"]);
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn a_reference_that_is_slower_than_the_rows_is_filled_in() {
             recording.position.iter_mut().for_each(|rows| rows[row] = [f64::NAN; 3]);
         }
     });
-    assert_told(&diagnosis, &["33 attitudes a second", "are interpolated"]);
+    assert_reported(&diagnosis, &["33 attitudes a second", "are interpolated"]);
     assert_ne!(diagnosis.verdict, Verdict::NotTestable);
 }
 

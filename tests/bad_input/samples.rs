@@ -100,8 +100,11 @@ fn a_stuck_stretch_is_reported_and_left_out() {
     }
     bad.calibrate().with(0);
     for kind in ALL {
-        let told = warnings(&bad);
-        assert!(told.iter().any(|w| w.starts_with(&format!("{kind}: stuck in rows 600 to 700"))), "{told:?}");
+        let messages = warnings(&bad);
+        assert!(
+            messages.iter().any(|w| w.starts_with(&format!("{kind}: stuck in rows 600 to 700"))),
+            "{messages:?}"
+        );
     }
     assert_as_clean(&bad, &ALL);
 }

@@ -20,9 +20,9 @@ fn refused(bad: &Bad, arguments: &[&str]) -> String {
         .stdin(Stdio::null())
         .output()
         .expect("the program starts");
-    let told = String::from_utf8(output.stderr).expect("the program writes UTF-8");
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
-    told
+    let message = String::from_utf8(output.stderr).expect("the program writes UTF-8");
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    message
 }
 
 /// A gigabyte of the same bytes in a megabyte of gzip: one member many times.
@@ -53,20 +53,23 @@ fn a_gigabyte_of_zeros_or_commas_is_a_line_that_is_too_long() {
     let quoted = format!("{HEADER}0,\"");
     for (head, piece, line) in [("", "\0", 1), ("", ",", 1), (HEADER, "0", 2), (quoted.as_str(), "x\n", 2)] {
         let bad = with_samples(SAMPLES, &bomb(head, piece));
-        let told = refused(&bad, &["calibrate", SAMPLES]);
+        let message = refused(&bad, &["calibrate", SAMPLES]);
         let parts = [format!("{SAMPLES}, line {line}: found"), "raise the limit with --max-columns".into()];
-        assert!(parts.iter().all(|part| told.contains(part.as_str())), "{told}");
+        assert!(parts.iter().all(|part| message.contains(part.as_str())), "{message}");
     }
 }
 
 #[test]
 fn a_gigabyte_of_rows_is_too_much_at_a_limit_that_can_be_raised() {
     let bad = with_samples(SAMPLES, &bomb(HEADER, "0,,,\n"));
-    let told = refused(&bad, &["calibrate", SAMPLES, "--max-size", "64M"]);
-    assert!(told.contains("samples that take more than 64 MiB") && told.contains("--max-size"), "{told}");
+    let message = refused(&bad, &["calibrate", SAMPLES, "--max-size", "64M"]);
+    assert!(
+        message.contains("samples that take more than 64 MiB") && message.contains("--max-size"),
+        "{message}"
+    );
     let bad = with_samples(SAMPLES, &bomb(HEADER, "\n"));
-    let told = refused(&bad, &["calibrate", SAMPLES, "--max-size", "64M"]);
-    assert!(told.contains("more than 64 MiB of it") && told.contains("--max-size"), "{told}");
+    let message = refused(&bad, &["calibrate", SAMPLES, "--max-size", "64M"]);
+    assert!(message.contains("more than 64 MiB of it") && message.contains("--max-size"), "{message}");
 }
 
 #[cfg(target_os = "linux")]
@@ -86,8 +89,8 @@ fn no_reader_follows_a_device_that_does_not_end() {
         (&["import", zero, zero, "--manifest", manifest, "--out", "new.csv"], "/dev/zero, line 1"),
         (&["import", zero, zero, "--manifest", zero, "--out", "new.csv"], "/dev/zero: found more than 1 MiB"),
     ] {
-        let told = refused(&bad, arguments);
-        assert!(told.contains(part), "{arguments:?}: {told}");
+        let message = refused(&bad, arguments);
+        assert!(message.contains(part), "{arguments:?}: {message}");
     }
 }
 
@@ -99,8 +102,8 @@ fn a_recording_of_many_columns_is_read_once_that_is_allowed() {
     }
     bad.rows.truncate(200);
     let bad = with_samples("small.csv", bad.text().as_bytes());
-    let told = refused(&bad, &["calibrate", "small.csv"]);
-    assert!(told.contains("small.csv, line 1: found more than 1024 columns"), "{told}");
+    let message = refused(&bad, &["calibrate", "small.csv"]);
+    assert!(message.contains("small.csv, line 1: found more than 1024 columns"), "{message}");
     let program = env!("CARGO_BIN_EXE_imucal-under-test");
     let raised = ["calibrate", &bad.path("small.csv").display().to_string(), "--max-columns", "2000"];
     let ended = imucal_tests::program::run(program, &[], &raised);

@@ -25,7 +25,7 @@ fn pair() -> &'static RobotPair {
 }
 
 fn diagnosed(spoil: impl Fn(&mut Stream)) -> Diagnosis {
-    let mut stream = Stream::beside(&pair().simulated, &pair().real).expect("a stream");
+    let mut stream = Stream::of_pair(&pair().simulated, &pair().real).expect("a stream");
     spoil(&mut stream);
     diagnose(&pair().real, &Options { stream: Some(stream), ..Options::default() }, &|_| ())
 }
@@ -51,7 +51,7 @@ fn assert_refused(diagnosis: &Diagnosis, words: &[&str]) {
 
 /// Nothing but `names` is asserted, and a remark has all of the words.
 #[track_caller]
-fn assert_told(diagnosis: &Diagnosis, names: &[&str], words: &[&str]) {
+fn assert_reported(diagnosis: &Diagnosis, names: &[&str], words: &[&str]) {
     let found: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.effect.as_str()).collect();
     assert_eq!(found, names, "{:?}", diagnosis.remarks);
     let has_all = |remark: &String| words.iter().all(|word| remark.contains(word));
@@ -103,7 +103,7 @@ fn frames_with_y_or_z_up_are_turned_axes() {
             let Simulated { acc, gyr, mag, .. } = &mut stream.values;
             [acc, gyr, mag].into_iter().for_each(|values| each(values, |value| turn * value));
         });
-        assert_told(
+        assert_reported(
             &diagnosis,
             &["acc.axis_swap", "gyr.axis_swap", "mag.axis_swap"],
             &["right angle", words],
@@ -113,7 +113,7 @@ fn frames_with_y_or_z_up_are_turned_axes() {
 }
 
 #[test]
-fn a_left_handed_frame_and_reversed_gravity_are_told() {
+fn a_left_handed_frame_and_reversed_gravity_are_reported() {
     let mirror = Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, 1.0));
     let mirrored = diagnosed(|stream| {
         each(&mut stream.values.acc, |force| mirror * force);
@@ -123,21 +123,21 @@ fn a_left_handed_frame_and_reversed_gravity_are_told() {
     });
     assert!(mirrored.remarks.iter().any(|remark| remark.contains("left-handed")), "{:?}", mirrored.remarks);
     let reversed = diagnosed(|stream| each(&mut stream.values.acc, |force| -force));
-    assert_told(&reversed, &["acc.axis_swap"], &["gravity minus acceleration"]);
+    assert_reported(&reversed, &["acc.axis_swap"], &["gravity minus acceleration"]);
 }
 
 #[test]
-fn an_oblique_mount_is_told_and_taken_up() {
+fn an_oblique_mount_is_reported_and_estimated() {
     let turn = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 0.5);
     let diagnosis = diagnosed(|stream| {
         let Simulated { acc, gyr, mag, .. } = &mut stream.values;
         [acc, gyr, mag].into_iter().for_each(|values| each(values, |value| turn * value));
     });
-    assert_told(&diagnosis, &[], &["turned against the simulator's axes by 2", "mounting"]);
+    assert_reported(&diagnosis, &[], &["turned against the simulator's axes by 2", "mounting"]);
 }
 
 #[test]
-fn noise_and_steps_of_the_stream_are_told() {
+fn noise_and_steps_of_the_stream_are_reported() {
     let noisy = diagnosed(|stream| {
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut add = |values: &mut Option<Vec<Vector3<f64>>>, size: f64| {
@@ -149,15 +149,15 @@ fn noise_and_steps_of_the_stream_are_told() {
         add(&mut stream.values.gyr, 0.003);
         add(&mut stream.values.mag, 0.2);
     });
-    assert_told(&noisy, &[], &["noise of its own", "gyr", "before the simulator's noise model"]);
-    assert_told(&noisy, &[], &["the mag is left out"]);
+    assert_reported(&noisy, &[], &["noise of its own", "gyr", "before the simulator's noise model"]);
+    assert_reported(&noisy, &[], &["the mag is left out"]);
     let stepped =
         diagnosed(|stream| each(&mut stream.values.gyr, |rate| rate.map(|w| (w / 0.012).round() * 0.012)));
-    assert_told(&stepped, &[], &["rounded to steps", "gyr 1.20e-2 rad/s", "more digits"]);
+    assert_reported(&stepped, &[], &["rounded to steps", "gyr 1.20e-2 rad/s", "more digits"]);
 }
 
 #[test]
-fn a_stream_that_is_too_slow_or_repeats_its_values_is_told() {
+fn a_stream_that_is_too_slow_or_repeats_its_values_is_reported() {
     let slow = diagnosed(|stream| thin(stream, 20));
     let left_out = slow.remarks.iter().filter(|remark| remark.contains("10 samples a second"));
     assert!(left_out.count() > 0 && slow.causes.is_empty(), "{:?} {:?}", slow.remarks, slow.causes);
@@ -167,7 +167,7 @@ fn a_stream_that_is_too_slow_or_repeats_its_values_is_told() {
             (0..values.len()).for_each(|row| values[row] = values[row / 4 * 4]);
         }
     });
-    assert_told(&held, &[], &["stands in 4 rows", "at their own rate"]);
+    assert_reported(&held, &[], &["stands in 4 rows", "at their own rate"]);
 }
 
 #[test]
@@ -194,7 +194,7 @@ fn a_stream_of_one_sensor_is_compared_with_that_alone() {
         nothing(&mut stream.values.mag);
         stream.values = std::mem::take(&mut stream.values).without_empty();
     });
-    assert_told(&diagnosis, &[], &["the acc is left out: the simulator gives no stream of it"]);
+    assert_reported(&diagnosis, &[], &["the acc is left out: the simulator gives no stream of it"]);
 }
 
 /// Runs `imucal diagnose` on the pair written to a folder, the stream's file with another header.

@@ -99,7 +99,7 @@ fn seconds_since_1970_with_microseconds_calibrate_as_those_since_the_start() {
 }
 
 #[test]
-fn absolute_times_that_run_back_are_told_as_the_file_has_them() {
+fn absolute_times_that_run_back_are_reported_as_the_file_has_them() {
     let mut bad = Bad::new();
     for (index, row) in bad.rows.iter_mut().enumerate().skip(1) {
         row[TIME] = format!("17000000{:02}.{:06}", index / 50, index % 50 * 20_000);

@@ -87,11 +87,11 @@ fn a_sensor_without_calibration_passes_unchanged() {
 /// Every use of a calibration file that must not be used ends so, and writes nothing.
 fn assert_unusable(folder: &Folder, file: &str, inspected: i32, used: i32, parts: &[&str]) {
     let ended = folder.run(&format!("inspect {file}")).with(inspected);
-    let told = format!("{}{}", ended.out, ended.err);
+    let printed = format!("{}{}", ended.out, ended.err);
     // A report is broken at blanks.
-    let flat = told.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(parts.iter().all(|part| flat.contains(part)), "{parts:?} in {told}");
-    assert!(!told.contains("intact\n"), "{told}");
+    let flat = printed.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(parts.iter().all(|part| flat.contains(part)), "{parts:?} in {printed}");
+    assert!(!printed.contains("intact\n"), "{printed}");
     folder.run(&format!("apply small.csv --calibration {file} --out out.csv")).with(used).telling(parts);
     folder.run(&format!("verify small.csv --calibration {file}")).with(used).telling(parts);
     assert!(!folder.path("out.csv").exists());
@@ -184,7 +184,7 @@ fn a_calibration_that_no_sensor_can_have_is_refused_with_its_figure() {
     let folder = Folder::with_calibration();
     let toml = folder.text("cal.toml");
     let line = |start: &str| toml.lines().find(|line| line.starts_with(start)).expect("a line of the triad");
-    for (start, spoiled, told) in [
+    for (start, spoiled, fault) in [
         ("coverage = ", "coverage = 1.5", "the coverage is 1.500, expected 0 to 1.000"),
         ("rms = ", "rms = -1.0", "the rms residual is -1.000"),
         ("bias = ", "bias = [1e12, 0.0, 0.0]", "the bias is 1.000e12"),
@@ -192,6 +192,6 @@ fn a_calibration_that_no_sensor_can_have_is_refused_with_its_figure() {
         ("unit_in = ", "unit_in = \"g\"", "expected 3.269 to 29.421"),
     ] {
         folder.write("bad.toml", toml.replacen(line(start), spoiled, 1));
-        assert_unusable(&folder, "bad.toml", 1, 1, &["bad.toml", "acc", told, "calibrate again"]);
+        assert_unusable(&folder, "bad.toml", 1, 1, &["bad.toml", "acc", fault, "calibrate again"]);
     }
 }

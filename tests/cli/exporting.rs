@@ -122,7 +122,9 @@ fn covariances_of_another_calibration_or_for_another_target_are_refused() {
 
 #[test]
 fn a_covariance_that_is_none_is_refused_with_its_fault() {
-    let faults: [(fn(&mut Value), &str); 5] = [
+    /// Damages a sensor's part of the file.
+    type Damage = fn(&mut Value);
+    let faults: [(Damage, &str); 5] = [
         (|acc| acc["covariance_of"][1] = "gain_99".into(), "an unknown entry `gain_99`"),
         (|acc| acc["covariance_of"][1] = acc["covariance_of"][0].clone(), "twice"),
         (|acc| acc["covariance"][2] = serde_json::json!([1.0]), "a row of 1 numbers for 9 entries"),
@@ -135,7 +137,7 @@ fn a_covariance_that_is_none_is_refused_with_its_fault() {
     for (damage, fault) in faults {
         let mut damaged = whole.clone();
         damage(&mut damaged["sensors"]["acc"]);
-        folder.write("cal.json", &damaged.to_string());
+        folder.write("cal.json", damaged.to_string());
         let run = folder.run("export cal.toml --covariance cal.json --to python").with(2);
         run.telling(&["cal.json", fault, "covariance of acc", "a square matrix of numbers"]);
     }

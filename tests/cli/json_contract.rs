@@ -100,7 +100,7 @@ fn is_upper_triangular(sensor: &Value) -> bool {
 }
 
 #[test]
-fn gains_are_upper_triangular_alone_and_full_beside_an_accelerometer() {
+fn gains_are_upper_triangular_alone_and_full_with_an_accelerometer() {
     let json = small();
     assert!(is_upper_triangular(&json["sensors"]["acc"]));
     assert!(!is_upper_triangular(&json["sensors"]["mag"]) && json["sensors"]["mag"]["alignment"].is_object());

@@ -97,14 +97,14 @@ fn no_output_replaces_what_was_read() {
 }
 
 #[test]
-fn apply_writes_beside_the_recording_unless_told_where() {
+fn apply_writes_to_the_folder_of_the_recording_unless_another_is_given() {
     let folder = Folder::with_calibration();
     folder.run("apply small.csv --calibration cal.bin").with(0).printing(&["small-calibrated.csv"]);
     assert!(folder.path("small-calibrated.csv").exists() && folder.path("small-calibrated.toml").exists());
 }
 
 #[test]
-fn a_dotted_name_keeps_its_dots_in_the_name_beside() {
+fn a_dotted_name_keeps_its_dots_in_the_name_of_what_is_written() {
     let folder = Folder::with_calibration();
     for (from, to) in [("small.csv", "run.2026-11-21.csv"), ("small.toml", "run.2026-11-21.toml")] {
         fs::rename(folder.path(from), folder.path(to)).expect("the folder takes names");

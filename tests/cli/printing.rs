@@ -80,16 +80,16 @@ fn a_reader_that_closes_the_pipe_is_no_failure() {
         .spawn()
         .expect("the program starts");
     drop(child.stdout.take());
-    let mut told = String::new();
-    child.stderr.take().expect("piped").read_to_string(&mut told).expect("text");
+    let mut message = String::new();
+    child.stderr.take().expect("piped").read_to_string(&mut message).expect("text");
     let status = child.wait().expect("the child is ours");
-    assert_eq!((status.code(), told.as_str()), (Some(0), ""));
+    assert_eq!((status.code(), message.as_str()), (Some(0), ""));
     assert!(folder.path("cal.toml").exists(), "what was asked for is written all the same");
 }
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_full_disk_behind_standard_output_is_told() {
+fn a_full_disk_behind_standard_output_is_reported() {
     let folder = Folder::with_recording();
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
     let output = Command::new(env!("CARGO_BIN_EXE_imucal-under-test"))
@@ -97,9 +97,9 @@ fn a_full_disk_behind_standard_output_is_told() {
         .stdout(full)
         .output()
         .expect("the program starts");
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{told}");
-    assert!(told.contains("standard output") && !told.contains("panicked"), "{told}");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("standard output") && !message.contains("panicked"), "{message}");
 }
 
 #[test]
@@ -114,4 +114,18 @@ fn on_one_day_two_runs_write_the_same_bytes() {
     assert_eq!(first, run("second"));
     let toml = String::from_utf8(first.1[0].clone()).expect("text");
     assert!(toml.contains("date = \"2026-09-21\""), "{toml}");
+}
+
+#[test]
+fn escapes_in_a_header_reach_neither_reports_nor_messages() {
+    let folder = Folder::with_recording();
+    let text = folder.text("small.csv");
+    let rows = text.lines().enumerate().map(|(row, line)| match row {
+        0 => format!("\u{1b}[2Jname,{line}\n"),
+        _ => format!("0,{line}\n"),
+    });
+    folder.write("small.csv", rows.collect::<String>());
+    let run = folder.run("calibrate small.csv");
+    let printed = run.out + &run.err;
+    assert!(printed.contains("\\u{1b}[2Jname") && !printed.contains("\u{1b}[2J"), "{printed}");
 }

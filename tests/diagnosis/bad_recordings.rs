@@ -44,7 +44,7 @@ fn without_rig_and_reference_a_motion_is_not_testable() {
     let folder = Folder::with(&rates(4), |recording| {
         recording.gimbal = None;
         recording.manifest.rig = None;
-        // Turning throughout: no rest whose attitude could be told.
+        // Turning throughout: no rest whose attitude could be determined.
         cut(recording, 40 * 50, 100 * 50);
     });
     assert_refused(&folder.diagnosed(1), &["gimbal_outer"]);
@@ -127,7 +127,7 @@ fn with_one_sensor_only_the_others_effects_are_neither_causes_nor_absent() {
 }
 
 #[test]
-fn a_rig_with_its_axes_in_another_order_is_told_instead_of_explained() {
+fn a_rig_with_its_axes_in_another_order_is_reported_instead_of_explained() {
     let folder = Folder::with(&rates(4), |recording| {
         recording.manifest.rig.iter_mut().for_each(|rig| rig.axes = Some(vec![Axis::X, Axis::Y, Axis::Z]));
     });

@@ -48,15 +48,15 @@ fn what_is_wrong_with_a_file_or_a_name_is_said_before_anything_is_done() {
     let folder = folder();
     fs::write(folder.path("bad.toml"), MINE.replace("abs(a_y)", "abs(a_q)")).expect("the folder takes files");
     for command in ["diagnose run.csv", "diagnose --list", "simulate --out new.csv", "blind --out new.d"] {
-        let told = ["bad.toml, line 2: effect `gyr.squeeze`: formula", "the name `a_q` at column 11"];
-        folder.run(&format!("{command} --effects bad.toml")).with(2).telling(&told);
-        let told = ["none.toml: cannot be read"];
-        folder.run(&format!("{command} --effects none.toml")).with(2).telling(&told);
+        let parts = ["bad.toml, line 2: effect `gyr.squeeze`: formula", "the name `a_q` at column 11"];
+        folder.run(&format!("{command} --effects bad.toml")).with(2).telling(&parts);
+        let parts = ["none.toml: cannot be read"];
+        folder.run(&format!("{command} --effects none.toml")).with(2).telling(&parts);
     }
-    let told = ["--effect: there is no effect `gyr.squeze`; did you mean `gyr.squeeze`"];
-    folder.run("simulate --out new.csv --effects mine.toml --effect gyr.squeze").with(2).telling(&told);
-    let told = ["--without: there is no effect or term `gyr.squeeze`"];
-    folder.run("diagnose run.csv --without gyr.squeeze").with(2).telling(&told);
+    let parts = ["--effect: there is no effect `gyr.squeze`; did you mean `gyr.squeeze`"];
+    folder.run("simulate --out new.csv --effects mine.toml --effect gyr.squeze").with(2).telling(&parts);
+    let parts = ["--without: there is no effect or term `gyr.squeeze`"];
+    folder.run("diagnose run.csv --without gyr.squeeze").with(2).telling(&parts);
     assert!(!folder.path("new.csv").exists() && !folder.path("new.d").exists());
 }
 

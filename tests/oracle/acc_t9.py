@@ -4,7 +4,7 @@
 
 x_i: mean of the nominal-SI samples over rest i (half-open row intervals, stored, from rests.py). Minimised by MINPACK's LM through
 SciPy with an analytic Jacobian (checked against the complex step), polished by Gauss-Newton, from eleven starts that must agree
-to 1e-10. Standard errors: s^2 (J'J)^-1, s^2 = 2 cost / (n - 9). Beside them two bootstraps:
+to 1e-10. Standard errors: s^2 (J'J)^-1, s^2 = 2 cost / (n - 9). Next to them two bootstraps:
   residual  centred residuals inflated by sqrt(n / (n - 9)), drawn with replacement, put on the footpoint of each observation along
             the normal of the fitted ellipsoid, refitted;
   pairs     rests drawn with replacement; a resample with fewer than ten distinct rests, a failed fit or |b - b_fit| > g is counted apart.

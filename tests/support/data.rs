@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// The folder named by `IMUCAL_DATA`, by default `../shared/data` beside the project.
+/// The folder named by `IMUCAL_DATA`, by default `../shared/data` next to the project.
 ///
 /// Without it the test is skipped, loudly; under `CI=true` it fails.
 pub fn folder() -> Option<PathBuf> {

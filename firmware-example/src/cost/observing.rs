@@ -16,7 +16,7 @@ use super::measured;
 use crate::{
     machine::Stopwatch,
     scene::Noise,
-    standalone::{POSES, Standalone},
+    standalone::{BLOCKS, POSES, Standalone},
 };
 
 /// Samples of a rest, and of a turn, at 100 Hz.
@@ -56,7 +56,7 @@ fn place() -> &'static mut Standalone {
 }
 
 /// What finds a session's rests and turns, by itself.
-type Observers = InertialObserver<f32, 4>;
+type Observers = InertialObserver<f32, BLOCKS>;
 
 #[inline(never)]
 fn observers() -> &'static mut Observers {

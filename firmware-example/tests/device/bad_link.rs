@@ -147,7 +147,7 @@ fn damage(rng: &mut ChaCha8Rng, frame: &mut Vec<u8>) {
 }
 
 #[test]
-fn the_state_of_a_record_is_told_whatever_the_flash_holds() {
+fn the_state_of_a_record_is_reported_whatever_the_flash_holds() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut memory = BenchMemory::new();
     let mut nor = Nor::new(2);

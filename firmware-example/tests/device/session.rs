@@ -35,7 +35,7 @@ fn state(bench: &mut Bench<'_>) -> RecordState {
     })
 }
 
-/// The record that the images carry, with its header or its serial changed and the checksum made anew.
+/// The record that the images carry, with its header or its serial changed and the checksum computed again.
 fn altered(change: impl Fn(&mut Vec<u8>)) -> Vec<u8> {
     let mut bytes = RECORD.to_vec();
     change(&mut bytes);
@@ -322,7 +322,7 @@ fn a_fit_on_board_is_the_core_s_and_samples_are_corrected_meanwhile() {
         (0..9).flat_map(|k| covariance.column(k).iter().take(k + 1).copied().collect::<Vec<_>>()).collect();
     assert_eq!(&report.covariance[..], &upper[..]);
 
-    // In use at once, in flash when asked for, beside what else the record before held.
+    // In use at once, in flash when asked for, with what else the record before held.
     assert_eq!(bench.ask(&Request::Store { replace: false }, fault), None);
     let stored = bench.ask(&Request::GetRecord, |reply| match reply {
         Reply::Record(bytes) => record::decode(bytes).expect("a record"),

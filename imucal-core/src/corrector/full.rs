@@ -40,7 +40,7 @@ pub struct FullCorrector<T: Scalar> {
 }
 
 impl<T: Scalar> FullCorrector<T> {
-    /// From the first order and what there is besides. A curvature without temperature terms has no reference, and
+    /// From the first order and what else there is. A curvature without temperature terms has no reference, and
     /// does nothing.
     ///
     /// # Errors

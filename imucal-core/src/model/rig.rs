@@ -40,7 +40,7 @@ pub struct RigAxes(pub [Axis; 3]);
 
 /// What a sensor put out at an attitude that is known.
 pub trait Pose<T: Scalar> {
-    /// What besides the pose itself its rotations follow from.
+    /// What its rotations follow from in addition to the pose itself.
     type Axes: Copy;
 
     /// Mean sensor output, nominal SI, sensor axes.

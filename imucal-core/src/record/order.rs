@@ -114,7 +114,7 @@ pub trait Parts: Sized {
         version: Version,
         appended: &'a [u8],
     ) -> Result<&'a [u8], DecodeError>;
-    /// A triad has no terms that change a value besides gain, bias and the slopes of temperature.
+    /// A triad has no terms that change a value other than gain, bias and the slopes of temperature.
     fn is_first_order(&self) -> bool;
     /// Checks a triad's parts; `bias` is the most that its bias may be, `warm` whether it has temperature terms.
     fn check(&self, check: &mut Check, bias: f32, warm: bool);

@@ -193,7 +193,7 @@ impl<T: Scalar, const N: usize, const P: usize, S> Swarm<T, N, P, S> {
 
     /// Works off at most `budget` blocks of the cost; says why it stopped, once it has.
     ///
-    /// An evaluation counts as one block at the least. Cost and generator must be the same at every call. Besides the
+    /// An evaluation counts as one block at the least. Cost and generator must be the same at every call. In addition to the
     /// blocks, an evaluation costs 2P draws, and an iteration N P comparisons.
     pub fn step<C: Cost<T, P, State = S>>(
         &mut self,

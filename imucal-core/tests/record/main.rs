@@ -374,7 +374,7 @@ fn max_len_of_higher_order_is_the_length_of_the_longest_record_of_it() {
 }
 
 #[test]
-fn a_buffer_too_small_is_told_the_exact_need() {
+fn a_buffer_too_small_is_refused_with_the_exact_need() {
     let need = GOLDEN.len();
     for have in 0..need {
         let refusal = EncodeError::BufferTooSmall { have, need };

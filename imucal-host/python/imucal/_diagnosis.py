@@ -42,7 +42,7 @@ class Diagnosis(Document):
     recording: str
     #: ``explained``, ``ambiguous``, ``partly``, ``unknown``, ``none`` or ``not-testable``.
     verdict: str
-    #: Why there is no better answer, or what should be known besides.
+    #: Why there is no better answer, or what else should be known.
     remarks: list[str]
     warnings: list[str]
     #: Effects that are asserted, most certain first.

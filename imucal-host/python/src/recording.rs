@@ -100,12 +100,14 @@ impl Recording {
 
     /// Writes samples and manifest, over a former recording of this name; what the file's format does not hold.
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<Option<String>> {
-        let beside = Manifest::path_beside(&path).filter(|beside| beside.exists());
-        if let Some(beside) = beside.filter(|beside| !Manifest::is_manifest(beside)) {
+        let manifest_path = Manifest::path_for(&path).filter(|manifest_path| manifest_path.exists());
+        if let Some(manifest_path) =
+            manifest_path.filter(|manifest_path| !Manifest::is_manifest(manifest_path))
+        {
             return Err(failure::unwritten(format!(
                 "{}: found a file that is no manifest, expected one or none, since it would be lost; choose another name; \
                  nothing was written",
-                beside.display()
+                manifest_path.display()
             )));
         }
         let recording = Arc::clone(&self.0);

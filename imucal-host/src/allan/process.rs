@@ -51,7 +51,7 @@ impl Kind {
         }
     }
 
-    /// What s has at t = 0 besides.
+    /// What else s has at t = 0.
     pub(super) fn at_zero(self) -> f64 {
         if self == Self::Quantisation { 1.0 } else { 0.0 }
     }

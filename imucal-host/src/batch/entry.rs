@@ -78,7 +78,7 @@ pub struct Entry {
     pub recording: String,
     /// What was read; `None` where it could not be.
     pub input: Option<Input>,
-    /// What it depends on besides.
+    /// What else it depends on.
     options: String,
     /// How it ended.
     pub standing: Standing,
@@ -240,7 +240,7 @@ impl Input {
     pub(super) fn of(samples: &Path) -> io::Result<Self> {
         let files = files_of(samples).map_err(io::Error::other)?;
         let (size, of_samples) = sha256(&files)?;
-        let manifest = Manifest::path_beside(samples).filter(|path| path.is_file());
+        let manifest = Manifest::path_for(samples).filter(|path| path.is_file());
         let manifest_sha256 = manifest.map(|path| sha256(&[path])).transpose()?.map(|(_, sum)| sum);
         Ok(Self { size, sha256: of_samples, manifest_sha256 })
     }

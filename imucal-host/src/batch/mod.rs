@@ -50,7 +50,7 @@ pub struct Method {
 }
 
 impl Method {
-    /// All that a calibration depends on besides its recording and the program, as text; the day is no part of it.
+    /// All that a calibration depends on apart from its recording and the program, as text; the day is no part of it.
     #[must_use]
     pub fn options(&self) -> String {
         let Self { request, mapping, limits, date: _ } = self;

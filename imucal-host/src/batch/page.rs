@@ -22,7 +22,7 @@ use crate::{
 
 /// Rows of a table at most, so that a page of any batch stays short.
 const ROWS: usize = 200;
-/// Units that a row of a drawing shows at most, besides those beyond the limit.
+/// Units that a row of a drawing shows at most, apart from those beyond the limit.
 const DOTS: usize = 30;
 /// Digits of a hash that tell recordings of a batch apart.
 const DIGITS: usize = 12;

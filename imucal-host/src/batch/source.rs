@@ -249,7 +249,7 @@ fn named(found: Vec<Found>, root: &Path) -> Result<Vec<Source>, SourceFault> {
     };
     let stem = |found: &Found| {
         found.name.clone().unwrap_or_else(|| {
-            let manifest = Manifest::path_beside(&found.place).unwrap_or_else(|| found.place.clone());
+            let manifest = Manifest::path_for(&found.place).unwrap_or_else(|| found.place.clone());
             from_root(&manifest.with_extension(""))
         })
     };

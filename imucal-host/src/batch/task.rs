@@ -143,7 +143,7 @@ impl Task<'_> {
                 .map_err(|cause| format!("{}: cannot be made ({cause})", folder.display()))?;
         }
         let inputs: Vec<PathBuf> =
-            std::iter::once(source.path.clone()).chain(Manifest::path_beside(&source.path)).collect();
+            std::iter::once(source.path.clone()).chain(Manifest::path_for(&source.path)).collect();
         let planned: Vec<(PathBuf, Form)> = outputs.iter().map(|(form, _)| (path(*form), *form)).collect();
         let mut files = (self.place)(&inputs, &planned)?;
         // First of all: what is half done must not be taken for done.

@@ -109,7 +109,7 @@ impl Batch {
         let manifests: std::collections::BTreeSet<PathBuf> = self
             .sources
             .iter()
-            .filter_map(|source| Some(place(&Manifest::path_beside(&source.path)?)))
+            .filter_map(|source| Some(place(&Manifest::path_for(&source.path)?)))
             .collect();
         let out = place(&self.out);
         let toml = |source: &Source| entry::output_path(Path::new(&out), &source.name, "toml");

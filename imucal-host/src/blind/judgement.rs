@@ -1,7 +1,7 @@
 //! One opened trial held against its answer.
 //!
 //! Ids are compared by the contract's classes ([`class`]) except where a figure asks for the id itself. A cause's first
-//! three declared equivalents stand for it in the figures that say so, and in none besides.
+//! three declared equivalents stand for it in the figures that say so, and in no others.
 
 use super::{
     answer::{Answer, Asserted, Finished},
@@ -39,7 +39,7 @@ pub struct Judgement {
     pub lambda: f64,
     /// The smallest λ of its effects with the others fitted.
     pub lambda_beside: f64,
-    /// The asserted classes are those that are there, and none besides.
+    /// The asserted classes are those that are there, and no others.
     pub classes_right: bool,
     /// Likewise where an asserted cause may stand for one of its declared equivalents.
     pub right_or_equivalent: bool,
@@ -55,7 +55,7 @@ pub struct Judgement {
     pub alarmed: bool,
     /// What is there is from outside, and a formula says it.
     pub spoken: bool,
-    /// A formula is proposed that is what is there, and none besides.
+    /// A formula is proposed that is what is there, and no other.
     pub formula_right: bool,
     /// A formula is proposed that is not there.
     pub formula_wrong: bool,

@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn the_closed_form_of_one_column_beside_a_constant_holds() {
+    fn the_closed_form_of_one_column_and_a_constant_holds() {
         let white = 0.25;
         let signal: Vec<Vector3<f64>> = (0..40).map(|k| Vector3::new(f64::from(k), 0.0, 0.0)).collect();
         let flat = vec![Vector3::zeros(); 40];

@@ -81,7 +81,7 @@ pub struct Score {
     pub shares: Vec<Share>,
     /// Mean of the closed share as said less the true one, its standard error and how many there are.
     pub closed_bias: Option<(f64, f64, usize)>,
-    /// Figures besides the contract's.
+    /// Figures in addition to the contract's.
     pub further: Vec<Share>,
     /// Of the causes' probabilities, where all that is there is of the catalogue.
     pub calibration: Vec<Calibration>,
@@ -113,7 +113,7 @@ impl<J> Figure<J> {
         Share { name: self.name, hits, trials: trials.len(), must: self.must, aim: self.aim }
     }
 
-    pub(super) const fn besides(name: &'static str, of: fn(&J) -> bool, hit: fn(&J) -> bool) -> Self {
+    pub(super) const fn further(name: &'static str, of: fn(&J) -> bool, hit: fn(&J) -> bool) -> Self {
         Self { name, of, hit, must: None, aim: None }
     }
 }
@@ -246,70 +246,70 @@ const CONTRACT: [Figure<Judgement>; 15] = [
 
 /// Figures next to the contract's.
 const FURTHER: [Figure<Judgement>; 16] = [
-    Figure::besides(
+    Figure::further(
         "one effect, class-correct, λ < 60",
         |j| is_of_one(j) && (0.0..60.0).contains(&j.lambda),
         |j| j.classes_right,
     ),
-    Figure::besides(
+    Figure::further(
         "one effect, class-correct, λ 60 to 100",
         |j| is_of_one(j) && (60.0..100.0).contains(&j.lambda),
         |j| j.classes_right,
     ),
-    Figure::besides(
+    Figure::further(
         "one effect, class-correct, λ 100 to 300",
         |j| is_of_one(j) && (100.0..300.0).contains(&j.lambda),
         |j| j.classes_right,
     ),
-    Figure::besides(
+    Figure::further(
         "one effect, class-correct, λ 300 and more",
         |j| is_of_one(j) && (300.0..f64::INFINITY).contains(&j.lambda),
         |j| j.classes_right,
     ),
-    Figure::besides(
+    Figure::further(
         "one effect, its class or a declared equivalent's, λ ≥ 100",
         |j| is_of_one(j) && j.lambda >= 100.0,
         |j| j.right_or_equivalent,
     ),
-    Figure::besides(
+    Figure::further(
         "credible set, λ < 100",
         |j| is_of_one(j) && (0.0..100.0).contains(&j.lambda),
         |j| j.credible,
     ),
-    Figure::besides(
+    Figure::further(
         "credible set, λ 100 to 300",
         |j| is_of_one(j) && (100.0..300.0).contains(&j.lambda),
         |j| j.credible,
     ),
-    Figure::besides(
+    Figure::further(
         "credible set, λ 300 and more",
         |j| is_of_one(j) && (300.0..f64::INFINITY).contains(&j.lambda),
         |j| j.credible,
     ),
-    Figure::besides(
+    Figure::further(
         "two effects, each λ ≥ 60 with the other fitted, exact",
         |j| j.truth == Truth::Catalogue(2) && j.lambda_beside >= 60.0,
         |j| j.classes_right,
     ),
-    Figure::besides(
+    Figure::further(
         "three effects, each λ ≥ 60 with the others fitted, exact",
         |j| j.truth == Truth::Catalogue(3) && j.lambda_beside >= 60.0,
         |j| j.classes_right,
     ),
-    Figure::besides(
+    Figure::further(
         "outside the catalogue, flagged, λ < 200",
         |j| j.truth == Truth::Outside && j.lambda < 200.0,
         |j| j.flagged,
     ),
-    Figure::besides("causes without a closed share", |j| j.closed.is_some(), |j| share_of(j).is_none()),
-    Figure::besides("without an answer", |_| true, |j| j.answer.verdict.is_none()),
-    Figure::besides(
+    Figure::further("causes without a closed share", |j| j.closed.is_some(), |j| share_of(j).is_none()),
+    Figure::further("without an answer", |_| true, |j| j.answer.verdict.is_none()),
+    Figure::further(
         "outside, a formula says it, flagged, λ ≥ 200: right",
         |j| j.spoken && j.flagged && j.lambda >= 200.0,
         |j| j.formula_right,
     ),
-    Figure::besides("outside, a formula says it: a wrong formula", |j| j.spoken, |j| j.formula_wrong),
-    Figure::besides(
+    Figure::further("outside, a formula says it: a wrong formula", |j| j.spoken, |j| j.formula_wrong),
+    Figure::further(
         "a right formula, confirmed on a second recording",
         |j| j.formula_right,
         |j| j.answer.proposals.iter().all(|proposed| proposed.confirmed == Some(true)),

@@ -41,7 +41,7 @@ pub struct Calibration {
     pub segmentation: Option<SegmentationReport>,
     /// The ladders, where they were climbed.
     pub comparisons: Vec<Comparison>,
-    /// What the user should know besides.
+    /// What else the user should know.
     pub warnings: Vec<String>,
     /// What was noticed when the recording was read.
     pub read_warnings: Vec<String>,
@@ -188,7 +188,7 @@ pub struct RigFindings {
     /// Earth's field in n, µT, where it was estimated.
     pub field_n: Option<Vector3<f64>>,
     /// Parameters that the poses cannot determine, and what each is like.
-    pub not_told: Vec<String>,
+    pub unobservable: Vec<String>,
     /// How a fit against attitudes was made, in words.
     pub notes: Vec<String>,
     /// The gyroscope's g-sensitivity, table axes in, raw rad/s per m/s², with standard errors, where it was estimated.
@@ -236,7 +236,7 @@ impl Estimates {
 }
 
 impl FitSummary {
-    /// A fit's figures and estimates; nothing left out, and nothing besides the triad.
+    /// A fit's figures and estimates; nothing left out, and nothing in addition to the triad.
     pub fn new(
         report: &FitReport,
         estimates: Estimates,

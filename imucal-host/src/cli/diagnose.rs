@@ -133,7 +133,7 @@ fn stream(
     Stream::chosen(&simulated, recording, topic).with_context(|| path.display().to_string())
 }
 
-/// That a simulator's file has no sensor, or topics beside the one that is meant, is what is asked for.
+/// That a simulator's file has no sensor, or topics other than the one that is meant, is what is asked for.
 fn is_expected(warning: &Warning) -> bool {
     match warning {
         Warning::SimulatorAlone { .. } | Warning::NoSensor { .. } => true,

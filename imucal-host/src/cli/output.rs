@@ -1,9 +1,11 @@
 //! What a command prints: how much, how wide, and in which colours.
 //!
 //! Reports are at most 80 columns wide and coloured on a terminal, unless `NO_COLOR` is set. What was asked for as a document
-//! (JSON, another program's settings) is printed as it is.
+//! (JSON, another program's settings) is printed as it is. In all else control characters, which names and texts of files can have, are
+//! printed as escapes, since a terminal would obey them.
 
 use std::{
+    borrow::Cow,
     fmt::{Arguments, Display},
     io::{ErrorKind, Write},
     sync::OnceLock,
@@ -43,7 +45,7 @@ pub(super) fn line(text: Arguments<'_>) -> anyhow::Result<()> {
     if volume() == Volume::Quiet {
         return Ok(());
     }
-    let text = fitted(&text.to_string());
+    let text = fitted(&visible(&text.to_string()));
     let painted: Vec<String> = text.split('\n').map(painted).collect();
     write(&painted.join("\n"))
 }
@@ -81,7 +83,21 @@ pub(super) fn report(what: &str, message: &dyn Display) {
         "warning" => DOUBT,
         _ => Style::new(),
     };
-    let _ = writeln!(anstream::stderr(), "imucal: {style}{what}{style:#}: {message}");
+    let message = message.to_string();
+    let _ = writeln!(anstream::stderr(), "imucal: {style}{what}{style:#}: {}", visible(&message));
+}
+
+/// A text with its control characters, but for ends of lines and tabs, as escapes; so are those that reverse the direction of a text.
+fn visible(text: &str) -> Cow<'_, str> {
+    let obeyed = |c: char| {
+        let turns = matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+        turns || (c.is_control() && !matches!(c, '\n' | '\t'))
+    };
+    if !text.contains(obeyed) {
+        return text.into();
+    }
+    let shown = |c: char| if obeyed(c) { c.escape_unicode().to_string() } else { c.to_string() };
+    text.chars().map(shown).collect()
 }
 
 const GOOD: Style = AnsiColor::Green.on_default().bold();
@@ -118,6 +134,12 @@ fn painted(line: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_terminal_would_obey_is_printed_as_an_escape() {
+        assert_eq!(visible("acc_x, °/s\n\tµT"), "acc_x, °/s\n\tµT");
+        assert_eq!(visible("\u{1b}[2Jname\r\u{202e}"), "\\u{1b}[2Jname\\u{d}\\u{202e}");
+    }
 
     #[test]
     fn the_answer_of_a_line_is_coloured_and_nothing_else() {

@@ -45,7 +45,7 @@ impl Planned {
 
 /// The samples of a recording and the manifest next to them.
 pub(super) fn files_of(recording: &Path) -> Vec<PathBuf> {
-    let manifest = Manifest::path_beside(recording);
+    let manifest = Manifest::path_for(recording);
     std::iter::once(recording.to_path_buf()).chain(manifest).collect()
 }
 
@@ -108,7 +108,7 @@ fn name(form: Form) -> &'static str {
 
 /// What a file is, for a message.
 fn kind_of(path: &Path) -> &'static str {
-    match Manifest::path_beside(path) {
+    match Manifest::path_for(path) {
         Some(_) => "a recording",
         None if Manifest::is_manifest(path) => "a recording's manifest",
         None => "a file",

@@ -63,7 +63,7 @@ pub(super) fn simulate(
 /// `NAME-real.csv.gz` of `NAME.csv.gz`.
 fn part(out: &Path, part: &str) -> anyhow::Result<PathBuf> {
     let refusal = || format!("{}: expected a name that ends in .csv or .csv.gz", out.display());
-    let manifest = Manifest::path_beside(out).with_context(refusal)?;
+    let manifest = Manifest::path_for(out).with_context(refusal)?;
     let stem = manifest.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let name = out.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let ending = name.strip_prefix(&stem).with_context(refusal)?;

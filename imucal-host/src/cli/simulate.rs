@@ -242,7 +242,7 @@ fn is_drawn(effect: &Effect) -> bool {
 }
 
 fn sealed(mut simulation: Simulation, out: &Path, overwrite: Overwrite) -> anyhow::Result<Ending> {
-    let label_path = label_beside(out)?;
+    let label_path = label_for(out)?;
     let mut planned = Planned::recording(out);
     planned.push(Planned::new(&label_path));
     let mut files = overwrite.plan(&[], &planned)?;
@@ -277,8 +277,8 @@ fn sealed(mut simulation: Simulation, out: &Path, overwrite: Overwrite) -> anyho
 }
 
 /// `NAME.label.json` for `NAME.csv.gz`.
-fn label_beside(out: &Path) -> anyhow::Result<PathBuf> {
-    let manifest = Manifest::path_beside(out)
+fn label_for(out: &Path) -> anyhow::Result<PathBuf> {
+    let manifest = Manifest::path_for(out)
         .with_context(|| format!("{}: expected a name that ends in .csv or .csv.gz", out.display()))?;
     Ok(manifest.with_extension("label.json"))
 }
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sealed_case_has_its_label_beside_it_and_the_manifest_does_not_tell() {
+    fn a_sealed_case_has_its_label_in_the_same_folder_and_the_manifest_does_not_tell() {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("case.csv");
         let simulation = Simulation { programme: Programme::Sinusoids, rate: 10.0, ..Simulation::default() };

@@ -38,7 +38,7 @@ pub struct Diagnosis {
     /// What the recording was compared with, where that is neither a rig nor the sensor's own rests.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<ReferenceKind>,
-    /// Why there is no better answer, where there is none; else what a reader should know besides.
+    /// Why there is no better answer, where there is none; otherwise what else a reader should know.
     pub remarks: Vec<String>,
     /// What was noticed when the recording was read.
     #[serde(default)]

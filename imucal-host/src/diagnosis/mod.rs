@@ -51,7 +51,7 @@ pub struct Options {
     pub model: Option<StoredCalibration>,
     /// A simulator's stream for the recording, on a clock of its own; without it, the recording's own reference.
     pub stream: Option<Stream>,
-    /// The user's own effects, candidates besides the catalogue's.
+    /// The user's own effects, candidates in addition to the catalogue's.
     pub effects: Vec<&'static Effect>,
     /// Text of the user's file where its effects are no candidates: their amplitudes are as the file has found them, and the
     /// diagnosis says whether the recording confirms them.

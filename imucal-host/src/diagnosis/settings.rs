@@ -213,7 +213,7 @@ pub struct ProposalSettings {
     pub amplitude_errors: f64,
     /// An axis whose amplitude is fewer standard errors from zero is left out.
     pub kept_errors: f64,
-    /// What the sensor still follows beside it is at most this share of what it explains. Larger: more wrong formulas.
+    /// What the sensor still follows apart from it is at most this share of what it explains. Larger: more wrong formulas.
     pub remainder: f64,
     /// What changes its amplitude matters from this share of what it explains on: a fiftieth leaves it a correlation of 0.99
     /// with what is there. Larger: more wrong formulas; smaller: strong ones are refused for what a derivative misses.

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use crate::{
     diagnosis::{
         Options, Verdict, diagnose,
+        finding::ProfileBin,
         library::{
             candidates::{Candidates, Setting},
             evidence::Projected,
@@ -80,7 +81,7 @@ fn a_healthy_residual_whitened_by_its_own_noise_has_the_energy_of_noise() {
 }
 
 #[test]
-fn what_gimbals_stand_off_their_encoders_is_noise_in_motion_too() {
+fn what_gimbals_deviate_from_their_encoders_is_noise_in_motion_too() {
     with_linear(|linear| {
         let mut noise = linear.weighing.white(&linear.scene.residual(&[]).unwrap());
         let acc = &mut noise.sensors[SensorKind::Acc as usize];
@@ -99,7 +100,7 @@ fn what_gimbals_stand_off_their_encoders_is_noise_in_motion_too() {
 }
 
 #[test]
-fn a_drift_that_forgets_nothing_is_told_from_one_that_does() {
+fn a_drift_that_forgets_nothing_is_distinguished_from_one_that_does() {
     for (kind, forgets) in [(DriftKind::Walk, false), (DriftKind::Quick, true)] {
         let mut simulation = Simulation { duration: Some(1100.0), ..simulation(5) };
         simulation.conditions.noise.fill(NoiseLevel { drift: 10.0, kind, ..NoiseLevel::default() });
@@ -135,7 +136,7 @@ fn pointing_errors_of_all_sensors_are_one_chance_and_no_harmonic() {
 }
 
 #[test]
-fn samples_beside_clipped_ones_are_left_out_whatever_their_own_noise() {
+fn samples_next_to_clipped_ones_are_left_out_whatever_their_own_noise() {
     let mut simulation = simulation(7);
     let full_scale = HEALTHY.acc.as_ref().unwrap().full_scale_si().unwrap();
     let effect = find("acc.saturation").unwrap();
@@ -153,7 +154,7 @@ fn samples_beside_clipped_ones_are_left_out_whatever_their_own_noise() {
 }
 
 #[test]
-fn a_signature_that_lasts_from_one_fit_to_the_next_is_the_one_taken_anew() {
+fn a_signature_that_lasts_from_one_fit_to_the_next_is_the_one_computed_again() {
     with_fit(&HEALTHY, |linear, fit| {
         let effect = find("acc.scale_quadratic").unwrap();
         let mut doses = fit.doses.clone();
@@ -163,7 +164,7 @@ fn a_signature_that_lasts_from_one_fit_to_the_next_is_the_one_taken_anew() {
         let noise = linear.weighing.white(&fit.residual);
         let about =
             |before| Linearisation::new(linear.scene, linear.candidates, &fit, &noise, before).unwrap();
-        let (lasting, anew) = (about(Some(&linear)), about(None));
+        let (lasting, again) = (about(Some(&linear)), about(None));
         for other in linear.candidates.effects.iter().filter(|other| !other.is_shaped()) {
             let columns = |linear: &Linearisation<'_>| -> Vec<f64> {
                 let of = |(id, channel): (usize, &Channel)| -> Vec<f64> {
@@ -175,7 +176,7 @@ fn a_signature_that_lasts_from_one_fit_to_the_next_is_the_one_taken_anew() {
                     .flat_map(of)
                     .collect()
             };
-            let (old, new) = (DVector::from_vec(columns(&lasting)), DVector::from_vec(columns(&anew)));
+            let (old, new) = (DVector::from_vec(columns(&lasting)), DVector::from_vec(columns(&again)));
             let change = (&old - &new).norm() / new.norm();
             assert!(change < 0.05, "{}: {change}", other.id);
         }
@@ -256,6 +257,25 @@ fn an_effect_is_named_with_its_size_and_closes_the_gap() {
         assert!((value - truth).abs() < 4.0 * error, "{id}: {value} ± {error}, truly {truth}");
         assert!(diagnosis.gap_closed_total.unwrap() > 0.95, "{id}");
     }
+}
+
+#[test]
+fn a_profile_shows_a_cubic_residual_over_the_rate_and_none_after_it() {
+    let mut simulation = simulation(5);
+    simulation.add(find("gyr.scale_cubic").unwrap(), 10.0).unwrap();
+    let recording = simulation.record("cubic").unwrap();
+    let diagnosis = diagnose(&recording, &Options::default(), &|_| ());
+    let profile = diagnosis.profiles.iter().find(|profile| profile.sensor == "gyr").unwrap();
+    let follows = [&profile.driver, &profile.function, &profile.unit];
+    assert_eq!(follows, ["input", "degree 3", "rad/s"]);
+    let bins = &profile.bins;
+    assert!(bins.len() > 10 && bins.is_sorted_by(|a, b| a.driver < b.driver), "{bins:?}");
+    let square = |of: fn(&ProfileBin) -> f64| {
+        bins.iter().map(|bin| (of(bin) / bin.std).powi(2)).sum::<f64>() / bins.len() as f64
+    };
+    // Before it, bins differ by what a cubic gain adds; after it, by hardly more than white noise.
+    let (before, after) = (square(|bin| bin.before), square(|bin| bin.after));
+    assert!(before > 100.0 && after < 4.0, "{before} {after}: {bins:?}");
 }
 
 #[test]

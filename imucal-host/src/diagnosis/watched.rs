@@ -34,7 +34,7 @@ pub struct Watched {
     pub false_alarms_a_day: f64,
     /// Accelerometer, gyroscope, magnetometer.
     pub triads: Vec<WatchedTriad>,
-    /// What a reader should know besides.
+    /// What else a reader should know.
     pub remarks: Vec<String>,
 }
 

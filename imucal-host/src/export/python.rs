@@ -104,7 +104,7 @@ fn of_noise(text: &mut String, kind: SensorKind, noise: &NoiseOfSensor, cannot: 
         std::array::from_fn(|at| noise.axes[at].as_ref().map_or(0.0, of))
     };
     let forgets = |axis: &NoiseOfAxis| axis.bias_std.value.zip(axis.correlation_time.value);
-    // A bias that forgets has its own process, and no walk besides.
+    // A bias that forgets has its own process, and no further walk.
     let walk = |axis: &NoiseOfAxis| {
         if forgets(axis).is_some() { 0.0 } else { axis.random_walk.value.unwrap_or(0.0) }
     };

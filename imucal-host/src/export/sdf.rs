@@ -87,7 +87,7 @@ fn of_sensor(
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// What is written of an axis besides its noise.
+/// What is written of an axis in addition to its noise.
 struct About {
     kind: SensorKind,
     name: &'static str,

@@ -153,7 +153,7 @@ fn place(target: &Path, spared: bool, part: &mut Part, named: &Path) -> Result<O
 
 /// Gives a file a second name, or copies it where the file system knows no second names.
 fn keep(target: &Path) -> io::Result<PathBuf> {
-    let former = part::name_beside(target, ".old");
+    let former = part::name_with(target, ".old");
     match fs::hard_link(target, &former) {
         Ok(()) => Ok(former),
         Err(_) => fs::copy(target, &former).map(|_| former),

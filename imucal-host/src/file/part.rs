@@ -23,7 +23,7 @@ static NUMBER: AtomicU32 = AtomicU32::new(0);
 static PARTS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// A name in the target's folder that nothing else of this process has.
-pub(super) fn name_beside(target: &Path, suffix: &str) -> PathBuf {
+pub(super) fn name_with(target: &Path, suffix: &str) -> PathBuf {
     let number = NUMBER.fetch_add(1, Ordering::Relaxed);
     folder_of(target).join(format!("{PREFIX}{}-{number}{suffix}", std::process::id()))
 }
@@ -40,7 +40,7 @@ impl Part {
     /// Starts a file in the target's folder, with owner and mode of the one that it is to replace.
     pub(super) fn next_to(target: &Path, replaced: Option<&Metadata>) -> io::Result<Self> {
         loop {
-            let path = name_beside(target, SUFFIX);
+            let path = name_with(target, SUFFIX);
             // Held until the part is known, so that a signal between finds it.
             let mut parts = held();
             let file = match OpenOptions::new().write(true).create_new(true).open(&path) {

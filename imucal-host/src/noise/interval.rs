@@ -84,7 +84,7 @@ pub struct Parts<'a> {
     pub ratios: &'a [(f64, f64)],
     /// What is known of s².
     pub scale: Scale,
-    /// Whether five standard errors shall hold nearly all: where something bounds the drift besides the prior.
+    /// Whether five standard errors shall hold nearly all: where something bounds the drift in addition to the prior.
     pub five: bool,
 }
 

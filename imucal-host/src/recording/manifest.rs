@@ -206,7 +206,7 @@ impl Manifest {
     /// The manifest's path next to a samples file: `NAME.toml` for `NAME.csv`, `NAME.csv.gz`,
     /// `NAME.parquet`, `NAME.mat`, robots' logs and the folder `NAME` of one; `None` for a file of another ending.
     #[must_use]
-    pub fn path_beside(samples: &Path) -> Option<PathBuf> {
+    pub fn path_for(samples: &Path) -> Option<PathBuf> {
         let name = samples.file_name()?.to_str()?;
         if is_bag_folder(samples) {
             return Some(samples.with_file_name(format!("{name}.toml")));
@@ -354,7 +354,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_manifest_lies_beside_the_samples() {
+    fn the_manifest_lies_in_the_folder_of_the_samples() {
         for (samples, manifest) in [
             ("d/a.csv", Some("d/a.toml")),
             ("a.b.csv.gz", Some("a.b.toml")),
@@ -365,7 +365,7 @@ mod tests {
             ("a_0.DB3", Some("a_0.toml")),
             ("a.txt", None),
         ] {
-            assert_eq!(Manifest::path_beside(Path::new(samples)), manifest.map(PathBuf::from));
+            assert_eq!(Manifest::path_for(Path::new(samples)), manifest.map(PathBuf::from));
         }
     }
 

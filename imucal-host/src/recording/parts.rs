@@ -141,8 +141,8 @@ fn refuse_options(path: &Path, format: Format, mapping: &Mapping) -> Result<(), 
 
 /// A log may go without; its messages say their units.
 fn manifest_of_log(path: &Path, limits: &Limits) -> Result<(Manifest, Vec<Warning>), ReadError> {
-    let beside = Manifest::path_beside(path).unwrap_or_else(|| path.with_extension("toml"));
-    match Manifest::read_within(&beside, limits) {
+    let manifest_path = Manifest::path_for(path).unwrap_or_else(|| path.with_extension("toml"));
+    match Manifest::read_within(&manifest_path, limits) {
         Err(ReadError::ManifestMissing { .. }) => Ok((Manifest::default(), Vec::new())),
         read => {
             let (manifest, mut warnings) = read?;
@@ -180,8 +180,8 @@ fn manifest_of(
     mapping: &Mapping,
     limits: &Limits,
 ) -> Result<(Manifest, Vec<Warning>), ReadError> {
-    let beside = Manifest::path_beside(path).unwrap_or_else(|| path.with_extension("toml"));
-    match Manifest::read_within(&beside, limits) {
+    let manifest_path = Manifest::path_for(path).unwrap_or_else(|| path.with_extension("toml"));
+    match Manifest::read_within(&manifest_path, limits) {
         Err(ReadError::ManifestMissing { .. }) if !mapping.is_empty() => {
             let assumed = mapping.unstated();
             let warning = (!assumed.is_empty()).then(|| Warning::UnitsAssumed {

@@ -98,8 +98,8 @@ fn in_si(
     kind: SensorKind,
     mut values: Vec<Vector3<f64>>,
 ) -> Result<Triple, ReadError> {
-    let beside = || Manifest::path_beside(path).unwrap_or_else(|| path.to_path_buf());
-    let fault = |fault| ReadError::Manifest { path: beside(), line: 1, fault };
+    let manifest_path = || Manifest::path_for(path).unwrap_or_else(|| path.to_path_buf());
+    let fault = |fault| ReadError::Manifest { path: manifest_path(), line: 1, fault };
     let nominal = manifest.nominal(kind).map_err(fault)?;
     if nominal != Nominal::IDENTITY {
         values.iter_mut().flatten().for_each(|value| *value = nominal.to_si(*value));

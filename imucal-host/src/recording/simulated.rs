@@ -120,7 +120,7 @@ impl Stream {
     /// The simulator's stream of a file of its own for a recording: as [`Stream::of`]; where both files have absolute times,
     /// on those of the recording.
     #[must_use]
-    pub fn beside(simulated: &Recording, recording: &Recording) -> Option<Self> {
+    pub fn of_pair(simulated: &Recording, recording: &Recording) -> Option<Self> {
         Some(Self::of(simulated)?.on_times_of(simulated, recording))
     }
 
@@ -140,7 +140,7 @@ impl Stream {
         Ok(stream.on_times_of(simulated, recording))
     }
 
-    /// The stream that a topic names or, without one, as [`Stream::beside`].
+    /// The stream that a topic names or, without one, as [`Stream::of_pair`].
     ///
     /// # Errors
     ///
@@ -152,7 +152,7 @@ impl Stream {
     ) -> Result<Self, TopicError> {
         match topic {
             Some(topic) => Self::of_topic(simulated, recording, topic),
-            None => Self::beside(simulated, recording)
+            None => Self::of_pair(simulated, recording)
                 .ok_or_else(|| TopicError::NoStream { there: topic::names(simulated) }),
         }
     }

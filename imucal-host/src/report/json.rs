@@ -202,7 +202,7 @@ fn search(found: &Search) -> Value {
 /// What belongs to the machine; null where it was not estimated.
 fn rig(kind: SensorKind, fit: &FitSummary) -> Value {
     let found = fit.rig.as_ref();
-    let not_told = found.map(|rig| &rig.not_told);
+    let unobservable = found.map(|rig| &rig.unobservable);
     match kind {
         SensorKind::Acc => {
             let tilt = found.and_then(|rig| rig.tilt);
@@ -210,7 +210,7 @@ fn rig(kind: SensorKind, fit: &FitSummary) -> Value {
                 "tilt_x": tilt.map(|(tilt, _)| tilt[0]),
                 "tilt_y": tilt.map(|(tilt, _)| tilt[1]),
                 "tilt_std": tilt.map(|(_, std)| std),
-                "not_told": not_told,
+                "not_told": unobservable,
                 "higher_order": fit.nonlinear.as_ref().map(higher_order),
             })
         }
@@ -230,7 +230,7 @@ fn rig(kind: SensorKind, fit: &FitSummary) -> Value {
                 "middle_hard_iron": sources.map(|[_, middle]| vector(&middle.0)),
                 "middle_hard_iron_std": sources.map(|[_, middle]| vector(&middle.1)),
                 "field_n": found.and_then(|rig| rig.field_n).as_ref().map(vector),
-                "not_told": not_told,
+                "not_told": unobservable,
                 "notes": found.map(|rig| &rig.notes),
             })
         }

@@ -274,8 +274,8 @@ fn write_rig(text: &mut String, rig: &RigFindings) -> fmt::Result {
     for note in &rig.notes {
         writeln!(text, "  {note}")?;
     }
-    if !rig.not_told.is_empty() {
-        writeln!(text, "  not observable from these poses, fixed: {}", rig.not_told.join(", "))?;
+    if !rig.unobservable.is_empty() {
+        writeln!(text, "  not observable from these poses, fixed: {}", rig.unobservable.join(", "))?;
     }
     Ok(())
 }

@@ -22,7 +22,7 @@ impl Default for NoiseLevel {
     }
 }
 
-/// Conditions of a recording besides unit and programme. By default a quiet laboratory in Ankara and the sheet's noise.
+/// Conditions of a recording other than unit and programme. By default a quiet laboratory in Ankara and the sheet's noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conditions {
     /// Where the rig stands.

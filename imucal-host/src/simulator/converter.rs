@@ -15,7 +15,7 @@ pub(super) struct Chance<'a> {
     pub random: &'a mut Random,
     /// Between rows, s.
     pub interval: f64,
-    /// What shakes it besides, row by row, SI units; may be empty.
+    /// What else shakes it, row by row, SI units; may be empty.
     pub shaken: &'a [Vector3<f64>],
 }
 

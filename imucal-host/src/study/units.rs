@@ -5,7 +5,7 @@
 //! schedule, base, and noise. The error is `gain · (raw − bias)` against the truth in the table's axes. Of the
 //! magnetometer the truth is Earth's field alone, and what a model says of the gimbals' magnets is taken off
 //! before: a source along the inner axis turns with the table and is the same as hard iron, so that neither bias
-//! nor source is right by itself, but their sum is. Besides the base that every recording draws (levelled to some
+//! nor source is right by itself, but their sum is. In addition to the base that every recording draws (levelled to some
 //! 0.05°, pointed to some 0.5°), the base is tilted by 0.1° and each of two gimbals carries 15 mG.
 
 use std::fmt::Write;

@@ -12,7 +12,7 @@ use crate::{
 const LENGTH: u32 = 2 * PAGE as u32;
 
 #[test]
-fn a_device_keeps_its_record_in_the_region_and_touches_nothing_beside_it() {
+fn a_device_keeps_its_record_in_the_region_and_touches_nothing_else() {
     let requests = requests();
     for page in 0..=4 {
         let mut flash = Nor::new(6);

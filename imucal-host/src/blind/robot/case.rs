@@ -48,7 +48,7 @@ const DEPARTURE: (f64, f64) = (0.05, 2.0);
 const SEEN: f64 = 200.0;
 const LARGEST: f64 = 8.0;
 
-/// What a pair holds besides its clocks and its mount.
+/// What a pair holds in addition to its clocks and its mount.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Content {
@@ -123,7 +123,7 @@ pub struct RobotPresent {
     pub effect: String,
     /// Names and values of its parameters.
     pub parameters: Vec<(String, f64)>,
-    /// λ beside triads, mounts and clock.
+    /// λ with triads, mounts and clock estimated as well.
     pub lambda: f64,
     /// Least λ with one effect of the catalogue on the same sensor taken out as well; of mechanisms that a formula says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -139,7 +139,7 @@ pub struct Departed {
     pub size: f64,
     /// Beginning and end of each stretch on the simulator's clock, s.
     pub stretches: Vec<[f64; 2]>,
-    /// λ beside triads, mounts and clock.
+    /// λ with triads, mounts and clock estimated as well.
     pub lambda: f64,
 }
 

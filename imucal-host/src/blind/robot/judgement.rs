@@ -37,7 +37,7 @@ pub struct RobotJudgement {
     pub lambda_beyond: f64,
     /// Something other than the clock is said to be there.
     pub alarmed: bool,
-    /// Besides the clock one class is asserted, that of the effect that is there.
+    /// Apart from the clock one class is asserted, that of the effect that is there.
     pub class_right: bool,
     /// Likewise where an asserted cause may stand for one of its declared equivalents, as in the contract's figure.
     pub right_or_equivalent: bool,
@@ -49,7 +49,7 @@ pub struct RobotJudgement {
     pub delay: Option<bool>,
     /// Likewise the clock's rate, by its standard errors alone; none where none is reported.
     pub rate: Option<bool>,
-    /// A formula is proposed that is what is there, and none besides.
+    /// A formula is proposed that is what is there, and no other.
     pub formula_right: bool,
     /// A formula is proposed that is not there.
     pub formula_wrong: bool,
@@ -62,22 +62,22 @@ impl RobotJudgement {
     pub fn of(trial: &Finished) -> Option<Self> {
         let label: RobotLabel = serde_json::from_str(&trial.label).ok()?;
         let answer = trial.answer.clone();
-        let besides: Vec<&Asserted> =
+        let others: Vec<&Asserted> =
             answer.causes.iter().filter(|cause| !CLOCK.contains(&cause.effect.as_str())).collect();
         let flagged = matches!(answer.verdict, Some(Verdict::Unknown | Verdict::Partly));
         let answered = !matches!(answer.verdict, None | Some(Verdict::NotTestable));
-        let of_class = |id: &str| besides.iter().all(|cause| class(&cause.effect) == class(id));
+        let of_class = |id: &str| others.iter().all(|cause| class(&cause.effect) == class(id));
         let there = label.effect.as_ref();
         let lambda = [there.map(|present| present.lambda), label.mismatch.as_ref().map(|m| m.lambda)];
         Some(Self {
             lambda: lambda.into_iter().flatten().fold(0.0, f64::max),
             lambda_beyond: there.and_then(|present| present.lambda_beyond).unwrap_or(0.0),
-            alarmed: !answered || flagged || !besides.is_empty(),
-            class_right: there.is_some_and(|present| !besides.is_empty() && of_class(&present.effect)),
+            alarmed: !answered || flagged || !others.is_empty(),
+            class_right: there.is_some_and(|present| !others.is_empty() && of_class(&present.effect)),
             right_or_equivalent: there.is_some_and(|present| {
-                !besides.is_empty() && besides.iter().all(|cause| stands_for_class(cause, &present.effect))
+                !others.is_empty() && others.iter().all(|cause| stands_for_class(cause, &present.effect))
             }),
-            motion_said: !besides.is_empty() && of_class(MOTION),
+            motion_said: !others.is_empty() && of_class(MOTION),
             flagged,
             delay: delay(&label, &answer),
             rate: rate(&label, &answer),

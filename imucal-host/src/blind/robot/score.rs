@@ -12,7 +12,7 @@ pub struct RobotScore {
     pub trials: [usize; 2],
     /// The figures of the contract, in its order.
     pub shares: Vec<Share>,
-    /// Figures besides the contract's.
+    /// Figures in addition to the contract's.
     pub further: Vec<Share>,
     /// Median and largest time of a diagnosis, s.
     pub seconds: [f64; 2],
@@ -89,74 +89,74 @@ const CONTRACT: [Figure<RobotJudgement>; 8] = [
 
 /// Figures next to the contract's.
 const FURTHER: [Figure<RobotJudgement>; 16] = [
-    Figure::besides(
+    Figure::further(
         "one effect, its class itself, λ ≥ 100",
         |j| holds(j, Content::Effect) && j.lambda >= 100.0,
         |j| j.class_right,
     ),
-    Figure::besides(
+    Figure::further(
         "one effect, its class or a declared equivalent's, λ < 100",
         |j| holds(j, Content::Effect) && j.lambda < 100.0,
         |j| j.right_or_equivalent,
     ),
-    Figure::besides(
+    Figure::further(
         "one effect, its class or a declared equivalent's, λ ≥ 300",
         |j| holds(j, Content::Effect) && j.lambda >= 300.0,
         |j| j.right_or_equivalent,
     ),
-    Figure::besides(
+    Figure::further(
         "one effect, λ ≥ 100, said to be motion",
         |j| holds(j, Content::Effect) && j.lambda >= 100.0,
         |j| j.motion_said,
     ),
-    Figure::besides(
+    Figure::further(
         "clock's rate, where reported, within 3 errors",
         |j| j.rate.is_some(),
         |j| j.rate == Some(true),
     ),
-    Figure::besides(
-        "delay of 2 to 50 ms beside other motion or mechanisms",
+    Figure::further(
+        "delay of 2 to 50 ms with other motion or mechanisms",
         |j| j.delay.is_some() && !has_delay(j),
         |j| j.delay == Some(true),
     ),
-    Figure::besides(
+    Figure::further(
         "a user's own effect, its own id and no equivalent, λ ≥ 100",
         |j| holds(j, Content::Own) && j.lambda >= 100.0,
         |j| j.class_right,
     ),
-    Figure::besides(
+    Figure::further(
         "outside, a formula says it, λ ≥ 200: a right formula",
         |j| holds(j, Content::Spoken) && j.lambda >= 200.0,
         |j| j.formula_right,
     ),
-    Figure::besides(
+    Figure::further(
         "outside, λ ≥ 200 beyond the catalogue: flagged",
         |j| holds(j, Content::Spoken) && j.lambda_beyond >= 200.0,
         |j| j.flagged,
     ),
-    Figure::besides(
+    Figure::further(
         "outside, no formula says it, flagged, λ ≥ 200",
         |j| holds(j, Content::Unspoken) && j.lambda >= 200.0,
         |j| j.flagged,
     ),
-    Figure::besides(
+    Figure::further(
         "outside, an effect of the catalogue asserted",
         |j| matches!(j.label.content, Content::Spoken | Content::Unspoken),
         |j| j.alarmed && !j.flagged,
     ),
-    Figure::besides("within the catalogue, flagged", |j| holds(j, Content::Effect), |j| j.flagged),
-    Figure::besides("without an answer", |_| true, |j| j.answer.verdict.is_none()),
-    Figure::besides(
+    Figure::further("within the catalogue, flagged", |j| holds(j, Content::Effect), |j| j.flagged),
+    Figure::further("without an answer", |_| true, |j| j.answer.verdict.is_none()),
+    Figure::further(
         "outside, λ ≥ 200 beyond the catalogue, flagged: right",
         |j| holds(j, Content::Spoken) && j.flagged && j.lambda_beyond >= 200.0,
         |j| j.formula_right,
     ),
-    Figure::besides(
+    Figure::further(
         "outside, a formula says it: a wrong formula",
         |j| holds(j, Content::Spoken),
         |j| j.formula_wrong,
     ),
-    Figure::besides(
+    Figure::further(
         "a right formula, confirmed on a second recording",
         |j| j.formula_right,
         |j| j.answer.proposals.iter().all(|proposed| proposed.confirmed == Some(true)),

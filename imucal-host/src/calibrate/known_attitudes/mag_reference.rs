@@ -184,8 +184,8 @@ fn note(summary: &mut FitSummary, samples: &Samples, found: &ReferenceFit, known
         let [x, y, z] = [direction.x, direction.y, direction.z];
         rig.notes.push(format!("the field points along {x:.3}, {y:.3}, {z:.3} in the reference's frame"));
         // One component of the field is what K takes of its length.
-        rig.not_told.retain(|name| !name.starts_with("field_"));
-        rig.not_told.push(if known {
+        rig.unobservable.retain(|name| !name.starts_with("field_"));
+        rig.unobservable.push(if known {
             "the field's length (like K's size): taken from [site] field_ned_ut".into()
         } else {
             "the field's length (like K's size): gain of determinant 1".into()

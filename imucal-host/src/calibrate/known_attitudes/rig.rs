@@ -333,7 +333,7 @@ fn findings(fit: &RigFit) -> RigFindings {
             .contains(&17)
             .then(|| [(now.outer_source, three(17)), (now.middle_source, three(20))]),
         field_n: fit.entries.contains(&14).then_some(now.vector_n),
-        not_told: fit
+        unobservable: fit
             .held
             .iter()
             .map(|(entry, like)| match like {

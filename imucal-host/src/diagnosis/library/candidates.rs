@@ -199,7 +199,7 @@ impl Candidates {
     }
 
     /// Terms of triads that a calibration made elsewhere gives, of the sensors that an effect reaches.
-    pub fn given_beside(&self, effect: &Effect) -> Vec<&'static Effect> {
+    pub fn given_with(&self, effect: &Effect) -> Vec<&'static Effect> {
         let stands_for = |term: &Effect| term.part == Part::TriadTerm || term.needs.other_calibration;
         let is_given = |term: &&&'static Effect| {
             stands_for(term)

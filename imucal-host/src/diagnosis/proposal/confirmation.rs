@@ -48,7 +48,7 @@ struct Frozen {
     amplitudes: Vec<Fitted>,
 }
 
-/// A prediction beside one set of effects.
+/// A prediction with one set of effects.
 struct Predicted {
     /// ln of the probability of the data with the prediction and the set.
     value: f64,
@@ -134,7 +134,7 @@ pub fn confirmed(
         let mut best: Option<Predicted> = None;
         let mut untestable = None;
         for set in [Vec::new(), asserted(explained, diagnosis)] {
-            let predicted = match frozen.beside(&set, explained, &drivers, toml) {
+            let predicted = match frozen.with(&set, explained, &drivers, toml) {
                 Err(DiagnosisError::Formula(cause)) => {
                     untestable = Some(cause.without_row());
                     break;
@@ -161,8 +161,8 @@ pub fn confirmed(
 }
 
 impl Frozen {
-    /// What it predicts, held against the recording beside a set of effects; `None` where that is too small to be seen.
-    fn beside(
+    /// What it predicts, held against the recording with a set of effects; `None` where that is too small to be seen.
+    fn with(
         &self,
         set: &[&'static Effect],
         explained: &Solution<'_>,
@@ -224,7 +224,7 @@ impl Frozen {
         own
     }
 
-    /// Whitened size of what the sensor still follows beside the prediction, another amplitude of it included.
+    /// Whitened size of what the sensor still follows apart from the prediction, another amplitude of it included.
     fn remainder(
         &self,
         without: &Linearisation<'_>,

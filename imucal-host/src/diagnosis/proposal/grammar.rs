@@ -29,7 +29,7 @@ const BEYOND: (f64, f64) = (0.3, 1.4);
 /// A knee goes no further than this share of the largest value.
 const KNEE: f64 = 0.9;
 
-/// What a recording holds besides its sensors.
+/// What a recording holds in addition to its sensors.
 #[derive(Clone, Copy, Debug)]
 pub struct Held {
     /// Gimbals turn the sensor.

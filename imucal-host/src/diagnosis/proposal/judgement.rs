@@ -1,4 +1,4 @@
-//! Formulas by their evidence, each with the sensor's noise estimated again beside it.
+//! Formulas by their evidence, each with the sensor's noise estimated again with it.
 //!
 //! ```text
 //! gain = ln p(y | formula) − ln p(y) − ln N      each with the noise that is likeliest with it

@@ -10,7 +10,7 @@
 //! | [`grammar`] | all formulas that are tried |
 //! | [`problem`] | the residual of a sensor, and formulas as columns |
 //! | [`screening`] | all formulas by linear algebra in a given noise |
-//! | [`judgement`] | one by its evidence, with the noise estimated again beside it; its shape refined |
+//! | [`judgement`] | one by its evidence, with the noise estimated again with it; its shape refined |
 //! | [`equivalents`] | formulas that the recording cannot distinguish: the simplest stands for them |
 //! | [`finalists`] | the best formula, by these |
 //! | [`null_threshold`] | what the best of all gains in noise alone |

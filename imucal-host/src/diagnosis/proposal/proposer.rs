@@ -197,7 +197,7 @@ impl<'a, 's> Setting<'a, 's> {
         Ok(Start { set, problem, before })
     }
 
-    /// The formula as a proposal, if held-out stretches bear it out and nothing is followed beside it.
+    /// The formula as a proposal, if held-out stretches bear it out and the residual then follows nothing else.
     fn accepted(
         &self,
         start: &Start<'_, '_>,
@@ -233,8 +233,8 @@ impl<'a, 's> Setting<'a, 's> {
         }
         let every: Vec<usize> = start.problem.fitted.clone();
         let own = (self.linear.design.columns.len()..linear.design.size).collect::<Vec<_>>();
-        let beside = Problem::new(&linear, &self.run, kind, [every, own].concat());
-        let second = finalists::next(&beside, formulas, &best.weighed.noise)?;
+        let next_to = Problem::new(&linear, &self.run, kind, [every, own].concat());
+        let second = finalists::next(&next_to, formulas, &best.weighed.noise)?;
         let cost = (formulas.len() as f64).ln();
         let is_needed = second.is_some_and(|second| {
             second.gain - cost > by.least_gain && second.explained > by.remainder * best.explained

@@ -1,4 +1,4 @@
-//! A formula put beside what is fitted, as effects like any other: what it closes on stretches that no fit has seen, and what
+//! A formula added to what is fitted, as effects like any other: what it closes on stretches that no fit has seen, and what
 //! the sensor's residual still follows.
 
 use crate::{
@@ -71,7 +71,7 @@ impl Joined {
         linear.joined(&self.candidates, fit, fitted, &self.doses, &self.signatures)
     }
 
-    /// Tries them in the problem that [`Self::problem`] gives, in a noise that was estimated beside them.
+    /// Tries them in the problem that [`Self::problem`] gives, in a noise that was estimated with them.
     ///
     /// # Errors
     ///

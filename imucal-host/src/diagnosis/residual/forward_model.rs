@@ -305,11 +305,7 @@ impl<'a> ForwardModel<'a> {
         input: &[Input],
     ) -> Result<[Vec<Vector3<f64>>; 3], DiagnosisError> {
         let chain = Chain::new(doses);
-        let mut outputs: [Vec<Vector3<f64>>; 3] = Default::default();
-        for kind in kinds.iter().filter(|kind| self.kinds.contains(kind)) {
-            outputs[*kind as usize] = self.output(&chain, *kind, input)?;
-        }
-        Ok(outputs)
+        self.each(kinds, |kind| self.output(&chain, kind, input))
     }
 
     /// What the sensors sense of an input.
@@ -332,10 +328,21 @@ impl<'a> ForwardModel<'a> {
         sensed: &[Sensed; 3],
     ) -> Result<[Vec<Vector3<f64>>; 3], DiagnosisError> {
         let chain = Chain::new(doses);
+        self.each(kinds, |kind| {
+            let Sensed { bias, axes } = &sensed[kind as usize];
+            Ok(chain.output_of(kind, bias, input, axes)?)
+        })
+    }
+
+    /// An output of each of some sensors that are there; empty of the others.
+    fn each(
+        &self,
+        kinds: &[SensorKind],
+        output: impl Fn(SensorKind) -> Result<Vec<Vector3<f64>>, DiagnosisError>,
+    ) -> Result<[Vec<Vector3<f64>>; 3], DiagnosisError> {
         let mut outputs: [Vec<Vector3<f64>>; 3] = Default::default();
         for kind in kinds.iter().filter(|kind| self.kinds.contains(kind)) {
-            let Sensed { bias, axes } = &sensed[*kind as usize];
-            outputs[*kind as usize] = chain.output_of(*kind, bias, input, axes)?;
+            outputs[*kind as usize] = output(*kind)?;
         }
         Ok(outputs)
     }

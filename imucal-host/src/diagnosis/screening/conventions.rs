@@ -199,7 +199,7 @@ pub fn check(
         saturation::check(triple, sensor, &mut found);
         stuck_samples::check(triple, sensor, &mut found);
         if motion.encoders(0.0).is_none() {
-            // What a hand does besides turning is no noise of the sensor.
+            // What a hand does other than turning is no noise of the sensor.
             continue;
         }
         let moves = |row: usize| motion.truth(recording.time[row], &|_| ()).w_pt_t.norm();

@@ -45,7 +45,7 @@ pub struct Linearisation<'s> {
     /// Where each candidate's signature was taken.
     pub shapes: Vec<GridPosterior>,
     scan: Grid<'s>,
-    /// Effects of the fit besides the baseline.
+    /// Effects of the fit in addition to the baseline.
     held: Vec<Dose>,
     normals: Memo<Noise, Normal>,
     products: Memo<White, DesignProducts>,

@@ -60,7 +60,7 @@ const BY_FORCE: f64 = 4.0;
 const ABOUT: usize = 10;
 const LONGEST: usize = 400;
 
-/// What a fit of the baseline shows, besides stretches that were found `before`, s.
+/// What a fit of the baseline shows, apart from stretches that were found `before`, s.
 ///
 /// # Errors
 ///
@@ -257,7 +257,7 @@ fn smoothed(energies: &[Option<f64>], block: usize) -> Option<f64> {
     (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
 }
 
-/// How brisk the movement is in a block: turning, its change, and force besides gravity, in logarithms.
+/// How brisk the movement is in a block: turning, its change, and force other than gravity, in logarithms.
 fn briskness(truth: &Truth, gravity: f64) -> Vector3<f64> {
     let floor = |value: f64, least: f64| (value + least).ln();
     Vector3::new(

@@ -130,7 +130,7 @@ mod tests {
 
     const NOISE: [f64; 2] = [4e-3, 0.05];
 
-    /// A hundred blocks of a tenth of a second; the rate's and the field's residuals besides noise by time.
+    /// A hundred blocks of a tenth of a second; the rate's and the field's residuals apart from noise by time.
     fn seen(
         rate: impl Fn(f64) -> Vector3<f64>,
         field: impl Fn(f64, &Vector3<f64>) -> Vector3<f64>,

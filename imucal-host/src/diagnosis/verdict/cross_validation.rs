@@ -40,7 +40,7 @@ pub fn leave_out(
         out.push(causes.remove(worst).effect);
     }
     for at in (0..kept.len()).rev() {
-        if !is_borne_beside_terms(at, &kept, linear, noise)? {
+        if !is_borne_with_terms(at, &kept, linear, noise)? {
             kept.remove(at);
             out.push(causes.remove(at).effect);
         }
@@ -59,7 +59,7 @@ fn is_borne(share: &Share, by: &VerdictSettings) -> bool {
 }
 
 /// Whether held-out blocks bear out a cause of a set with the terms of its triads free, where these are given.
-fn is_borne_beside_terms(
+fn is_borne_with_terms(
     at: usize,
     set: &[&'static Effect],
     linear: &Linearisation<'_>,
@@ -67,7 +67,7 @@ fn is_borne_beside_terms(
 ) -> Result<bool, DiagnosisError> {
     let is_other = |term: &&'static Effect| !set.contains(term);
     let terms: Vec<&'static Effect> =
-        linear.candidates.given_beside(set[at]).into_iter().filter(is_other).collect();
+        linear.candidates.given_with(set[at]).into_iter().filter(is_other).collect();
     if terms.is_empty() {
         return Ok(true);
     }

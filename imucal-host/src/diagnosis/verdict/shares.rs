@@ -185,7 +185,7 @@ fn closed_in(
 }
 
 /// Share of what a sensor shows beyond the baseline that a prediction closes which was made without this recording;
-/// `predicted` is the problem less the prediction, `remainder` the whitened size of what is left beside it.
+/// `predicted` is the problem less the prediction, `remainder` the whitened size of what it leaves.
 ///
 /// # Errors
 ///

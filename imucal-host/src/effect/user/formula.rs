@@ -71,7 +71,7 @@ impl NotFinite {
 
 impl Formula {
     /// A formula of its own for each axis of a sensor, with an amplitude an axis; `shapes` names the parameters that it may
-    /// have besides.
+    /// have in addition.
     ///
     /// # Errors
     ///

@@ -31,7 +31,7 @@ pub(super) const DEEPEST_HISTORY: usize = 3;
 /// Edits within which a misspelt name is taken for a known one.
 const NEAR: usize = 2;
 
-/// Understands a formula; `shapes` names the parameters it may have besides the inputs.
+/// Understands a formula; `shapes` names the parameters it may have in addition to the inputs.
 pub(super) fn parse(text: &str, shapes: &[String]) -> Result<Expression, FormulaFault> {
     if text.len() > LONGEST {
         return Err(FormulaFault::TooLong { found: text.len(), most: LONGEST });

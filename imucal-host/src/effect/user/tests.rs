@@ -70,10 +70,10 @@ fn equal_entries_are_one_effect_and_others_are_not() {
     let other = read_text(&ENTRY.replace("1e-3", "2e-3")).unwrap()[0];
     assert!(!std::ptr::eq(one, other));
     let twice = format!("{ENTRY}{}", ENTRY.replace("1e-3", "2e-3"));
-    let told = read_text(&twice).unwrap_err().to_string();
+    let message = read_text(&twice).unwrap_err().to_string();
     assert!(
-        told.contains("mine.toml, line 14: effect `gyr.cable_torque`") && told.contains("line 2"),
-        "{told}"
+        message.contains("mine.toml, line 14: effect `gyr.cable_torque`") && message.contains("line 2"),
+        "{message}"
     );
 }
 
@@ -118,7 +118,7 @@ fn formulas_mean_what_they_do_on_paper() {
 
 #[test]
 fn what_is_no_formula_is_refused_with_its_column() {
-    for (formula, told) in [
+    for (formula, message) in [
         ("", "found the end at column 1, expected a number, a name or `(`"),
         ("a_x +", "found the end at column 6"),
         ("a_x a_y", "found `a` at column 5, expected an operator"),
@@ -145,7 +145,7 @@ fn what_is_no_formula_is_refused_with_its_column() {
         ("{a}", "found `{` at column 1"),
     ] {
         let fault = fault(formula).to_string();
-        assert!(fault.contains(told), "{formula}: {fault}");
+        assert!(fault.contains(message), "{formula}: {fault}");
     }
 }
 
@@ -169,7 +169,7 @@ fn bombs_are_refused_before_they_go_off() {
 
 #[test]
 fn entries_of_nonsense_are_refused_with_line_and_key() {
-    for (from, to, told) in [
+    for (from, to, message) in [
         ("id = \"gyr.cable_torque\"", "id = \"gyr.bias\"", "that of an effect of the program"),
         (
             "id = \"gyr.cable_torque\"",
@@ -203,7 +203,7 @@ fn entries_of_nonsense_are_refused_with_line_and_key() {
         ("sin(3 * inner)", "sin(3 * iner)", "did you mean `inner`"),
     ] {
         let text = refusal(from, to);
-        assert!(text.starts_with("mine.toml, line ") && text.contains(told), "{to}: {text}");
+        assert!(text.starts_with("mine.toml, line ") && text.contains(message), "{to}: {text}");
     }
     assert!(read_text("effect = []").unwrap_err().to_string().contains("found 0 effects"));
     assert!(read_text("").unwrap_err().to_string().contains("missing field `effect`"));
@@ -215,18 +215,18 @@ fn entries_of_nonsense_are_refused_with_line_and_key() {
 fn a_time_that_is_a_shape_must_be_positive() {
     let lagged = ENTRY.replace("tanh(a_y / s)", "lag(a_y, s)");
     assert!(read_text(&lagged).is_ok());
-    let told = read_text(&lagged.replace("low = 0.5", "low = -0.5")).unwrap_err().to_string();
-    assert!(told.contains("a time of lag or mean"), "{told}");
+    let message = read_text(&lagged.replace("low = 0.5", "low = -0.5")).unwrap_err().to_string();
+    assert!(message.contains("a time of lag or mean"), "{message}");
 }
 
 #[test]
 fn a_file_that_is_no_text_or_is_not_there_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mine.toml");
-    let told = || read(&path, &Limits::default()).unwrap_err().to_string();
-    assert!(told().contains("mine.toml: cannot be read"), "{}", told());
+    let message = || read(&path, &Limits::default()).unwrap_err().to_string();
+    assert!(message().contains("mine.toml: cannot be read"), "{}", message());
     std::fs::write(&path, [b'\n', 0xff, 0xfe]).unwrap();
-    assert!(told().contains("line 2: found bytes that are no UTF-8"), "{}", told());
+    assert!(message().contains("line 2: found bytes that are no UTF-8"), "{}", message());
     std::fs::write(&path, ENTRY).unwrap();
     assert_eq!(read(&path, &Limits::default()).unwrap().len(), 1);
 }
@@ -238,12 +238,12 @@ fn a_value_that_is_not_finite_is_an_error_with_its_row() {
     let input = Input::empty(5);
     let mut output = vec![Vector3::zeros(); 5];
     let mut run = SensorRun { input: &input, sensed: &[], output: &mut output };
-    let told = formula.add(&[0.0, 1.0, 0.0, 3.0], &mut run).unwrap_err().to_string();
+    let message = formula.add(&[0.0, 1.0, 0.0, 3.0], &mut run).unwrap_err().to_string();
     assert!(
-        told.contains("gyr.cable_torque: found inf") && told.contains("axis y in row 3 (t = 0.02 s)"),
-        "{told}"
+        message.contains("gyr.cable_torque: found inf") && message.contains("axis y in row 3 (t = 0.02 s)"),
+        "{message}"
     );
-    assert!(told.contains("`s / (t - 0.02)`"), "{told}");
+    assert!(message.contains("`s / (t - 0.02)`"), "{message}");
     // An axis without an amplitude is not asked.
     formula.add(&[0.0, 0.0, 0.0, 3.0], &mut run).unwrap();
 }

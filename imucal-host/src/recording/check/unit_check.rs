@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn one_axis_in_g_beside_two_in_metres_is_named() {
+    fn one_axis_in_g_among_two_in_metres_is_named() {
         let message = fixture("acc = \"m/s^2\"", &attitudes("acc", [9.81, 1.0, 9.81], 6)).error();
         assert_says(
             &message,

@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn a_misspelt_key_of_the_reference_is_told_with_the_one_meant() {
+    fn a_misspelt_key_of_the_reference_is_reported_with_the_one_meant() {
         let sections = "[reference]\nkind = \"pose\"\nnoize = 1\n[refrence]\n";
         let warnings = Fixture::new("run.csv", sections, SAMPLES).warnings();
         assert_says(&warnings[0], &["line 4: unknown key `reference.noize`", "write `noise`"]);

@@ -148,7 +148,7 @@ fn triple(
     if x.is_empty() {
         return Ok(None);
     }
-    let manifest_path = || Manifest::path_beside(path).unwrap_or_else(|| path.to_path_buf());
+    let manifest_path = || Manifest::path_for(path).unwrap_or_else(|| path.to_path_buf());
     let fault = |fault| ReadError::Manifest { path: manifest_path(), line: 1, fault };
     let nominal = manifest.nominal(kind).map_err(fault)?;
     let raw = x.iter().zip(y).zip(z).map(|((x, y), z)| Vector3::new(*x, *y, *z));
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_intervals_beside_a_wrong_order_hint_at_the_unit() {
+    fn odd_intervals_with_a_wrong_order_hint_at_the_unit() {
         assert_says(&with_times(&["0", "10", "20", "20"]).error(), &["check the unit of t", "`s`"]);
     }
 
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn absolute_times_that_run_back_are_told_as_the_file_has_them() {
+    fn absolute_times_that_run_back_are_reported_as_the_file_has_them() {
         let message = with_times(&["1700000000.000001", "1700000000.01", "1700000000.000002"]).error();
         assert_says(&message, &["line 4", "found 1700000000.000002 after 1700000000.01", "sort"]);
         let recording = with_times(&["1700000000.000001", "1700000000.010002"]).read();

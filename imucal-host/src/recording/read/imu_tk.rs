@@ -29,7 +29,7 @@ const NAMES: [&str; 4] = ["t", "x", "y", "z"];
 ///
 /// # Errors
 ///
-/// [`ReadError`]; besides those of a recording, when the files differ in their number of rows or a
+/// [`ReadError`]; those of a recording, and when the files differ in their number of rows or a
 /// sample's times differ by more than half the median interval.
 pub fn read_pair(
     acc: &Path,

@@ -38,7 +38,7 @@ pub(crate) fn write<R: Borrow<Recording>>(
         Format::of(path).map_err(|found| WriteError::UnknownFormat { path: path.to_path_buf(), found })?;
     let mut parts = parts.into_iter();
     let Some(first) = parts.next() else { return Ok(Written { rows: 0, left_out: None }) };
-    let manifest_path = Manifest::path_beside(path)
+    let manifest_path = Manifest::path_for(path)
         .ok_or_else(|| failed(path, io::Error::other("the name has no ending of a recording")))?;
     let manifest = first.borrow().manifest.clone();
     manifest.check().map_err(|fault| WriteError::Manifest { path: path.to_path_buf(), fault })?;

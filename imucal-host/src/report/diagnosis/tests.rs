@@ -111,15 +111,15 @@ fn what_is_no_number_is_null_in_the_json() {
 
 #[test]
 fn a_simulator_s_page_says_what_to_change_first_and_what_remains() {
-    let mut beside = diagnosis(Verdict::Explained);
-    beside.reference = Some(ReferenceKind::Simulator);
+    let mut with_stream = diagnosis(Verdict::Explained);
+    with_stream.reference = Some(ReferenceKind::Simulator);
     let mut clock = cause();
     clock.effect = "clk.time_offset".into();
     clock.parameters = vec![amount("offset", Some(0.0124), Some(1e-4), "s")];
     (clock.gap_closed, clock.gap_closed_ci95) = (Some(0.99), Some([0.98, 1.0]));
-    beside.causes.push(clock);
-    beside.gap[0].noise_floor = 0.05;
-    let text = page(&beside);
+    with_stream.causes.push(clock);
+    with_stream.gap[0].noise_floor = 0.05;
+    let text = page(&with_stream);
     let place = |part: &str| text.find(part).unwrap_or_else(|| panic!("{part} is missing in {text}"));
     let parts = [
         "what to change in the simulator",
@@ -129,6 +129,6 @@ fn a_simulator_s_page_says_what_to_change_first_and_what_remains() {
         "what remains\n  nothing beyond the noise",
     ];
     assert!(parts.map(place).is_sorted(), "{text}");
-    beside.gap[0].noise_floor = 0.01;
-    assert!(page(&beside).contains("mag x: 5.1e-2 uT beyond the noise"), "{}", page(&beside));
+    with_stream.gap[0].noise_floor = 0.01;
+    assert!(page(&with_stream).contains("mag x: 5.1e-2 uT beyond the noise"), "{}", page(&with_stream));
 }

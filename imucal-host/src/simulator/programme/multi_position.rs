@@ -14,7 +14,7 @@ use crate::{
     },
 };
 
-/// Attitudes besides the six faces.
+/// Attitudes other than the six faces.
 const OBLIQUE: usize = 18;
 /// Attitudes that come twice.
 const REVISITS: usize = 6;

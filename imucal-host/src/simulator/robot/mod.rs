@@ -1,4 +1,4 @@
-//! Robots that move: legged, wheeled and flying, beside the stream that a simulator of them puts out.
+//! Robots that move: legged, wheeled and flying, with the stream that a simulator of them puts out.
 
 pub mod deviation;
 pub mod flying;

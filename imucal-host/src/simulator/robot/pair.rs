@@ -1,4 +1,4 @@
-//! A robot's recording beside its simulator's ideal stream, each with a clock and a rate of its own.
+//! A robot's recording with its simulator's ideal stream, each with a clock and a rate of its own.
 
 use imucal_core::rotation;
 use nalgebra::Vector3;

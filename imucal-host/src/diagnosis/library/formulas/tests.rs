@@ -77,13 +77,13 @@ fn effects_that_are_the_same_are_named_together_and_one_without_a_value_cannot_b
     let same = (1..40).filter(|k| cause.equivalents.contains(&format!("mag.own_{k:02}"))).count();
     assert_eq!((same, diagnosis.verdict), (39, Verdict::Ambiguous), "{diagnosis:#?}");
     assert!(cause.probability < 0.03 && diagnosis.user_effects.len() == 40, "{diagnosis:#?}");
-    for (id, told) in [
+    for (id, reason) in [
         ("mag.rooted", "gives NaN on axis x at"),
         ("mag.huge", "`exp(100 * t)` gives"),
         ("mag.hidden", "gives NaN on axis x at"),
     ] {
         let not = diagnosis.not_testable.iter().find(|not| not.effect == id).unwrap();
-        assert!(not.because.contains(told), "{not:?}");
+        assert!(not.because.contains(reason), "{not:?}");
     }
     let failed = simulated(&own, "mag.rooted", 1.0).unwrap_err();
     assert!(matches!(&failed, SimulationError::Output(OutputError::NotFinite(cause)) if cause.row > 0));

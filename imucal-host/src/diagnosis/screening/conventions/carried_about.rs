@@ -70,7 +70,7 @@ pub(crate) fn left_open(
     })
 }
 
-/// Usable samples beside the entries of the attitude.
+/// Usable samples in addition to the entries of the attitude.
 fn gravity_rows(
     recording: &Recording,
     integrity: &Integrity,

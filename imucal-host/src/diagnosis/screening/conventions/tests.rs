@@ -148,7 +148,7 @@ fn a_noisy_stretch_is_found_with_its_times_and_excess() {
 }
 
 #[test]
-fn encoders_read_in_another_order_or_sign_or_unit_are_told_by_all_sensors() {
+fn encoders_read_in_another_order_or_sign_or_unit_are_recognised_by_all_sensors() {
     type Mistake = fn(&mut Recording);
     let mistakes: [(Mistake, &str); 4] = [
         (|r| r.gimbal.iter_mut().flatten().for_each(|row| row.swap(0, 2)), "outer from gimbal_inner"),

@@ -75,7 +75,7 @@ pub fn wrong(recording: &Recording, integrity: &Integrity, pose: &Pose) -> Optio
     })
 }
 
-/// Rates of the attitudes beside those of the gyroscope.
+/// Rates of the attitudes next to those of the gyroscope.
 pub fn rates(
     recording: &Recording,
     integrity: &Integrity,

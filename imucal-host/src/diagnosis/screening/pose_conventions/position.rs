@@ -1,6 +1,6 @@
 //! Positions that jump, come in steps, or are in another unit than metres.
 //!
-//! The unit shows in what the accelerometer senses beside gravity, turned into the frame: it is the positions' second
+//! The unit shows in what the accelerometer senses other than gravity, turned into the frame: it is the positions' second
 //! derivative times the unit.
 
 use nalgebra::{Matrix3, Vector3};
