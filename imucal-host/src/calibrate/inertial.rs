@@ -253,8 +253,8 @@ impl GyrShared<'_> {
         cut: &'b Cut,
         acc: &'b WarmTriad,
         used: &'b [usize],
-    ) -> gyr::turns::GyrInput<'b> {
-        gyr::turns::GyrInput {
+    ) -> gyr::observed_turns::GyrInput<'b> {
+        gyr::observed_turns::GyrInput {
             time: &self.recording.time,
             sensor: gyr,
             usable: self.usable,
@@ -282,7 +282,8 @@ impl GyrShared<'_> {
         let count = cut.rows.partition_point(|rest| rest.end <= row);
         let used: Vec<usize> = used.iter().copied().filter(|k| *k < count).collect();
         let whole = self.input(gyr, cut, acc, &used);
-        let input = gyr::turns::GyrInput { rows: &cut.rows[..count], rests: &cut.rests[..count], ..whole };
+        let input =
+            gyr::observed_turns::GyrInput { rows: &cut.rows[..count], rests: &cut.rests[..count], ..whole };
         gyr::turns::calibrate(&input).passed().map(|fit| fit.triad)
     }
 
@@ -299,7 +300,7 @@ impl GyrShared<'_> {
             (Err(refused), _) => return without_accelerometer(refused.refusal),
             (Ok(()), None) => return without_accelerometer(Refusal::NoRest),
         };
-        let input = gyr::turns::GyrInput {
+        let input = gyr::observed_turns::GyrInput {
             directions: self.directions,
             thermometry: self.thermometry,
             ..self.input(gyr, chosen, &acc, used)

@@ -6,7 +6,8 @@
 //!
 //! | file | what |
 //! | --- | --- |
-//! | [`turns`] | turns between rests: the field form |
+//! | [`observed_turns`] | turns between rests, and the bias that is taken off them |
+//! | [`turns`] | the fit to them: the field form |
 //! | [`turn_errors`] | what the accelerometer's errors add to a turn's |
 //! | [`motions`], [`rig`] | turns along a reference attitude, or a rig's encoders |
 //! | [`bias_smoother`] | a bias that drifts between the rests |
@@ -17,6 +18,7 @@ pub mod acceptance;
 pub mod bias_smoother;
 pub mod ladder;
 pub mod motions;
+pub mod observed_turns;
 pub mod rig;
 pub mod turn_errors;
 pub mod turns;
