@@ -18,4 +18,5 @@ pub mod seal;
 mod setting;
 mod table;
 pub mod trial;
+pub mod trial_error;
 pub mod world;

@@ -18,12 +18,15 @@
 //! | [`detectability`] | what is absent, and from what size on it would have been detected |
 //! | [`profile`] | the residual over what a sensor follows most, for drawings |
 //! | [`experiment`] | what to record next to distinguish what is ambiguous |
+//! | `tested` | what the residual of the best set still follows, what the set closes |
+//! | `asserted` | the causes that are asserted |
 //! | [`decision`] | the verdict, decided once from all of these |
 //! | [`answer`] | the diagnosis, put together once |
 //!
 //! Not done here: nothing is fitted that the search has not fitted, but for the folds of the cross-validation.
 
 pub mod answer;
+mod asserted;
 pub mod confounded_episode;
 pub mod credible;
 pub mod cross_validation;
@@ -37,3 +40,4 @@ pub mod profile;
 pub mod reference_clock;
 pub mod reference_error;
 pub mod shares;
+mod tested;
