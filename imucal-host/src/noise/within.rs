@@ -19,6 +19,7 @@
 use std::{collections::BTreeMap, ops::Range};
 
 use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
+use rayon::prelude::*;
 
 use super::{Span, flicker, white};
 
@@ -62,10 +63,10 @@ impl Within {
         &self,
         prior: &[(f64, f64)],
         times: &[f64],
-        variance: impl Fn(f64) -> f64,
+        variance: impl Fn(f64) -> f64 + Sync,
     ) -> Vec<(f64, f64)> {
         let logs: Option<Vec<f64>> =
-            prior.iter().map(|(ratio, _)| self.log(variance(*ratio), times)).collect();
+            prior.par_iter().map(|(ratio, _)| self.log(variance(*ratio), times)).collect();
         let Some(logs) = logs else { return prior.to_vec() };
         let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let likely: Vec<f64> =

@@ -86,8 +86,10 @@ impl<'a> RestDetector<'a> {
     /// Looks at a recording with the given usual interval, s.
     pub fn new(samples: Samples<'a>, interval: f64) -> Self {
         let half = ((WINDOW / 2.0 / interval).round() as usize).max(1);
-        let variance = windowed_variance(samples, half, GAP * interval);
-        let rate = samples.gyr.map(|gyr| windowed_mean(gyr, samples.usable, half));
+        let (variance, rate) = rayon::join(
+            || windowed_variance(samples, half, GAP * interval),
+            || samples.gyr.map(|gyr| windowed_mean(gyr, samples.usable, half)),
+        );
         let (noise, from_initial) = reference_noise(&variance, (INITIAL / interval).round() as usize, half);
         Self { samples, variance, rate, noise, from_initial, interval, half }
     }

@@ -16,6 +16,7 @@
 
 use imucal_core::observation::Rest;
 use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
 
 use super::rest_noise::{self, AtRest};
 use crate::{
@@ -70,7 +71,8 @@ pub fn errors(rests: &[Rest<f64>], means: &[Vector3<f64>], at_rest: &AtRest<'_>)
         |axis: usize| at_rest.rows.iter().flat_map(move |rows| at_rest.samples(rows).map(move |v| v[axis]));
     let of_axis_steps =
         |axis: usize| quantum::variances_of_means(at_rest.step[axis], std::iter::once(resting(axis)))[0];
-    let steps = Vector3::from_fn(|axis, _| of_axis_steps(axis));
+    let mut steps = Vector3::zeros();
+    steps.as_mut_slice().par_iter_mut().enumerate().for_each(|(axis, step)| *step = of_axis_steps(axis));
     let std = Vector3::from_fn(|axis, _| (of_axis(axis) * density[axis] + steps[axis]).sqrt());
     BiasErrors { std, steps }
 }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use crate::{
     noise::{Span, flicker, interval::Parts, white, within::Within},
@@ -87,12 +88,13 @@ impl AtRest<'_> {
         self.samples(rows).map(move |v| v[axis])
     }
 
-    fn noise_with_steps(&self, steps: impl Fn(f64, usize) -> Vec<f64>) -> RestNoise {
-        let steps = [0, 1, 2].map(|axis| steps(self.step[axis], axis));
+    fn noise_with_steps(&self, steps: impl Fn(f64, usize) -> Vec<f64> + Sync) -> RestNoise {
+        let mut of_axes: [Vec<f64>; 3] = Default::default();
+        of_axes.par_iter_mut().enumerate().for_each(|(axis, of)| *of = steps(self.step[axis], axis));
         RestNoise {
             spans: self.rows.iter().map(|rows| self.span(rows)).collect(),
             density: self.density(),
-            steps: (0..self.rows.len()).map(|k| Vector3::from_fn(|axis, _| steps[axis][k])).collect(),
+            steps: (0..self.rows.len()).map(|k| Vector3::from_fn(|axis, _| of_axes[axis][k])).collect(),
             within: self.within(),
         }
     }

@@ -68,12 +68,18 @@ impl<'a> AxisSamples<'a> {
         if low >= high {
             return Vec::new();
         }
+        // Counted first: most extremes are those of noise.
+        let piles = |extreme: f64| self.values.iter().filter(|value| **value == extreme).count() >= PILE;
         let clipped = |extreme| {
-            self.is_limit(extreme) || self.is_clipped(extreme, [low, high]) || self.is_piled(extreme)
+            self.is_limit(extreme)
+                || (piles(extreme) && (self.is_clipped(extreme, [low, high]) || self.is_piled(extreme)))
         };
         let (clipped_low, clipped_high) = (clipped(low), clipped(high));
         let full_scale = self.triple.full_scale_si().map(|scale| scale * (1.0 - NEAR));
         let declared = |value: f64| full_scale.is_some_and(|scale| value.abs() >= scale);
+        if !(clipped_low || clipped_high || declared(low) || declared(high)) {
+            return Vec::new();
+        }
         let at_limit =
             |value: f64| declared(value) || (clipped_low && value == low) || (clipped_high && value == high);
         let stretches = stretches(&self.values, at_limit);
@@ -98,9 +104,6 @@ impl<'a> AxisSamples<'a> {
 
     /// Whether an extreme is a clip and not where a quantised rest happens to lie.
     fn is_clipped(&self, extreme: f64, extremes: [f64; 2]) -> bool {
-        if self.values.iter().filter(|value| **value == extreme).count() < PILE {
-            return false;
-        }
         let at = |run: &&Range<usize>| self.values[run.start] == extreme;
         let inner =
             || self.runs().iter().filter(|run| !extremes.contains(&self.values[run.start])).map(Range::len);
