@@ -14,6 +14,7 @@ pub(crate) mod date;
 pub mod euroc;
 pub mod header_fault;
 pub mod imu_tk;
+mod inflated;
 pub(crate) mod interval;
 pub(crate) mod joined;
 #[cfg(feature = "logs")]

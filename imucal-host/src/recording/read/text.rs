@@ -6,8 +6,7 @@ use std::{
     path::Path,
 };
 
-use flate2::read::MultiGzDecoder;
-
+use super::inflated::Inflated;
 use crate::{
     file::{Limits, limits::Size, metered::Metered},
     recording::read_error::ReadError,
@@ -49,7 +48,7 @@ impl<'a> Text<'a> {
         let compressed = head == [0x1f, 0x8b];
         let whole = Cursor::new(head).chain(Metered(file));
         let source: Box<dyn Read> =
-            if compressed { Box::new(MultiGzDecoder::new(whole)) } else { Box::new(whole) };
+            if compressed { Box::new(Inflated::of(whole).map_err(unreadable)?) } else { Box::new(whole) };
         let mut text = Self {
             path,
             limit: limits.size,
