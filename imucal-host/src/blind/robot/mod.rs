@@ -1,4 +1,4 @@
-//! Sealed trials with robots: a recording with the stream of a simulator, and what tells the two apart.
+//! Sealed trials with robots: a recording with the stream of a simulator, and what distinguishes the two.
 //!
 //! As with the rig a nonce draws every case, and labels are hashed before the pair is diagnosed. Each pair has clocks and
 //! a mount of its own. Apart from that it is healthy, or has one effect of the catalogue, or stretches in which the robot
