@@ -124,12 +124,14 @@ fn covariances_of_another_calibration_or_for_another_target_are_refused() {
 fn a_covariance_that_is_none_is_refused_with_its_fault() {
     /// Damages a sensor's part of the file.
     type Damage = fn(&mut Value);
-    let faults: [(Damage, &str); 5] = [
+    let faults: [(Damage, &str); 7] = [
         (|acc| acc["covariance_of"][1] = "gain_99".into(), "an unknown entry `gain_99`"),
         (|acc| acc["covariance_of"][1] = acc["covariance_of"][0].clone(), "twice"),
         (|acc| acc["covariance"][2] = serde_json::json!([1.0]), "a row of 1 numbers for 9 entries"),
         (|acc| drop(acc["covariance"].as_array_mut().and_then(Vec::pop)), "8 rows for 9 entries"),
         (|acc| acc["covariance"][4][4] = Value::Null, "null in place of a number"),
+        (|acc| acc["covariance_of"] = Value::Null, "no covariance_of"),
+        (|acc| acc["gain"] = Value::Null, "no gain"),
     ];
     let folder = Folder::with_recording();
     folder.run("calibrate small.csv --out cal.toml --json cal.json").with(0);

@@ -113,8 +113,13 @@ struct Sensor {
 impl Sensor {
     /// `None` where the sensor was not fitted. The error says what is found in place of a covariance.
     fn read(self) -> Result<Option<EntryCovariance>, String> {
-        let (Some(names), Some(rows)) = (self.covariance_of, self.covariance) else { return Ok(None) };
-        let (Some(gain), Some(bias)) = (self.gain, self.bias) else { return Ok(None) };
+        if self.covariance.is_none() && self.covariance_of.is_none() {
+            return Ok(None);
+        }
+        let rows = self.covariance.ok_or("no numbers")?;
+        let names = self.covariance_of.ok_or("no covariance_of")?;
+        let gain = self.gain.ok_or("no gain")?;
+        let bias = self.bias.ok_or("no bias")?;
         let mut entries: Vec<u8> = Vec::with_capacity(names.len());
         for name in names {
             let place = (0..ENTRIES).find(|entry| entry_name(*entry) == name);
