@@ -4,7 +4,8 @@
 //! `diagnosis::Options::effects`. To have it look for a new one:
 //!
 //! 1. Write `imucal-host/src/effect/NAME.rs` like `scale_cubic.rs`: a function `effect`, which says what the effect is,
-//!    and a function `alter`, which does it.
+//!    and a function `alter`, which does it. It sees one row at a time; an effect that looks at other rows is an
+//!    `Act::Memory`, as in `hysteresis.rs`.
 //! 2. In `imucal-host/src/effect/mod.rs`, add the line `mod NAME;`, and `NAME::effect` to the list in [`CATALOGUE`], at
 //!    its place in the chain. With `for family in […]` it is there for each sensor.
 //!
@@ -17,7 +18,7 @@ use std::{error::Error, sync::LazyLock};
 
 use imucal_host::{
     diagnosis::{self, Diagnosis, diagnose},
-    effect::{Act, CATALOGUE, Effect, Needs, Parameter, Part, Role, SensorRun, Words},
+    effect::{Act, CATALOGUE, Effect, Needs, Parameter, Part, Role, SensorRows, Words},
     recording::{Recording, SensorKind},
     simulator::{Programme, Simulation},
 };
@@ -58,7 +59,7 @@ fn amplitude(axis: &str) -> Parameter {
 }
 
 /// What it does to the accelerometer's output: `y += c x³`.
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let c = Vector3::from_column_slice(values);
     run.add(|_, sensed| c.component_mul(&sensed.map(|x| x * x * x)));
 }

@@ -81,6 +81,29 @@ fn a_healthy_residual_whitened_by_its_own_noise_has_the_energy_of_noise() {
 }
 
 #[test]
+fn a_residual_that_is_simulated_in_parts_is_that_of_the_whole_run() {
+    with_linear(|linear| {
+        let scene = linear.scene;
+        // Of each stage, and one that looks at other rows.
+        for id in ["rig.wobble", "clk.time_offset", "mag.field_drift", "acc.scale_cubic", "gyr.bandwidth"] {
+            let doses = [Dose::sized(find(id).unwrap(), 3.0, 1, scene.duration())];
+            let residual = scene.residual(&doses).unwrap();
+            for (kind, output) in scene.simulated(&doses).unwrap() {
+                let recorded = &scene.recording.sensor(kind).unwrap().values;
+                let mean = |rows: std::ops::Range<usize>| {
+                    let used: Vec<usize> = rows.filter(|row| scene.usable[kind as usize][*row]).collect();
+                    let sum =
+                        used.iter().fold(Vector3::zeros(), |sum, row| sum + (recorded[*row] - output[*row]));
+                    if used.is_empty() { sum } else { sum / used.len() as f64 }
+                };
+                let whole: Vec<_> = scene.blocks.iter().map(|block| mean(block.rows.clone())).collect();
+                assert_eq!(residual[kind as usize].as_ref().unwrap(), &whole, "{id} {kind}");
+            }
+        }
+    });
+}
+
+#[test]
 fn what_gimbals_deviate_from_their_encoders_is_noise_in_motion_too() {
     with_linear(|linear| {
         let mut noise = linear.weighing.white(&linear.scene.residual(&[]).unwrap());

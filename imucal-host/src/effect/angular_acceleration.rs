@@ -1,6 +1,6 @@
 //! Rate that angular acceleration feigns: `gyr.angular_acceleration`.
 
-use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, XYZ, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRows, Words, XYZ, vector};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -15,7 +15,7 @@ pub(super) fn effect() -> Effect {
         .like("clk.time_offset", "the accelerometer: it is late only where the clock is")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let c = vector(values, 0);
     run.add(|input, _| c.component_mul(&input.dw_iq_q));
 }

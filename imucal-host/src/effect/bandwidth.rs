@@ -21,7 +21,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     };
     let tau = Parameter::magnitude("tau", "s", of(kind, 5e-3, 4e-3, 0.016), 0.2);
     let interval = Parameter::detail("interval", "s", 5e-3);
-    let effect = Effect::member(kind, "bandwidth", Act::Sensor(kind, alter), vec![tau, interval], words)
+    let effect = Effect::member(kind, "bandwidth", Act::Memory(kind, alter), vec![tau, interval], words)
         .needing(Needs::EXACT_ATTITUDE)
         .like("clk.time_offset", "the other triads: one clock makes all of them late alike");
     match kind {

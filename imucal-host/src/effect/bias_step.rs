@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, of, si, vector};
+use super::{Act, Effect, Parameter, SensorKind, SensorRows, Words, XYZ, member_id, of, si, vector};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -22,7 +22,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         .like(&member_id(kind, "bias_drift"), "the same attitude several times")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let [_, _, _, start, end] = *values else { return };
     let c = vector(values, 0);
     run.add(|input, _| if (start..end).contains(&input.time) { c } else { Vector3::zeros() });

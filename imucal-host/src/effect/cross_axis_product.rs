@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, matrix, member_id, of, si};
+use super::{Act, Effect, Parameter, SensorKind, SensorRows, Words, matrix, member_id, of, si};
 
 const NAMES: [&str; 9] = ["x_xy", "x_yz", "x_zx", "y_xy", "y_yz", "y_zx", "z_xy", "z_yz", "z_zx"];
 
@@ -37,7 +37,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     .like(&member_id(kind, "scale_quadratic"), "input along one axis at a time")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let c = matrix(values);
     run.add(|_, x| c * Vector3::new(x.x * x.y, x.y * x.z, x.z * x.x));
 }

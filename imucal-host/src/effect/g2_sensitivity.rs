@@ -1,6 +1,6 @@
 //! Rate that the square of specific force feigns: `gyr.g2_sensitivity`.
 
-use super::{Act, Effect, MATRIX, Parameter, SensorKind, SensorRun, Words, matrix};
+use super::{Act, Effect, MATRIX, Parameter, SensorKind, SensorRows, Words, matrix};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -14,7 +14,7 @@ pub(super) fn effect() -> Effect {
         .like("gyr.bias", "oblique attitudes")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let g = matrix(values);
     run.add(|input, _| g * input.f_q.component_mul(&input.f_q));
 }

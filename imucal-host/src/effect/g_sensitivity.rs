@@ -1,6 +1,6 @@
 //! Rate that specific force feigns: `gyr.g_sensitivity`.
 
-use super::{Act, Effect, MATRIX, Parameter, SensorKind, SensorRun, Words, matrix};
+use super::{Act, Effect, MATRIX, Parameter, SensorKind, SensorRows, Words, matrix};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -15,7 +15,7 @@ pub(super) fn effect() -> Effect {
         .like("gyr.g2_sensitivity", "opposite attitudes")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let g = matrix(values);
     run.add(|input, _| g * input.f_q);
 }

@@ -1,6 +1,6 @@
 //! A magnet fixed to the sensor: `mag.hard_iron`.
 
-use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, TriadEntries, Words, XYZ, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRows, TriadEntries, Words, XYZ, vector};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -21,7 +21,7 @@ pub(super) fn effect() -> Effect {
     .like("mag.gimbal_hard_iron_middle", "turns of the inner gimbal; along its axis the two are the same")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let d = vector(values, 0);
     run.add(|_, _| d);
 }

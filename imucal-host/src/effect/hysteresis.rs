@@ -16,7 +16,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     parameters.push(Parameter::shape("play", &si(kind), of(kind, 0.5, 0.05, 2.0)));
     // The filter of a reference attitude lags behind a rate as play does.
     let needs = if kind == SensorKind::Gyr { Needs::EXACT_ATTITUDE } else { Needs::NOTHING };
-    Effect::member(kind, "hysteresis", Act::Sensor(kind, alter), parameters, words)
+    Effect::member(kind, "hysteresis", Act::Memory(kind, alter), parameters, words)
         .needing(needs)
         .like(&member_id(kind, "bias_drift"), "the same attitude from both sides, early and late")
         .like(&member_id(kind, "scale_asymmetry"), "the same attitude from both sides")

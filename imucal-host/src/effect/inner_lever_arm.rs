@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRows, Words, vector};
 
 const NAMES: [&str; 9] = ["x_x", "x_y", "x_z", "y_x", "y_y", "y_z", "z_x", "z_y", "z_z"];
 
@@ -22,7 +22,7 @@ pub(super) fn effect() -> Effect {
         .like("acc.lever_arm", "none for its common part; constant rates about all three axes for the rest")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let arms = [vector(values, 0), vector(values, 3), vector(values, 6)];
     run.add(|input, _| {
         let (w, dw) = (input.w_iq_q, input.dw_iq_q);

@@ -15,7 +15,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     let lag = Parameter::amplitude("lag", "s", 5e-3);
     // Without a position an accelerometer shows hardly more than gravity.
     let free = if kind == SensorKind::Mag { Free::ReadApart } else { Free::Placed };
-    Effect::new(&member_id(kind, "lag"), Act::Sensor(kind, alter), vec![lag], words)
+    Effect::new(&member_id(kind, "lag"), Act::Memory(kind, alter), vec![lag], words)
         .part(Part::Nuisance(free))
 }
 

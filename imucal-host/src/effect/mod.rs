@@ -5,7 +5,7 @@
 //! to the rig and the unit: rig and clock → truth → field → triad → sensor → noise → signal → converter → data.
 //!
 //! Effects have no noise of their own: without the unit's noise a recording is a function of the parameters, and can
-//! be differentiated by them. Those with a memory are handed the whole run.
+//! be differentiated by them. Those with a memory ([`Act::Memory`]) are given the whole run.
 
 use std::sync::LazyLock;
 
@@ -88,7 +88,7 @@ pub use self::{
     machine::{Machine, Swing},
     parameter::{Parameter, Role},
     part::{Free, Needs, Part, Spoils},
-    sensor_run::{DataRun, SensorRun, SignalRun},
+    sensor_run::{DataRun, SensorRows, SensorRun, SignalRun},
     triad_entries::TriadEntries,
     truth::{Input, Truth},
     unknown_name::UnknownName,
@@ -123,8 +123,10 @@ pub enum Act {
     Field(fn(&[f64], &mut Truth)),
     /// Alters a triad of the baseline: true SI in the enclosure's axes to raw SI.
     Triad(SensorKind, fn(&[f64], &mut Triad<f64>)),
-    /// Alters a triad's output.
-    Sensor(SensorKind, fn(&[f64], &mut SensorRun<'_>)),
+    /// Alters a triad's output, each row by itself: a run may be given to it in parts.
+    Sensor(SensorKind, fn(&[f64], &mut SensorRows<'_>)),
+    /// Alters a triad's output by other rows as well: it is given the whole run.
+    Memory(SensorKind, fn(&[f64], &mut SensorRun<'_>)),
     /// Adds a user's formula to a triad's output.
     Formula(SensorKind, &'static user::Formula),
     /// Alters a triad's noise or limit.
@@ -140,10 +142,15 @@ impl Act {
             Self::Rig(_) => Stage::Rig,
             Self::Clock(_) => Stage::Clock,
             Self::Field(_) => Stage::Field,
-            Self::Triad(..) | Self::Sensor(..) | Self::Formula(..) => Stage::Sensor,
+            Self::Triad(..) | Self::Sensor(..) | Self::Memory(..) | Self::Formula(..) => Stage::Sensor,
             Self::Signal(..) => Stage::Signal,
             Self::Data(..) => Stage::Data,
         }
+    }
+
+    /// Its effect on a triad's output in a row depends on other rows, or may, as a user's formula.
+    pub fn remembers(&self) -> bool {
+        matches!(self, Self::Memory(..) | Self::Formula(..))
     }
 }
 
@@ -185,6 +192,7 @@ impl Effect {
             Act::Rig(_) | Act::Clock(_) | Act::Field(_) => &SensorKind::ALL,
             Act::Triad(kind, _)
             | Act::Sensor(kind, _)
+            | Act::Memory(kind, _)
             | Act::Formula(kind, _)
             | Act::Signal(kind, _)
             | Act::Data(kind, _) => only(kind),

@@ -4,7 +4,7 @@
 //! y += c |x|
 //! ```
 
-use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, of, vector};
+use super::{Act, Effect, Parameter, SensorKind, SensorRows, Words, XYZ, member_id, of, vector};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -24,7 +24,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     .like(&member_id(kind, "scale_quadratic"), "inputs at half and at full level of both signs")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let c = vector(values, 0);
     run.add(|_, x| c.component_mul(&x.abs()));
 }

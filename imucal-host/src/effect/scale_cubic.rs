@@ -4,7 +4,7 @@
 //! y += c x³
 //! ```
 
-use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, of, si, vector};
+use super::{Act, Effect, Parameter, SensorKind, SensorRows, Words, XYZ, member_id, of, si, vector};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -30,7 +30,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     .like(&member_id(kind, "saturation"), "inputs well below the limit")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let c = vector(values, 0);
     run.add(|_, x| c.component_mul(&x.component_mul(&x.component_mul(x))));
 }

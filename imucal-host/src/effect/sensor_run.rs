@@ -1,10 +1,10 @@
-//! One triad over a whole run, on its way from input to output.
+//! One triad over a run, on its way from input to output.
 
 use nalgebra::Vector3;
 
 use super::{truth::Input, user::History};
 
-/// A triad's output before noise. Effects with a memory see the whole run.
+/// A triad's output before noise, over the whole run: for effects that look at other rows than their own.
 #[derive(Debug)]
 pub struct SensorRun<'a> {
     /// What the unit is given, row by row.
@@ -15,12 +15,24 @@ pub struct SensorRun<'a> {
     pub output: &'a mut [Vector3<f64>],
 }
 
-impl SensorRun<'_> {
-    /// Adds to each row's output a function of its input and of what the axes sense.
+/// A triad's output before noise, of which an effect sees one row at a time.
+#[derive(Debug)]
+pub struct SensorRows<'a>(SensorRun<'a>);
+
+impl SensorRows<'_> {
+    /// Adds to each row's output a function of its input and of what the axes sense, SI units.
     pub fn add(&mut self, term: impl Fn(&Input, &Vector3<f64>) -> Vector3<f64>) {
-        for ((output, input), sensed) in self.output.iter_mut().zip(self.input).zip(self.sensed) {
+        let Self(SensorRun { input, sensed, output }) = self;
+        for ((output, input), sensed) in output.iter_mut().zip(*input).zip(*sensed) {
             *output += term(input, sensed);
         }
+    }
+}
+
+impl SensorRun<'_> {
+    /// The same, row by row.
+    pub fn rows(&mut self) -> SensorRows<'_> {
+        SensorRows(SensorRun { input: self.input, sensed: self.sensed, output: self.output })
     }
 
     /// Time since the row before, s; 0 for the first. Rows need not be evenly apart.

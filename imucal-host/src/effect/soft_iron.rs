@@ -1,7 +1,7 @@
 //! Soft iron fixed to the sensor: `mag.soft_iron`.
 
 use super::{
-    Act, Effect, Needs, Parameter, SYMMETRIC, SensorKind, SensorRun, TriadEntries, Words, symmetric,
+    Act, Effect, Needs, Parameter, SYMMETRIC, SensorKind, SensorRows, TriadEntries, Words, symmetric,
 };
 
 pub(super) fn effect() -> Effect {
@@ -19,7 +19,7 @@ pub(super) fn effect() -> Effect {
         .like("mag.misalignment", "none: its symmetric part is the same")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let s = symmetric(values);
     run.add(|_, sensed| s * sensed);
 }

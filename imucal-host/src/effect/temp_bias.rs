@@ -5,7 +5,7 @@
 use imucal_core::{temperature::TemperatureTerms, triad::Triad};
 use nalgebra::Vector3;
 
-use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, of, si, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRows, Words, XYZ, member_id, of, si, vector};
 
 /// Temperature at which temperature effects vanish, °C.
 pub(super) const REFERENCE: f64 = 25.0;
@@ -24,7 +24,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         .like(&member_id(kind, "temp_bias_quadratic"), "three or more temperatures")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let slope = vector(values, 0);
     let terms = TemperatureTerms { reference: REFERENCE, bias_slope: slope.into(), scale_slope: [0.0; 3] };
     // Nothing to invert: the triad is the identity and the scale stays.

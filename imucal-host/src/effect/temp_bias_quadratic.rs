@@ -4,7 +4,7 @@
 //! y += c (T − 25 °C)²
 //! ```
 
-use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, of, si, vector};
+use super::{Act, Effect, Needs, Parameter, SensorKind, SensorRows, Words, XYZ, member_id, of, si, vector};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -26,7 +26,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     .like(&member_id(kind, "bias_drift"), "heating and then cooling")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let c = vector(values, 0);
     run.add(|input, _| {
         let change = input.temperature - super::temp_bias::REFERENCE;

@@ -5,7 +5,8 @@
 use imucal_core::{temperature::TemperatureTerms, triad::Triad};
 
 use super::{
-    Act, Effect, Needs, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, temp_bias::REFERENCE, vector,
+    Act, Effect, Needs, Parameter, SensorKind, SensorRows, Words, XYZ, member_id, temp_bias::REFERENCE,
+    vector,
 };
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
@@ -21,7 +22,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         .like(&member_id(kind, "scale_cubic"), "the same inputs at two temperatures")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let slope = vector(values, 0);
     let terms = TemperatureTerms { reference: REFERENCE, bias_slope: [0.0; 3], scale_slope: slope.into() };
     run.add(|input, sensed| {

@@ -14,7 +14,7 @@ pub(super) fn effect() -> Effect {
         remedy: "Damp the mount, or widen the range; do not calibrate while the rig shakes.",
         needs: "Different levels of vibration at the same attitude, such as drives on and off.",
     };
-    let act = Act::Sensor(SensorKind::Acc, alter);
+    let act = Act::Memory(SensorKind::Acc, alter);
     Effect::new(
         "acc.vibration_rectification",
         act,

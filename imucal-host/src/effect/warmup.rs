@@ -4,7 +4,7 @@
 //! y += c exp(−t/τ)
 //! ```
 
-use super::{Act, Effect, Parameter, SensorKind, SensorRun, Words, XYZ, member_id, of, si, vector};
+use super::{Act, Effect, Parameter, SensorKind, SensorRows, Words, XYZ, member_id, of, si, vector};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -21,7 +21,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         .like(&member_id(kind, "temp_bias"), "a cooling ramp, then the first attitude again")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let [_, _, _, tau] = *values else { return };
     let c = vector(values, 0);
     run.add(|input, _| c * libm::exp(-input.time / tau));

@@ -10,6 +10,9 @@ use crate::{
     recording::SensorKind,
 };
 
+/// Rows that one core simulates at a time, at least.
+const TOGETHER: usize = 512;
+
 /// Effects in the order of the chain; those that are off are left out, so that they change not a bit.
 #[derive(Clone, Debug, Default)]
 pub struct Chain<'a> {
@@ -24,16 +27,21 @@ impl<'a> Chain<'a> {
         Self { doses: active }
     }
 
+    /// Some effect looks at other rows than its own, so that a run has to be given to it whole.
+    pub fn remembers(&self) -> bool {
+        self.doses.iter().any(|dose| dose.effect.act.remembers())
+    }
+
     /// The truth of each row: times of the sensor's clock, s.
     pub fn truth(&self, motion: &dyn Motion, times: &[f64]) -> Vec<Truth> {
         let row = |recent: &mut Recent, time: &f64| self.row(motion, *time, recent);
-        times.par_iter().map_init(Recent::default, row).collect()
+        times.par_iter().with_min_len(TOGETHER).map_init(Recent::default, row).collect()
     }
 
     /// The rows as a unit is given them whose axes are the table's.
     pub fn inputs(&self, motion: &dyn Motion, times: &[f64]) -> Vec<Input> {
         let row = |recent: &mut Recent, time: &f64| Input::of(&self.row(motion, *time, recent));
-        times.par_iter().map_init(Recent::default, row).collect()
+        times.par_iter().with_min_len(TOGETHER).map_init(Recent::default, row).collect()
     }
 
     fn row(&self, motion: &dyn Motion, time: f64, recent: &mut Recent) -> Truth {
@@ -48,7 +56,8 @@ impl<'a> Chain<'a> {
                 }
             }
         };
-        let mut row = Truth { time, ..motion.truth_among(shown, &rig, recent) };
+        let mut row = motion.truth_among(shown, &rig, recent);
+        row.time = time;
         for dose in &self.doses {
             if let Act::Field(alter) = dose.effect.act {
                 alter(&dose.values, &mut row);
@@ -88,7 +97,8 @@ impl<'a> Chain<'a> {
         let mut run = SensorRun { input, sensed, output: &mut output };
         for dose in &self.doses {
             match dose.effect.act {
-                Act::Sensor(of, alter) if of == kind => alter(&dose.values, &mut run),
+                Act::Sensor(of, alter) if of == kind => alter(&dose.values, &mut run.rows()),
+                Act::Memory(of, alter) if of == kind => alter(&dose.values, &mut run),
                 Act::Formula(of, formula) if of == kind => formula.add(&dose.values, &mut run)?,
                 _ => {}
             }

@@ -24,11 +24,9 @@ use crate::{
     recording::manifest::Axis,
 };
 
-/// Attitude and motion of the table at an instant.
+/// Attitude and motion of the table against its base at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Base to n.
-    pub c_p_n: Matrix3<f64>,
     /// Table to base.
     pub c_t_p: Matrix3<f64>,
     /// Table to outer gimbal.
@@ -77,8 +75,8 @@ pub fn base(heading: f64, [tilt_x, tilt_y]: [f64; 2]) -> Matrix3<f64> {
     turn(Vector3::z(), heading) * turn(Vector3::y(), tilt_y) * turn(Vector3::x(), tilt_x)
 }
 
-/// The pose of a rig whose base stands like this: C_p_n.
-pub fn pose(machine: &Machine, c_p_n: Matrix3<f64>) -> Pose {
+/// The pose of a rig's table.
+pub fn pose(machine: &Machine) -> Pose {
     let [outer, middle, inner] = &machine.axes;
     let mut chain = Chain::base();
     // A level rig without wobble keeps the plain product of three rotations, bit for bit.
@@ -95,7 +93,6 @@ pub fn pose(machine: &Machine, c_p_n: Matrix3<f64>) -> Pose {
     skew(&mut chain, middle, inner, machine.skew[1]);
     chain.turn(inner, machine.gimbals[2]);
     Pose {
-        c_p_n,
         c_t_p: chain.c,
         c_t_o: c_o_p.tr_mul(&chain.c),
         c_t_m: c_m_p.tr_mul(&chain.c),
@@ -147,7 +144,7 @@ mod tests {
     fn the_rate_is_the_derivative_of_the_attitude_for_any_order_of_axes() {
         let h = 1e-5;
         for axes in AXES {
-            let at = |t: f64| pose(&machine(axes, t), Matrix3::identity());
+            let at = |t: f64| pose(&machine(axes, t));
             for k in 0..20 {
                 let t = 0.1 * f64::from(k);
                 let (before, here, after) = (at(t - h), at(t), at(t + h));
@@ -171,10 +168,7 @@ mod tests {
                 )
                 .matrix()
             };
-            assert!(
-                (pose(&machine, Matrix3::identity()).c_t_p - r(0) * r(1) * r(2)).norm() < 1e-14,
-                "{axes:?}"
-            );
+            assert!((pose(&machine).c_t_p - r(0) * r(1) * r(2)).norm() < 1e-14, "{axes:?}");
         }
     }
 

@@ -5,9 +5,6 @@ use nalgebra::{Matrix3, Vector3};
 use super::{gimbal::base, place::Place};
 use crate::effect::Machine;
 
-/// Rows that are looked at after the last one, before all are.
-const SOON: usize = 16;
-
 /// What the last row was asked for, and what it was answered.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Recent {
@@ -30,12 +27,17 @@ impl Recent {
 
     /// The row nearest to a time, s: as a rule soon after the last one.
     pub fn nearest(&mut self, times: &[f64], time: f64) -> usize {
-        let soon = self.row..(self.row + SOON).min(times.len());
         let begins_before =
             self.row.checked_sub(1).is_none_or(|row| times.get(row).is_some_and(|t| *t < time));
-        let found =
-            times.get(soon).filter(|_| begins_before).and_then(|soon| soon.iter().position(|t| *t >= time));
-        self.row = found.map_or_else(|| times.partition_point(|t| *t < time), |at| self.row + at);
+        let from = if begins_before { self.row.min(times.len()) } else { 0 };
+        // Most rows come soon after the one before: steps from there, each twice the last, end behind it.
+        let (mut low, mut high, mut step) = (from, from, 1);
+        while times.get(high).is_some_and(|t| *t < time) {
+            (low, high) = (high + 1, high + step);
+            step *= 2;
+        }
+        let high = high.min(times.len());
+        self.row = low + times[low..high].partition_point(|t| *t < time);
         let after = self.row.min(times.len().saturating_sub(1));
         let before = after.saturating_sub(1);
         match (times.get(before), times.get(after)) {

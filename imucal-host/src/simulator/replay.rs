@@ -12,7 +12,7 @@
 use crate::recording::order_statistics::std_of_median;
 use std::{f64::consts::TAU, sync::OnceLock};
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{
@@ -39,7 +39,7 @@ const CREEP: f64 = 3e-3;
 const NOISES: f64 = 8.0;
 /// Two rates further apart than this, rad/s, and than their noise are those of a jerk.
 const JERK: f64 = 1e-3;
-/// Poses of so many rows are remembered, a third of a kilobyte each: of eleven minutes at 1 kHz.
+/// The poses of so many rows are remembered, a quarter of a kilobyte each: of eleven minutes at 1 kHz.
 const REMEMBERED: usize = 700_000;
 /// At least this many readings to each side.
 const FEWEST: usize = 2;
@@ -55,7 +55,8 @@ pub struct Replay {
     axes: [Axis; 3],
     place: Place,
     steady: Option<Box<Replay>>,
-    poses: OnceLock<Vec<Pose>>,
+    /// Of the rows that were asked for: of the steady movement they are few.
+    poses: Vec<OnceLock<Box<Pose>>>,
 }
 
 impl Replay {
@@ -75,7 +76,7 @@ impl Replay {
         let (short, long) = (rows(REACH.0), rows(reach(&noise, interval)));
         let moving = moving(time, &angles, &noise);
         let known = known(encoders, long);
-        let of = |reach: usize| {
+        let of = |reach: usize, poses: usize| {
             let (swings, known) = swings(time, &angles, &noise, &moving, known.clone(), reach);
             let (time, moving, temperature) = (time.to_vec(), moving.clone(), temperature.clone());
             Self {
@@ -87,11 +88,12 @@ impl Replay {
                 axes,
                 place,
                 steady: None,
-                poses: OnceLock::new(),
+                poses: vec![OnceLock::new(); poses],
             }
         };
-        let steady = (long > short).then(|| Box::new(of(long)));
-        Some(Self { steady, ..of(short) })
+        let rows = time.len();
+        let steady = (long > short).then(|| Box::new(of(long, rows)));
+        Some(Self { steady, ..of(short, if rows > REMEMBERED { 0 } else { rows }) })
     }
 
     /// An exact rig on a level base, so many seconds after a row.
@@ -105,11 +107,10 @@ impl Replay {
         Machine { gimbals, ..Machine::exact(self.axes.map(direction)) }
     }
 
-    /// Poses of an exact rig on a level base, row by row; none of a long recording, which are computed as they are needed.
-    fn poses(&self) -> &[Pose] {
-        let of = |row: usize| pose(&self.machine(row, 0.0), Matrix3::identity());
-        let rows = if self.time.len() > REMEMBERED { 0 } else { self.time.len() };
-        self.poses.get_or_init(|| (0..rows).into_par_iter().map(of).collect())
+    /// The pose of an exact rig at a row; `None` in a long recording, whose poses are computed as they are needed.
+    fn pose(&self, row: usize) -> Option<&Pose> {
+        let known = self.poses.get(row)?;
+        Some(known.get_or_init(|| Box::new(pose(&self.machine(row, 0.0)))))
     }
 }
 
@@ -125,11 +126,11 @@ impl Motion for Replay {
         let mut machine = exact;
         rig(&mut machine);
         let temperature = self.temperature.get(row).copied().unwrap_or_default();
-        let known = self.poses().get(row).filter(|_| since == 0.0 && machine.turns_like(&exact));
-        match known {
+        let as_recorded = since == 0.0 && machine.turns_like(&exact);
+        match as_recorded.then(|| self.pose(row)).flatten() {
             Some(pose) => {
-                let pose = Pose { c_p_n: recent.base(&machine), ..*pose };
-                at_pose(time, &pose, machine.gimbals, &self.place, temperature, recent)
+                let c_p_n = recent.base(&machine);
+                at_pose(time, pose, c_p_n, machine.gimbals, &self.place, temperature, recent)
             }
             None => on_rig(time, &machine, &self.place, temperature, recent),
         }

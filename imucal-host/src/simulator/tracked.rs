@@ -116,17 +116,11 @@ impl Motion for Tracked {
         let State { c_t_p, w_pt_t, dw_pt_t } = self.states.get(row).copied().unwrap_or(still);
         let mut machine = Machine::exact([Axis::Z, Axis::Y, Axis::X].map(direction));
         rig(&mut machine);
+        let c_p_n = recent.base(&machine);
         let c_t_p = c_t_p * exp(&((w_pt_t + dw_pt_t * (0.5 * since)) * since));
-        let pose = Pose {
-            c_p_n: recent.base(&machine),
-            c_t_p,
-            c_t_o: c_t_p,
-            c_t_m: c_t_p,
-            w_pt_t: w_pt_t + dw_pt_t * since,
-            dw_pt_t,
-        };
+        let pose = Pose { c_t_p, c_t_o: c_t_p, c_t_m: c_t_p, w_pt_t: w_pt_t + dw_pt_t * since, dw_pt_t };
         let temperature = self.temperature.get(row).copied().unwrap_or_default();
-        at_pose(time, &pose, [Swing::default(); 3], &self.place, temperature, recent)
+        at_pose(time, &pose, c_p_n, [Swing::default(); 3], &self.place, temperature, recent)
     }
 
     fn rig(&self) -> Rig {

@@ -90,22 +90,23 @@ pub trait Recorded: Motion {
 
 /// The truth on a three-gimbal rig.
 pub fn on_rig(time: f64, machine: &Machine, place: &Place, temperature: f64, recent: &mut Recent) -> Truth {
-    let pose = pose(machine, recent.base(machine));
-    at_pose(time, &pose, machine.gimbals, place, temperature, recent)
+    let c_p_n = recent.base(machine);
+    at_pose(time, &pose(machine), c_p_n, machine.gimbals, place, temperature, recent)
 }
 
-/// The truth on a table in a pose.
+/// The truth on a table in a pose, on a base that stands like `c_p_n`.
 ///
 /// Without lever arm: the unit sits where the axes meet. The table does not travel, so that specific force is gravity.
 pub fn at_pose(
     time: f64,
     pose: &Pose,
+    c_p_n: Matrix3<f64>,
     gimbals: [Swing; 3],
     place: &Place,
     temperature: f64,
     recent: &mut Recent,
 ) -> Truth {
-    let c_t_n = pose.c_p_n * pose.c_t_p;
+    let c_t_n = c_p_n * pose.c_t_p;
     let to_t = |v_n: Vector3<f64>| c_t_n.tr_mul(&v_n);
     let w_ie_t = to_t(recent.earth_rate_n(place));
     Truth {
@@ -113,7 +114,7 @@ pub fn at_pose(
         c_t_p: pose.c_t_p,
         c_t_o: pose.c_t_o,
         c_t_m: pose.c_t_m,
-        c_p_n: pose.c_p_n,
+        c_p_n,
         p_p: Vector3::zeros(),
         gimbals,
         w_pt_t: pose.w_pt_t,
@@ -136,15 +137,8 @@ pub fn in_the_open(
     place: &Place,
     recent: &mut Recent,
 ) -> Truth {
-    let pose = Pose {
-        c_p_n: Matrix3::identity(),
-        c_t_p: *c_t_n,
-        c_t_o: *c_t_n,
-        c_t_m: *c_t_n,
-        w_pt_t: w_nt_t,
-        dw_pt_t: dw_nt_t,
-    };
-    at_pose(time, &pose, [Swing::default(); 3], place, 25.0, recent)
+    let pose = Pose { c_t_p: *c_t_n, c_t_o: *c_t_n, c_t_m: *c_t_n, w_pt_t: w_nt_t, dw_pt_t: dw_nt_t };
+    at_pose(time, &pose, Matrix3::identity(), [Swing::default(); 3], place, 25.0, recent)
 }
 
 #[cfg(test)]

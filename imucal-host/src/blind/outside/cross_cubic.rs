@@ -2,7 +2,7 @@
 
 use super::{XYZ, amplitudes, mechanism, neighbour, of, vector};
 use crate::{
-    effect::{Act, Effect, SensorRun},
+    effect::{Act, Effect, SensorRows},
     recording::SensorKind,
 };
 
@@ -17,7 +17,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     )
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let c = vector(values, 0);
     run.add(|_, x| c.component_mul(&neighbour(x).map(|x| x * x * x)));
 }

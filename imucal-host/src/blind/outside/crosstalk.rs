@@ -6,7 +6,7 @@
 
 use super::{XYZ, amplitudes, mechanism, neighbour, of, vector};
 use crate::{
-    effect::{Act, Effect, SensorRun},
+    effect::{Act, Effect, SensorRows},
     recording::SensorKind,
 };
 
@@ -19,12 +19,12 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     mechanism(kind, "crosstalk", act, parameters, "Lines of another triad couple into this one.")
 }
 
-fn of_field(values: &[f64], run: &mut SensorRun<'_>) {
+fn of_field(values: &[f64], run: &mut SensorRows<'_>) {
     let c = vector(values, 0);
     run.add(|input, _| c.component_mul(&neighbour(&input.b_q)));
 }
 
-fn of_force(values: &[f64], run: &mut SensorRun<'_>) {
+fn of_force(values: &[f64], run: &mut SensorRows<'_>) {
     let c = vector(values, 0);
     run.add(|input, _| c.component_mul(&neighbour(&input.f_q)));
 }

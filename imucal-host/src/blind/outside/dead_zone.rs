@@ -2,7 +2,7 @@
 
 use super::{XYZ, amplitudes, mechanism, of, shape, vector};
 use crate::{
-    effect::{Act, Effect, SensorRun},
+    effect::{Act, Effect, SensorRows},
     recording::SensorKind,
 };
 
@@ -12,7 +12,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     mechanism(kind, "dead_zone", Act::Sensor(kind, alter), parameters, "The loop is slack about zero.")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let (c, d) = (vector(values, 0), values.get(3).copied().unwrap_or(0.0).abs());
     run.add(|_, x| -c.component_mul(&x.map(|x| x.clamp(-d, d))));
 }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::{XYZ, amplitudes, mechanism, of, shape, vector};
 use crate::{
-    effect::{Act, Effect, SensorRun},
+    effect::{Act, Effect, SensorRows},
     recording::SensorKind,
 };
 
@@ -14,7 +14,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     mechanism(kind, "ladder", Act::Sensor(kind, alter), parameters, "Steps of the converter are not alike.")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let (c, period) = (vector(values, 0), values.get(3).copied().unwrap_or(1.0));
     run.add(|_, x| c.component_mul(&x.map(|x| libm::sin(TAU * x / period))));
 }

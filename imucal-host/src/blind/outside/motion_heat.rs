@@ -16,7 +16,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     mechanism(
         kind,
         "motion_heat",
-        Act::Sensor(kind, alter),
+        Act::Memory(kind, alter),
         parameters,
         "Drives warm the unit while they work.",
     )

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::{amplitudes, mechanism, of, shape, vector};
 use crate::{
-    effect::{Act, Effect, SensorRun},
+    effect::{Act, Effect, SensorRows},
     recording::SensorKind,
 };
 
@@ -16,7 +16,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     mechanism(kind, "ripple", Act::Sensor(kind, alter), parameters, "Something beats slowly.")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let period = values.get(6).copied().unwrap_or(1.0);
     run.add(|input, _| {
         let (sin, cos) = libm::sincos(TAU * input.time / period);

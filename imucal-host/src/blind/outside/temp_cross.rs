@@ -2,7 +2,7 @@
 
 use super::{XYZ, amplitudes, mechanism, neighbour, of, vector};
 use crate::{
-    effect::{Act, Effect, SensorRun},
+    effect::{Act, Effect, SensorRows},
     recording::SensorKind,
 };
 
@@ -11,7 +11,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     mechanism(kind, "temp_cross", Act::Sensor(kind, alter), parameters, "The package bends as it warms.")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let c = vector(values, 0);
     run.add(|input, x| c.component_mul(&neighbour(x)) * (input.temperature - 25.0));
 }

@@ -11,7 +11,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     mechanism(
         kind,
         "temp_rate",
-        Act::Sensor(kind, alter),
+        Act::Memory(kind, alter),
         parameters,
         "Gradients in the package while it warms.",
     )

@@ -122,7 +122,7 @@ impl<'s> Reference<'s> {
                 self.scene.outputs(&doses, effect.sensors, &self.scene.inputs(&doses, self.nodes))?
             }
             Act::Triad(..) => self.scene.outputs(&doses, effect.sensors, &self.input)?,
-            Act::Sensor(..) | Act::Formula(..) | Act::Signal(..) | Act::Data(..) => {
+            Act::Sensor(..) | Act::Memory(..) | Act::Formula(..) | Act::Signal(..) | Act::Data(..) => {
                 self.scene.outputs_of(&doses, effect.sensors, &self.input, &self.sensed)?
             }
         };

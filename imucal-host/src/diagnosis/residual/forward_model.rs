@@ -7,7 +7,6 @@ use std::{ops::Range, sync::OnceLock};
 
 use imucal_core::triad::Triad;
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 use super::{
     block::{Block, Means, cut_at_most},
@@ -21,9 +20,6 @@ use crate::{
     recording::{Recording, SensorKind},
     simulator::{Dose, Recorded, chain::Chain},
 };
-
-/// What sensors put out, row by row.
-type Outputs = Vec<(SensorKind, Vec<Vector3<f64>>)>;
 
 /// What the axes of a sensor sense, row by row: its output before bias and effects, SI units. Empty without the sensor.
 #[derive(Clone, Debug)]
@@ -56,8 +52,8 @@ pub struct ForwardModel<'a> {
     pub counts: [Vec<usize>; 3],
     /// Variance of a sample in each block, by sensor, against the usual one; none where all are alike.
     pub vibration: [Option<Vec<f64>>; 3],
-    motion: &'a dyn Recorded,
-    acc_as_sharp: Option<Vec<Vector3<f64>>>,
+    pub(super) motion: &'a dyn Recorded,
+    pub(super) acc_as_sharp: Option<Vec<Vector3<f64>>>,
     /// Rows of each sensor that are used, by [`SensorKind::ALL`].
     pub usable: [Vec<bool>; 3],
     /// The triads that the simulator starts from, by [`SensorKind::ALL`].
@@ -260,43 +256,6 @@ impl<'a> ForwardModel<'a> {
         }
     }
 
-    /// What the simulator puts out at each row, by sensor. `None` where a triad is singular.
-    pub fn simulated(&self, doses: &[Dose]) -> Result<Outputs, DiagnosisError> {
-        let chain = Chain::new(doses);
-        let input = chain.inputs(self.motion, &self.recording.time);
-        let of = |kind: &SensorKind| Ok((*kind, self.output(&chain, *kind, &input)?));
-        self.kinds.par_iter().map(of).collect()
-    }
-
-    /// Recorded less simulated, block by block. `None` where a triad is singular.
-    pub fn residual(&self, doses: &[Dose]) -> Result<Means, DiagnosisError> {
-        let chain = Chain::new(doses);
-        let input = chain.inputs(self.motion, &self.recording.time);
-        // A sensor's output is let go before the next one's is made: it is as long as the recording.
-        let of =
-            |kind: &SensorKind| Ok((*kind, self.difference(*kind, &self.output(&chain, *kind, &input)?)));
-        let differences: Vec<_> = self.kinds.par_iter().map(of).collect::<Result<_, DiagnosisError>>()?;
-        let mut means: Means = Default::default();
-        differences.into_iter().for_each(|(kind, difference)| means[kind as usize] = difference);
-        Ok(self.seen(means))
-    }
-
-    fn difference(&self, kind: SensorKind, output: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
-        let sharp = self.acc_as_sharp.as_ref().filter(|_| kind == SensorKind::Acc);
-        let samples = sharp.unwrap_or(&self.recording.sensor(kind)?.values);
-        let usable = &self.usable[kind as usize];
-        let mean = |block: &Block| {
-            let mut sum = Vector3::zeros();
-            let mut count = 0.0;
-            for row in block.rows.clone().filter(|row| usable[*row]) {
-                sum += samples[row] - output[row];
-                count += 1.0;
-            }
-            if count > 0.0 { sum / count } else { sum }
-        };
-        Some(self.cuts.iter().map(mean).collect())
-    }
-
     /// What each sensor puts out at the nodes.
     pub(super) fn outputs(
         &self,
@@ -347,7 +306,7 @@ impl<'a> ForwardModel<'a> {
         Ok(outputs)
     }
 
-    fn output(
+    pub(super) fn output(
         &self,
         chain: &Chain<'_>,
         kind: SensorKind,

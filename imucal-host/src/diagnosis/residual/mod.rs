@@ -9,6 +9,7 @@
 //! | [`block`] | rows that are averaged: short in motion, longer at rest |
 //! | [`sample_points`] | where in a block the simulator is evaluated |
 //! | [`forward_model`] | data and simulator side by side |
+//! | [`simulated_rows`] | recorded less simulated, row by row |
 //! | [`base_run`] | a simulated run and its derivatives by difference quotients |
 //! | [`gimbal_derivatives`] | what a radian of a gimbal's offset changes |
 //! | [`gravity_observables`] | what rests and turns of a hand show whatever the heading was |
@@ -23,5 +24,6 @@ pub mod forward_model;
 pub mod gimbal_derivatives;
 pub mod gravity_observables;
 pub mod sample_points;
+pub mod simulated_rows;
 pub mod transient;
 pub mod vibration;

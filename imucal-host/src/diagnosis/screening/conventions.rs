@@ -4,11 +4,16 @@
 //! the catalogue, or, where the fault lies not in one sensor, says in words what would explain it. Times of rows are
 //! those of [`Recording::time`]. Not looked for: columns that are shifted by a row, wrong byte order.
 
+use rayon::prelude::*;
+
 use crate::{
     diagnosis::{finding::Amount, settings::Provided},
     effect,
     effect::{Effect, Truth},
-    recording::{Recording, SensorKind, check::integrity::Integrity},
+    recording::{
+        Recording, SensorKind,
+        check::integrity::{Integrity, SensorIntegrity},
+    },
     simulator::{Dose, Motion},
 };
 
@@ -191,19 +196,30 @@ pub fn check(
             }
         }
     }
-    for sensor in &integrity.sensors {
-        let Some(triple) = recording.sensor(sensor.sensor) else { continue };
-        if found.beyond_movement == Some(sensor.sensor) {
-            continue;
+    let own = |sensor: &SensorIntegrity| {
+        let mut own = Conventions::default();
+        if found.beyond_movement != Some(sensor.sensor) {
+            of_itself(recording, motion, sensor, &mut own);
         }
-        saturation::check(triple, sensor, &mut found);
-        stuck_samples::check(triple, sensor, &mut found);
-        if motion.encoders(0.0).is_none() {
-            // What a hand does other than turning is no noise of the sensor.
-            continue;
-        }
-        let moves = |row: usize| motion.truth(recording.time[row], &|_| ()).w_pt_t.norm();
-        noise_burst::check(&recording.time, triple, sensor, &moves, &mut found);
+        own
+    };
+    let own: Vec<Conventions> = integrity.sensors.par_iter().map(own).collect();
+    for own in own {
+        found.findings.extend(own.findings);
+        found.remarks.extend(own.remarks);
     }
     found
+}
+
+/// Checks a sensor's samples against each other.
+fn of_itself(recording: &Recording, motion: &dyn Motion, sensor: &SensorIntegrity, found: &mut Conventions) {
+    let Some(triple) = recording.sensor(sensor.sensor) else { return };
+    saturation::check(triple, sensor, found);
+    stuck_samples::check(triple, sensor, found);
+    if motion.encoders(0.0).is_none() {
+        // What a hand does other than turning is no noise of the sensor.
+        return;
+    }
+    let moves = |row: usize| motion.truth(recording.time[row], &|_| ()).w_pt_t.norm();
+    noise_burst::check(&recording.time, triple, sensor, &moves, found);
 }

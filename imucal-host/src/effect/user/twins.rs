@@ -102,7 +102,8 @@ impl Run {
         let mut run = SensorRun { input, sensed: &sensed, output: &mut output };
         for dose in doses {
             match dose.effect.act {
-                Act::Sensor(_, alter) => alter(&dose.values, &mut run),
+                Act::Sensor(_, alter) => alter(&dose.values, &mut run.rows()),
+                Act::Memory(_, alter) => alter(&dose.values, &mut run),
                 Act::Formula(_, formula) => formula.add(&dose.values, &mut run).unwrap(),
                 Act::Field(alter) => {
                     for (output, row) in run.output.iter_mut().zip(&self.truth) {

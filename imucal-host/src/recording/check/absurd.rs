@@ -2,6 +2,8 @@
 //!
 //! One of them would drown the noise of all rows in any sum. They become missing, with a warning.
 
+use rayon::prelude::*;
+
 use crate::recording::{Recording, place::Places, sensor_kind::SensorKind, triple::Triple, warning::Warning};
 
 /// Beyond ten thousand times gravity, m/s², nothing that is calibrated survives.
@@ -13,30 +15,37 @@ const FIELD: f64 = 1e4;
 
 /// Takes absurd samples out, and notes the first of each axis and their number.
 pub(crate) fn mask(recording: &mut Recording, places: &Places) {
+    let absurd: Vec<_> = SensorKind::ALL.par_iter().map(|kind| find(recording, *kind)).collect();
     let path = recording.path.clone();
-    for kind in SensorKind::ALL {
+    for (kind, absurd) in SensorKind::ALL.into_iter().zip(absurd) {
         let triple = match kind {
             SensorKind::Acc => &mut recording.acc,
             SensorKind::Gyr => &mut recording.gyr,
             SensorKind::Mag => &mut recording.mag,
         };
         let Some(triple) = triple else { continue };
-        let Some(limit) = limit(kind, triple) else { continue };
-        for (axis, column) in kind.columns().into_iter().enumerate() {
-            let absurd: Vec<usize> =
-                (0..triple.values.len()).filter(|row| triple.values[*row][axis].abs() > limit).collect();
-            let Some(first) = absurd.first().copied() else { continue };
+        for ((axis, column), rows) in kind.columns().into_iter().enumerate().zip(absurd) {
+            let Some(first) = rows.first().copied() else { continue };
             recording.warnings.push(Warning::Absurd {
                 path: path.clone(),
                 place: places.of(first),
                 column: column.to_owned(),
                 found: triple.nominal.to_raw(triple.values[first][axis]),
                 unit: triple.unit,
-                more: absurd.len() - 1,
+                more: rows.len() - 1,
             });
-            absurd.iter().for_each(|row| triple.values[*row][axis] = f64::NAN);
+            rows.iter().for_each(|row| triple.values[*row][axis] = f64::NAN);
         }
     }
+}
+
+/// Rows of absurd samples, by axis.
+fn find(recording: &Recording, kind: SensorKind) -> [Vec<usize>; 3] {
+    let Some(triple) = recording.sensor(kind) else { return Default::default() };
+    let Some(limit) = limit(kind, triple) else { return Default::default() };
+    let rows =
+        |axis: usize| (0..triple.values.len()).filter(move |row| triple.values[*row][axis].abs() > limit);
+    [0, 1, 2].map(|axis| rows(axis).collect())
 }
 
 /// Largest sample on the SI side; none where most are beyond it, which the unit explains and not a lost digit.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_4;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::plan::Plan;
 use crate::{
@@ -44,7 +44,7 @@ pub(super) fn add(plan: &mut Plan, axes: [Axis; 3], random: &mut Random) {
 pub(super) fn down(axes: [Axis; 3], angles: [f64; 3]) -> Vector3<f64> {
     let mut machine = Machine::exact(axes.map(direction));
     machine.gimbals = angles.map(Swing::still);
-    pose(&machine, Matrix3::identity()).c_t_p.tr_mul(&Vector3::z())
+    pose(&machine).c_t_p.tr_mul(&Vector3::z())
 }
 
 /// One attitude for each face, of those at quarter turns that have it down.

@@ -36,9 +36,9 @@ impl Motion for RobotMotion {
         let mut ground = Machine::exact([Axis::Z, Axis::Y, Axis::X].map(direction));
         rig(&mut ground);
         let body = self.trajectory.body(time, &self.mismatch.at(time));
-        let pose = body.pose(recent.base(&ground));
+        let (pose, c_p_n) = (body.pose(), recent.base(&ground));
         let temperature = self.climate.temperature(time);
-        let truth = at_pose(time, &pose, [Swing::default(); 3], &self.place, temperature, recent);
+        let truth = at_pose(time, &pose, c_p_n, [Swing::default(); 3], &self.place, temperature, recent);
         Truth { f_t: truth.f_t + pose.c_t_p.tr_mul(&body.acceleration()), ..truth }
     }
 

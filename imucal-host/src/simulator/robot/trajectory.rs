@@ -5,7 +5,7 @@
 //! f_t = C_n_t (a_n − g_n)
 //! ```
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::{deviation::Deviation, flying::Flight, jet::Jet, legged::Walk, route::Plan, wheeled::Drive};
 use crate::{
@@ -68,10 +68,10 @@ impl Body {
         Vector3::from(self.position.map(|jet| jet.second))
     }
 
-    /// Attitude, rate and angular acceleration, against a base that stands in n like this.
-    pub fn pose(&self, c_p_n: Matrix3<f64>) -> Pose {
+    /// Attitude, rate and angular acceleration against the base.
+    pub fn pose(&self) -> Pose {
         let gimbals = self.attitude.map(Jet::swing);
-        pose(&Machine { gimbals, ..Machine::exact([Axis::Z, Axis::Y, Axis::X].map(direction)) }, c_p_n)
+        pose(&Machine { gimbals, ..Machine::exact([Axis::Z, Axis::Y, Axis::X].map(direction)) })
     }
 }
 
@@ -204,7 +204,7 @@ mod tests {
                 // Of an impact of milliseconds the third derivative is large.
                 let tolerance = 2e-4 * (1.0 + here.acceleration().norm());
                 assert!((faster - here.acceleration()).norm() < tolerance, "{kind:?} {t}");
-                let pose = |body: &Body| body.pose(Matrix3::identity());
+                let pose = |body: &Body| body.pose();
                 let (before, here, after) = (pose(&before), pose(&here), pose(&after));
                 let turned = here.c_t_p.tr_mul(&((after.c_t_p - before.c_t_p) / (2.0 * h)));
                 assert!((turned - rotation::cross_matrix(&here.w_pt_t)).norm() < 1e-6, "{kind:?} {t}");
@@ -221,7 +221,7 @@ mod tests {
             let (mut square, mut rests) = (Vector3::zeros(), 0);
             for k in 0..8000 {
                 let t = 0.01 * f64::from(k);
-                let w = trajectory.body(t, &Deviation::NONE).pose(Matrix3::identity()).w_pt_t;
+                let w = trajectory.body(t, &Deviation::NONE).pose().w_pt_t;
                 let working = trajectory.effort(t);
                 assert!((0.0..1.7).contains(&working), "{kind:?} {t} {working}");
                 if w == Vector3::zeros() {

@@ -18,7 +18,7 @@ const WARMTH: f64 = 2e-4;
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let mut parameters = amplitudes(&XYZ, of(kind, 5e-3, 1e-3, 0.1));
     parameters.push(shape("frequency", 401.3));
-    mechanism(kind, "aliasing", Act::Sensor(kind, alter), parameters, "A switching supply is near.")
+    mechanism(kind, "aliasing", Act::Memory(kind, alter), parameters, "A switching supply is near.")
 }
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {

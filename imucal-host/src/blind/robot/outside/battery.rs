@@ -20,7 +20,7 @@ const REST: f64 = 9.81;
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let mut parameters = amplitudes(&XYZ, of(kind, 2e-3, 5e-3, 2e-3));
     parameters.push(shape("charge", 40.0));
-    mechanism(kind, "battery", Act::Sensor(kind, alter), parameters, "The battery is spent.")
+    mechanism(kind, "battery", Act::Memory(kind, alter), parameters, "The battery is spent.")
 }
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {

@@ -15,7 +15,7 @@ use crate::{
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let mut parameters = amplitudes(&XYZ, 0.1);
     parameters.extend([shape("slope", of(kind, 10.0, 3.0, 12.0)), shape("dead", 0.03)]);
-    mechanism(kind, "dead_time", Act::Sensor(kind, alter), parameters, "The converter is dead for a while.")
+    mechanism(kind, "dead_time", Act::Memory(kind, alter), parameters, "The converter is dead for a while.")
 }
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {

@@ -2,7 +2,7 @@
 
 use crate::{
     blind::outside::{XYZ, amplitudes, mechanism, of, shape, vector},
-    effect::{Act, Effect, SensorRun},
+    effect::{Act, Effect, SensorRows},
     recording::SensorKind,
 };
 
@@ -12,7 +12,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     mechanism(kind, "knee", Act::Sensor(kind, alter), parameters, "A second stage takes over.")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let (c, knee) = (vector(values, 0), values.get(3).copied().unwrap_or(0.0));
     run.add(|_, x| c.component_mul(&x.map(|x| (x - knee).max(0.0))));
 }

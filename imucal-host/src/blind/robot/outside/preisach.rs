@@ -18,7 +18,7 @@ const RELAYS: [(f64, f64); 4] = [(0.3, -0.9), (0.9, 0.1), (-0.1, -0.7), (0.6, -0
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let mut parameters = amplitudes(&XYZ, of(kind, 5e-3, 1e-3, 0.1));
     parameters.push(shape("x", of(kind, 0.7, 0.2, 12.0)));
-    mechanism(kind, "preisach", Act::Sensor(kind, alter), parameters, "Domains switch late.")
+    mechanism(kind, "preisach", Act::Memory(kind, alter), parameters, "Domains switch late.")
 }
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {

@@ -2,7 +2,7 @@
 
 use crate::{
     blind::outside::{XYZ, amplitudes, mechanism, neighbour, of, vector},
-    effect::{Act, Effect, SensorRun},
+    effect::{Act, Effect, SensorRows},
     recording::SensorKind,
 };
 
@@ -15,12 +15,12 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     mechanism(kind, "product", act, parameters, "One drive modulates another.")
 }
 
-fn of_rate(values: &[f64], run: &mut SensorRun<'_>) {
+fn of_rate(values: &[f64], run: &mut SensorRows<'_>) {
     let c = vector(values, 0);
     run.add(|input, _| c.component_mul(&neighbour(&input.f_q)).component_mul(&neighbour(&input.w_iq_q)));
 }
 
-fn of_force(values: &[f64], run: &mut SensorRun<'_>) {
+fn of_force(values: &[f64], run: &mut SensorRows<'_>) {
     let c = vector(values, 0);
     run.add(|input, _| c.component_mul(&neighbour(&input.f_q)).component_mul(&input.f_q));
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     blind::outside::{XYZ, amplitudes, mechanism, of, shape, vector},
-    effect::{Act, Effect, SensorRun},
+    effect::{Act, Effect, SensorRows},
     recording::SensorKind,
 };
 
@@ -12,7 +12,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
     mechanism(kind, "soft_limit", Act::Sensor(kind, alter), parameters, "A stage saturates softly.")
 }
 
-fn alter(values: &[f64], run: &mut SensorRun<'_>) {
+fn alter(values: &[f64], run: &mut SensorRows<'_>) {
     let (c, s) = (vector(values, 0), values.get(3).copied().unwrap_or(1.0));
     run.add(|_, x| c.component_mul(&x.map(|x| libm::tanh(x / s))));
 }

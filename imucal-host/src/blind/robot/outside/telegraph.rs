@@ -19,7 +19,7 @@ const REST: f64 = 9.81;
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let mut parameters = amplitudes(&XYZ, of(kind, 5e-3, 1e-3, 0.1));
     parameters.extend([shape("k", 0.5), shape("draw", 1.0)]);
-    mechanism(kind, "telegraph", Act::Sensor(kind, alter), parameters, "A contact is loose.")
+    mechanism(kind, "telegraph", Act::Memory(kind, alter), parameters, "A contact is loose.")
 }
 
 fn alter(values: &[f64], run: &mut SensorRun<'_>) {
