@@ -44,42 +44,60 @@ pub fn shifted(block: &Block<f64>, rate: &Vector3<f64>, duration: f64) -> Block<
 
 /// The row after the first gap in time.
 pub fn jump(time: &[f64], rows: &[usize], interval: f64) -> Option<usize> {
-    rows.windows(2).find(|pair| time[pair[1]] - time[pair[0]] > GAP * interval).map(|pair| pair[1])
+    rows.windows(2).find(|pair| is_jump(time[pair[1]] - time[pair[0]], interval)).map(|pair| pair[1])
 }
 
-/// Compresses rows to blocks of `size` samples. `rate` gives that of a row, rad/s; it is held from half-way to the
-/// sample before it to half-way to the one after (the trapezoidal rule). `each` is called with each sample in its turn.
+/// Whether a time between samples, s, is a gap in which no rate is known.
+pub fn is_jump(step: f64, interval: f64) -> bool {
+    step > GAP * interval
+}
+
+/// Compresses rows to blocks of `size` samples. `rate` gives that of a row, rad/s; it is held as [`held`] says. `each` is called with
+/// each sample in its turn.
 pub fn compress(
     time: &[f64],
     rows: &[usize],
     size: u16,
     rate: impl Fn(usize) -> Vector3<f64>,
-    mut each: impl FnMut(Sample),
+    each: impl FnMut(Sample),
 ) -> Compressed {
-    let count = rows.len() / usize::from(size) + 1;
-    let mut all = Compressed {
-        blocks: Vec::with_capacity(count),
-        durations: Vec::with_capacity(count),
-        rows: Vec::with_capacity(count),
-    };
+    let samples = rows.iter().enumerate().map(|(index, row)| (rate(*row), held(time, rows, index)));
+    let (blocks, durations) = blocks(samples, size, each);
+    let of_block = |rows: &[usize]| rows[0]..rows[rows.len() - 1] + 1;
+    Compressed { blocks, durations, rows: rows.chunks(usize::from(size)).map(of_block).collect() }
+}
+
+/// How long the sample of one of some rows is held, s: from half-way to the sample before it to half-way to the one after (the
+/// trapezoidal rule).
+pub fn held(time: &[f64], rows: &[usize], index: usize) -> f64 {
+    let row = rows[index];
+    let from = if index == 0 { time[row] } else { time[rows[index - 1]] };
+    let to = rows.get(index + 1).map_or(time[row], |next| time[*next]);
+    0.5 * (to - from)
+}
+
+/// Compresses samples, each a rate, rad/s, and how long it is held, s, to blocks of so many, with their durations, s. `each` is called
+/// with each sample in its turn.
+pub fn blocks(
+    samples: impl ExactSizeIterator<Item = (Vector3<f64>, f64)>,
+    size: u16,
+    mut each: impl FnMut(Sample),
+) -> (Vec<Block<f64>>, Vec<f64>) {
+    let last = samples.len();
+    let count = last / usize::from(size) + 1;
+    let (mut blocks, mut durations) = (Vec::with_capacity(count), Vec::with_capacity(count));
     let mut builder = BlockBuilder::default();
-    let mut first = 0;
-    for (index, row) in rows.iter().copied().enumerate() {
-        let from = if index == 0 { time[row] } else { time[rows[index - 1]] };
-        let to = rows.get(index + 1).map_or(time[row], |next| time[*next]);
-        let (rate, held) = (rate(row), 0.5 * (to - from));
+    for (index, (rate, held)) in samples.enumerate() {
         builder.push(&rate, held);
-        each(Sample { rate, held, block: all.blocks.len() });
-        if builder.count() < size && index + 1 < rows.len() {
+        each(Sample { rate, held, block: blocks.len() });
+        if builder.count() < size && index + 1 < last {
             continue;
         }
         let (block, duration) = builder.finish();
-        all.blocks.push(block);
-        all.durations.push(duration);
-        all.rows.push(rows[first]..row + 1);
-        first = index + 1;
+        blocks.push(block);
+        durations.push(duration);
     }
-    all
+    (blocks, durations)
 }
 
 #[cfg(test)]

@@ -123,7 +123,12 @@ impl Codes {
         if step <= 0.0 {
             return None;
         }
-        let mut codes: Vec<i64> = samples.map(|x| (x / step).round() as i64).collect();
+        let samples: Vec<f64> = samples.collect();
+        // Of few samples every code counts, so that two of them tell how far the noise goes.
+        if MOVING * (samples.len() as f64) < 1.0 && goes_over_many(step, &samples) {
+            return None;
+        }
+        let mut codes: Vec<i64> = samples.iter().map(|x| code(step, *x)).collect();
         codes.sort_unstable();
         let mut counts: Vec<(i64, f64)> =
             codes.chunk_by(|a, b| a == b).map(|alike| (alike[0], alike.len() as f64)).collect();
@@ -160,6 +165,19 @@ impl Codes {
         });
         (most + f64::ln(weight), sum / weight)
     }
+}
+
+fn code(step: f64, x: f64) -> i64 {
+    (x / step).round() as i64
+}
+
+/// Codes of samples are further apart than noise leaves an error of the mean.
+fn goes_over_many(step: f64, samples: &[f64]) -> bool {
+    let (mut low, mut high) = (i64::MAX, i64::MIN);
+    samples.iter().any(|x| {
+        (low, high) = (low.min(code(step, *x)), high.max(code(step, *x)));
+        high - low > DITHER
+    })
 }
 
 /// Logarithm of the probability of a code, by its distance from the value in grid steps.

@@ -17,6 +17,7 @@ use std::ops::Range;
 
 use imucal_core::observation::Moments;
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use super::quantum;
 
@@ -59,7 +60,8 @@ pub fn mean_variance(
         let variances = quantum::variances_of_means(step[axis], rests.iter().map(samples));
         variances.iter().sum::<f64>() / variances.len() as f64
     };
-    let steps = Vector3::from_fn(|axis, _| of_axis(axis));
+    let mut steps = Vector3::zeros();
+    steps.as_mut_slice().par_iter_mut().enumerate().for_each(|(axis, steps)| *steps = of_axis(axis));
     Some(MeanVariance { within: sum / count as f64, steps, count })
 }
 

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     compression,
-    compression::{Compressed, jump},
+    compression::{Compressed, is_jump},
 };
 
 /// Samples a block. Five at 100 Hz differ from the product over samples by about 1e-5° in 100 s (models.md 3).
@@ -127,7 +127,7 @@ fn turn_rows(time: &[f64], before: &Range<usize>, after: &Range<usize>) -> Range
     first..last
 }
 
-/// Compresses the motion between two rests; see [`compress_rows`].
+/// Compresses the motion between two rests. Rates are taken less the bias path.
 ///
 /// # Errors
 /// [`TurnGap`], with the row, where the motion was not wholly recorded.
@@ -137,36 +137,69 @@ pub fn compress(
     bias: &BiasPath,
 ) -> Result<TurnData, TurnGap> {
     let rows = turn_rows(rates.time, before, after);
-    compress_rows(rates, rows, (rest_before, rest_after), bias, |rate| rate)
+    let measured = measured(rates, &rows)?;
+    let rate = |k: usize| rates.values[k] - bias.at(rates.time[k]);
+    let Compressed { blocks, durations, rows: _ } =
+        compression::compress(rates.time, &measured, BLOCK, rate, |_| ());
+    Ok(TurnData { rest_before, rest_after, rows, bias: *bias, blocks, durations })
 }
 
-/// Compresses the rows of a turn between two rests, by their indices. Rates are taken less the bias path, and what `altered` makes
-/// of them is integrated.
+/// The samples of a turn that are integrated: those of a dropout are bridged by their neighbours.
 ///
 /// # Errors
 /// [`TurnGap`], with the row, where the motion was not wholly recorded.
-pub fn compress_rows(
-    Rates { time, values, usable, interval }: Rates<'_>,
-    rows: Range<usize>,
-    (rest_before, rest_after): (usize, usize),
-    bias: &BiasPath,
-    altered: impl Fn(Vector3<f64>) -> Vector3<f64>,
-) -> Result<TurnData, TurnGap> {
-    // A dropout is bridged by its neighbours; what was clipped or stuck is not what was turned.
-    let measured: Vec<usize> = rows.clone().filter(|k| values[*k].iter().all(|w| w.is_finite())).collect();
-    if let Some(row) = measured.iter().find(|k| !usable[**k]) {
-        return Err(TurnGap::Unusable { row: *row });
+fn measured(rates: Rates<'_>, rows: &Range<usize>) -> Result<Vec<usize>, TurnGap> {
+    let Rates { time, values, usable, interval } = rates;
+    let mut measured = Vec::with_capacity(rows.len());
+    let mut jumped = None;
+    for row in rows.clone().filter(|row| values[*row].iter().all(|w| w.is_finite())) {
+        // What was clipped or stuck is not what was turned.
+        if !usable[row] {
+            return Err(TurnGap::Unusable { row });
+        }
+        let jumps = measured.last().is_some_and(|before| is_jump(time[row] - time[*before], interval));
+        jumped = jumped.or(jumps.then_some(row));
+        measured.push(row);
     }
-    if measured.len() < 2 {
-        return Err(TurnGap::Unusable { row: rows.start });
+    match jumped {
+        _ if measured.len() < 2 => Err(TurnGap::Unusable { row: rows.start }),
+        Some(row) => Err(TurnGap::Jump { row }),
+        None => Ok(measured),
     }
-    if let Some(row) = jump(time, &measured, interval) {
-        return Err(TurnGap::Jump { row });
+}
+
+/// The rates of a turn, bias taken off, to be altered and integrated again.
+#[derive(Clone, Debug)]
+pub struct TurnSamples {
+    /// Rates, rad/s, and how long each is held, s.
+    samples: Vec<(Vector3<f64>, f64)>,
+}
+
+impl TurnSamples {
+    /// Of a turn.
+    ///
+    /// # Errors
+    /// [`TurnGap`], as of [`compress`].
+    pub fn of(rates: Rates<'_>, turn: &TurnData) -> Result<Self, TurnGap> {
+        let measured = measured(rates, &turn.rows)?;
+        let sample = |(index, row): (usize, &usize)| {
+            let rate = rates.values[*row] - turn.bias.at(rates.time[*row]);
+            (rate, compression::held(rates.time, &measured, index))
+        };
+        Ok(Self { samples: measured.iter().enumerate().map(sample).collect() })
     }
-    let rate = |k: usize| altered(values[k] - bias.at(time[k]));
-    let Compressed { blocks, durations, rows: _ } =
-        compression::compress(time, &measured, BLOCK, rate, |_| ());
-    Ok(TurnData { rest_before, rest_after, rows, bias: *bias, blocks, durations })
+
+    /// The largest component of any rate, rad/s.
+    pub fn largest(&self) -> f64 {
+        self.samples.iter().map(|(rate, _)| rate.amax()).fold(0.0, f64::max)
+    }
+
+    /// The turn, were its rates what `altered` makes of them.
+    pub fn altered(&self, turn: &TurnData, altered: impl Fn(Vector3<f64>) -> Vector3<f64>) -> TurnData {
+        let samples = self.samples.iter().map(|(rate, held)| (altered(*rate), *held));
+        let (blocks, durations) = compression::blocks(samples, BLOCK, |_| ());
+        TurnData { blocks, durations, rows: turn.rows.clone(), ..*turn }
+    }
 }
 
 #[cfg(test)]

@@ -82,11 +82,12 @@ pub fn examine(recording: &Recording, integrity: &Integrity, calibration: &mut C
     let mut leant_on = None;
     let examined = calibration.sensors.par_iter().map(|outcome| {
         let refused = outcome.status() == Status::Refused;
-        (!refused).then(|| scene.suspicions(outcome, accelerometer_rms))
+        let of_fit = || scene.suspicions(outcome, accelerometer_rms);
+        (!refused).then(|| rayon::join(of_fit, || scene.held(outcome.kind)))
     });
     let examined: Vec<_> = examined.collect();
     for (outcome, found) in calibration.sensors.iter_mut().zip(examined) {
-        let Some(mut found) = found else { continue };
+        let Some((mut found, held)) = found else { continue };
         if square && matches!(outcome.evidence, Some(Evidence::Turns(_))) {
             // Six parameters were asked for, and what they leave out is left in the turns.
             calibration.warnings.extend(found.drain(..).map(|found| {
@@ -97,7 +98,7 @@ pub fn examine(recording: &Recording, integrity: &Integrity, calibration: &mut C
             }));
         }
         outcome.suspicions.extend(found);
-        outcome.suspicions.extend(scene.held(outcome.kind));
+        outcome.suspicions.extend(held);
         let leans = matches!(outcome.evidence, Some(Evidence::Turns(_)))
             || outcome.fit.as_ref().is_some_and(|fit| fit.alignment.is_some());
         if let Some(detail) = leant_on.as_ref().filter(|_| leans) {

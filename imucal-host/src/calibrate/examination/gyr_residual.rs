@@ -24,7 +24,7 @@ use crate::{
         outcome::KnownTurn,
         suspicion::Follows,
     },
-    observe::turn::{Rates, TurnData, compress_rows},
+    observe::turn::{Rates, TurnData, TurnSamples},
 };
 
 /// Rates are altered by this share of the largest.
@@ -54,38 +54,43 @@ pub fn rows(turns: &[KnownTurn], theta: &SVector<f64, 9>) -> Rows<9> {
     Rows::of(&TurnModel { turns: &known(turns, &data), form: FULL_GAIN }, theta)
 }
 
-/// The largest rate of any turn, bias taken off, rad/s.
-fn largest(turns: &[KnownTurn], rates: Rates<'_>) -> f64 {
-    let of = |turn: &KnownTurn| {
-        let rows = turn.data.rows.clone().filter(|k| rates.usable[*k]);
-        rows.map(|k| (rates.values[k] - turn.data.bias.at(rates.time[k])).amax()).fold(0.0, f64::max)
-    };
-    turns.iter().map(of).fold(0.0, f64::max)
-}
-
 /// Residuals with altered rates, less those without, by the alteration's size; `None` where nothing moves. `most` is the largest rate
 /// of any turn, rad/s.
 fn column(
     turns: &[KnownTurn],
-    rates: Rates<'_>,
+    samples: &[TurnSamples],
     (theta, as_is): (&SVector<f64, 9>, &[f64]),
     most: f64,
     (axis, of): (usize, fn(f64) -> f64),
 ) -> Option<Vec<f64>> {
     let size = SHARE * most / of(most);
-    let again = |turn: &KnownTurn| {
-        let ends = (turn.data.rest_before, turn.data.rest_after);
-        let altered = |mut rate: Vector3<f64>| {
-            rate[axis] += size * of(rate[axis]);
-            rate
-        };
-        let data = compress_rows(rates, turn.data.rows.clone(), ends, &turn.data.bias, altered);
-        Some(data.ok()?.stretched(&turn.stretch))
+    let altered = |mut rate: Vector3<f64>| {
+        rate[axis] += size * of(rate[axis]);
+        rate
     };
-    let data: Option<Vec<TurnData>> = turns.iter().map(again).collect();
-    let data = data?;
+    let again = |(turn, samples): (&KnownTurn, &TurnSamples)| {
+        samples.altered(&turn.data, altered).stretched(&turn.stretch)
+    };
+    let data: Vec<TurnData> = turns.iter().zip(samples).map(again).collect();
     let altered = Residuals::of(&TurnModel { turns: &known(turns, &data), form: FULL_GAIN }, theta);
     (size > 0.0).then(|| altered.iter().zip(as_is).map(|(a, b)| (a - b) / size).collect())
+}
+
+/// The columns of rates that are altered.
+fn altered(
+    turns: &[KnownTurn],
+    samples: &[TurnSamples],
+    (theta, rows): (&SVector<f64, 9>, &Rows<9>),
+) -> Vec<Columns> {
+    let count = rows.residuals.len();
+    let most = samples.iter().map(TurnSamples::largest).fold(0.0, f64::max);
+    let altered = ALTERATIONS.par_iter().filter_map(|(name, of)| {
+        let of_axis = |axis| column(turns, samples, (theta, &rows.residuals), most, (axis, *of));
+        let axes: Vec<_> = (0..3).into_par_iter().map(of_axis).collect::<Option<_>>()?;
+        let values = DMatrix::from_fn(count, 3, |row, axis| axes[axis][row]);
+        Some(Columns { follows: Follows::Rate, name: (*name).into(), values })
+    });
+    altered.collect()
 }
 
 /// All columns to test, three an axis, of courses over the turns.
@@ -97,14 +102,10 @@ pub fn columns(
     courses: &[Course],
 ) -> Vec<Columns> {
     let count = rows.residuals.len();
-    let most = largest(turns, rates);
-    let altered = ALTERATIONS.par_iter().filter_map(|(name, of)| {
-        let of_axis = |axis| column(turns, rates, (theta, &rows.residuals), most, (axis, *of));
-        let axes: Vec<_> = (0..3).into_par_iter().map(of_axis).collect::<Option<_>>()?;
-        let values = DMatrix::from_fn(count, 3, |row, axis| axes[axis][row]);
-        Some(Columns { follows: Follows::Rate, name: (*name).into(), values })
-    });
-    let mut all: Vec<Columns> = altered.collect();
+    let samples: Result<Vec<_>, _> =
+        turns.par_iter().map(|turn| TurnSamples::of(rates, &turn.data)).collect();
+    // Turns that were integrated once can be again.
+    let mut all = samples.map_or_else(|_| Vec::new(), |samples| altered(turns, &samples, (theta, rows)));
     all.extend(courses.iter().map(|course| Columns {
         follows: course.follows,
         name: format!("{}, as a gain makes it that changes", course.name),

@@ -10,6 +10,7 @@
 //! | [`norm_fit`], [`rig_fit`], [`reference_fit`], [`gyr_rig_fit`] | least squares for each kind of observation |
 //! | [`least_squares`] | one fit by the core's solver |
 //! | [`parallel_rows`] | the same rows on all cores, where they are very many |
+//! | [`parallel_turns`] | rows of turns, worked out on all cores |
 //! | [`outlier`] | observations that are left out, and the fit without them |
 //! | [`held_out`], [`leverage`] | residuals of observations that the fit has not seen, from one factor of all |
 //! | [`report`] | the figures of any of these fits |
@@ -33,6 +34,7 @@ pub mod leverage;
 pub mod norm_fit;
 pub mod outlier;
 pub mod parallel_rows;
+pub mod parallel_turns;
 pub mod reference_fit;
 pub mod report;
 pub mod rest_bias;

@@ -7,6 +7,7 @@ use imucal_core::{
     session::bias::{MeanRate, RestBias},
 };
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 use crate::{
     calibrate::{
@@ -67,7 +68,7 @@ impl GyrInput<'_> {
         let (mean, wander) = wander(self.rests, &means);
         let bias = warm.map_or(mean, rests::Kept::rest_bias);
         let mut turns = Turns { data: Vec::new(), bias, wander, left_out: Vec::new(), stretches: Vec::new() };
-        for pair in self.used.windows(2) {
+        let turn = |pair: &[usize]| {
             let (i, j) = (pair[0], pair[1]);
             let mean = |k: usize| {
                 if wander.interpolated { raw[k] } else { bias + drift(k) }
@@ -75,9 +76,14 @@ impl GyrInput<'_> {
             let path =
                 BiasPath { before: (self.rests[i].time, mean(i)), after: (self.rests[j].time, mean(j)) };
             let ends = (i, &self.rows[i], j, &self.rows[j]);
-            match compress(self.rates(), ends, &path) {
+            let left_out = |gap| format!("turn from rest {} to {}: {gap}", i + 1, j + 1);
+            compress(self.rates(), ends, &path).map_err(left_out)
+        };
+        let each: Vec<Result<TurnData, String>> = self.used.par_windows(2).map(turn).collect();
+        for turn in each {
+            match turn {
                 Ok(data) => turns.data.push(data),
-                Err(gap) => turns.left_out.push(format!("turn from rest {} to {}: {gap}", i + 1, j + 1)),
+                Err(left_out) => turns.left_out.push(left_out),
             }
         }
         turns

@@ -25,6 +25,7 @@ use imucal_core::{
     triad::Triad,
 };
 use nalgebra::{DMatrix, DVector, Matrix3, MatrixXx3, SMatrix, Vector3};
+use rayon::prelude::*;
 
 use crate::{
     calibrate::fit::{
@@ -92,6 +93,10 @@ fn linear(between: &Between<'_>, gain: &Matrix3<f64>) -> Linear {
     }
 }
 
+fn all_linear(turns: &[Between<'_>], gain: &Matrix3<f64>) -> Vec<Linear> {
+    turns.par_iter().map(|turn| linear(turn, gain)).collect()
+}
+
 /// Two unit vectors across a direction, as rows.
 pub fn across(direction: &Vector3<f64>) -> MatrixXx3<f64> {
     let least = direction.iamin();
@@ -107,8 +112,8 @@ pub fn errors(
     directions: &Directions,
     rates: &RateNoise,
 ) -> Option<Errors> {
-    let noise = TurnCovariance::of(turns, gain, directions, rates);
-    let turns: Vec<Linear> = turns.iter().map(|turn| linear(turn, gain)).collect();
+    let turns = all_linear(turns, gain);
+    let noise = TurnCovariance::of_linear(&turns, directions, rates);
     let rows = 2 * turns.len();
     let (mut jacobian, mut residuals) = (DMatrix::zeros(rows, 9), DVector::zeros(rows));
     for (k, turn) in turns.iter().enumerate() {
@@ -130,7 +135,10 @@ impl TurnCovariance {
         directions: &Directions,
         rates: &RateNoise,
     ) -> Self {
-        let turns: Vec<Linear> = turns.iter().map(|turn| linear(turn, gain)).collect();
+        Self::of_linear(&all_linear(turns, gain), directions, rates)
+    }
+
+    fn of_linear(turns: &[Linear], directions: &Directions, rates: &RateNoise) -> Self {
         let of_ends = |(k, turn): (usize, &Linear)| {
             let ends = [(turn.rests.0, &turn.by_before), (turn.rests.1, &turn.by_after)];
             ends.map(|(rest, by)| {

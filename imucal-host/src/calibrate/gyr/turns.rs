@@ -24,6 +24,7 @@ use crate::{
             least_squares,
             least_squares::dynamic,
             outlier::{Kept, leaving_out},
+            parallel_turns::ParallelTurns,
             report::FitReport,
             rest_bias,
             rest_bias::BiasErrors,
@@ -57,7 +58,7 @@ fn solve(turns: &[Turn<'_, f64>]) -> (LevenbergMarquardt<f64, 9>, Search) {
     shortest.sort_by_key(|turn| turn.blocks.len());
     shortest.truncate(SWARM_OBSERVATIONS);
     let searched = Searched {
-        model: &TurnModel { turns, form: FULL_GAIN },
+        model: &ParallelTurns(TurnModel { turns, form: FULL_GAIN }),
         cost: &TurnModel { turns: &shortest, form: FULL_GAIN },
         start: FULL_GAIN.theta(&Triad::identity()),
         reach: SVector::repeat(REACH),
@@ -69,7 +70,7 @@ fn solve(turns: &[Turn<'_, f64>]) -> (LevenbergMarquardt<f64, 9>, Search) {
 
 /// Chord between the carried and the measured direction of each turn, rad.
 fn turn_errors(turns: &[Turn<'_, f64>], theta: &SVector<f64, 9>) -> Vec<f64> {
-    Residuals::of(&TurnModel { turns, form: FULL_GAIN }, theta)
+    Residuals::of(&ParallelTurns(TurnModel { turns, form: FULL_GAIN }), theta)
         .chunks_exact(3)
         .map(|r| r.iter().map(|x| x * x).sum::<f64>().sqrt())
         .collect()
@@ -249,7 +250,8 @@ fn refuse(refusal: Refusal, fit: Option<FitSummary>) -> SensorOutcome {
 /// Rms error of turns left out of the fit, one at a time. Each time the fit takes one Gauss–Newton step from the
 /// optimum of all; the held turn is then integrated afresh.
 fn held_out_rms(known: &[Turn<'_, f64>], theta: &SVector<f64, 9>) -> Option<f64> {
-    let (rows, count) = (Rows::of(&TurnModel { turns: known, form: FULL_GAIN }, theta), known.len());
+    let (rows, count) =
+        (Rows::of(&ParallelTurns(TurnModel { turns: known, form: FULL_GAIN }), theta), known.len());
     let sum = by_steps(&rows, theta, (count, 3), |k, theta| {
         turn_errors(&known[k..=k], theta).iter().map(|e| e * e).sum()
     });
@@ -273,7 +275,7 @@ fn summarise(
         held_out_rms: held_out_rms(known, solver.theta()),
         nonlinearity: accept::nonlinearity(
             solver,
-            &TurnModel { turns: known, form: FULL_GAIN },
+            &ParallelTurns(TurnModel { turns: known, form: FULL_GAIN }),
             weakest_inflation(solver, &covariance),
         ),
         inflation: covariance.diagonal().component_div(&classical.diagonal()).map(f64::sqrt).max(),

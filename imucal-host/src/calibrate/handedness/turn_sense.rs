@@ -20,6 +20,7 @@ use std::ops::Range;
 
 use imucal_core::{model::turn, observation::Turn, triad::Triad};
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 use super::gain_remark::FACTORS;
 use crate::{
@@ -83,7 +84,7 @@ fn carried(turns: &[Turn<'_, f64>], factor: f64) -> Option<usize> {
         let p = axis_swap::signed_permutation(*code).unwrap_or_else(Matrix3::identity);
         (error(turns, &(p * factor)), *code)
     };
-    let errors: Vec<(f64, usize)> = (0..axis_swap::CODES).map(|code| error(&code)).collect();
+    let errors: Vec<(f64, usize)> = (0..axis_swap::CODES).into_par_iter().map(|code| error(&code)).collect();
     let least = errors.iter().map(|(error, _)| *error).fold(f64::INFINITY, f64::min);
     let alike = errors.into_iter().filter(|(error, _)| *error <= ALIKE * least);
     let simplest = alike.map(|(_, code)| code).min_by_key(|code| changes(*code));

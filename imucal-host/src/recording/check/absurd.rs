@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use crate::recording::{Recording, place::Places, sensor_kind::SensorKind, triple::Triple, warning::Warning};
+use crate::recording::{Recording, place::Places, sensor_kind::SensorKind, warning::Warning};
 
 /// Beyond ten thousand times gravity, m/s², nothing that is calibrated survives.
 const ACCELERATION: f64 = 1e5;
@@ -23,7 +23,7 @@ pub(crate) fn mask(recording: &mut Recording, places: &Places) {
             SensorKind::Gyr => &mut recording.gyr,
             SensorKind::Mag => &mut recording.mag,
         };
-        let Some(triple) = triple else { continue };
+        let (Some(triple), Some(absurd)) = (triple, absurd) else { continue };
         for ((axis, column), rows) in kind.columns().into_iter().enumerate().zip(absurd) {
             let Some(first) = rows.first().copied() else { continue };
             recording.warnings.push(Warning::Absurd {
@@ -39,24 +39,22 @@ pub(crate) fn mask(recording: &mut Recording, places: &Places) {
     }
 }
 
-/// Rows of absurd samples, by axis.
-fn find(recording: &Recording, kind: SensorKind) -> [Vec<usize>; 3] {
-    let Some(triple) = recording.sensor(kind) else { return Default::default() };
-    let Some(limit) = limit(kind, triple) else { return Default::default() };
-    let rows =
-        |axis: usize| (0..triple.values.len()).filter(move |row| triple.values[*row][axis].abs() > limit);
-    [0, 1, 2].map(|axis| rows(axis).collect())
-}
-
-/// Largest sample on the SI side; none where most are beyond it, which the unit explains and not a lost digit.
-fn limit(kind: SensorKind, triple: &Triple) -> Option<f64> {
-    let median = triple.median_norm()?;
+/// Rows of absurd samples, by axis; none where most samples are beyond the limit, which the unit explains and not a lost digit.
+fn find(recording: &Recording, kind: SensorKind) -> Option<[Vec<usize>; 3]> {
+    let triple = recording.sensor(kind)?;
     let limit = match kind {
         SensorKind::Acc => ACCELERATION,
         SensorKind::Gyr => RATE,
-        SensorKind::Mag => FIELD * median,
+        SensorKind::Mag => FIELD * triple.median_norm().filter(|median| *median > 0.0)?,
     };
-    (limit > 0.0 && median < limit).then_some(limit)
+    let beyond = |axis: usize| {
+        let rows = 0..triple.values.len();
+        rows.filter(|row| triple.values[*row][axis].abs() > limit).collect::<Vec<_>>()
+    };
+    let found = [0, 1, 2].map(beyond);
+    // The median takes longer to find than the largest.
+    let is_none = found.iter().all(Vec::is_empty);
+    (!is_none && triple.median_norm()? < limit).then_some(found)
 }
 
 #[cfg(test)]

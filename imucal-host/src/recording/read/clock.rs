@@ -39,6 +39,11 @@ impl Clock {
         self.dated
     }
 
+    /// Whether times are what the file counts, as numbers.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.started && self.epoch.is_none()
+    }
+
     /// A field of a text file, all of which are numbers or all dates; NaN if it is empty.
     pub(crate) fn take_text(&mut self, field: &[u8]) -> Result<f64, NotANumber> {
         let value = match number::parse(field) {

@@ -83,7 +83,17 @@ fn reader<'a>(
     let renamed = mapping.renamed(&names).map_err(fault)?;
     let layout = Layout::new(&renamed.iter().map(String::as_str).collect::<Vec<_>>(), path, line)?;
     let names: Vec<String> = names.iter().map(|name| name.trim().to_owned()).collect();
-    Ok(CsvReader { path, clock: Clock::new(unit), layout, names, limit, taken: 0, rows: 0, ended: false })
+    Ok(CsvReader {
+        path,
+        clock: Clock::new(unit),
+        layout,
+        names,
+        limit,
+        taken: 0,
+        rows: 0,
+        ended: false,
+        odd: false,
+    })
 }
 
 struct CsvReader<'a> {
@@ -98,6 +108,8 @@ struct CsvReader<'a> {
     rows: usize,
     /// The text has no more rows.
     ended: bool,
+    /// A line was read that is not numbers alone: the next ones may be like it, and are looked at one by one.
+    odd: bool,
 }
 
 /// What is wrong with a field, before the place is known.
@@ -118,6 +130,9 @@ impl CsvReader<'_> {
         self.taken = 0;
         let mut values = vec![0.0; self.names.len()];
         while lines.len() < length {
+            if self.push_pieces(rows, length - lines.len(), &mut table, &mut lines)? {
+                continue;
+            }
             if self.push_numbers(rows, &mut values, &mut table)? {
                 lines.push(rows.line);
                 self.take(rows)?;
@@ -158,6 +173,32 @@ impl CsvReader<'_> {
         !self.layout.extra.is_empty()
     }
 
+    /// Takes the next lines on several cores, where they are many, are numbers, and their times are what the file counts; false, and nothing
+    /// is read, where they are not.
+    fn push_pieces(
+        &mut self,
+        rows: &mut Rows<'_>,
+        most: usize,
+        table: &mut Table,
+        lines: &mut Vec<u64>,
+    ) -> Result<bool, ReadError> {
+        if self.odd || self.has_texts() || !table.clock.is_plain() {
+            return Ok(false);
+        }
+        let Some(pieces) = rows.pieces(self.names.len(), most)? else { return Ok(false) };
+        for piece in pieces {
+            for (values, target) in piece.columns.iter().zip(&self.layout.targets) {
+                if let Target::Known(slot) = *target {
+                    table.columns[slot].extend_from_slice(values);
+                }
+            }
+            lines.extend_from_slice(&piece.lines);
+            self.odd = piece.stopped;
+            self.take_rows(piece.lines.len(), 0)?;
+        }
+        Ok(true)
+    }
+
     /// Takes the next line where it consists of numbers; false, and nothing is read, where it does not.
     fn push_numbers(
         &self,
@@ -190,7 +231,12 @@ impl CsvReader<'_> {
         };
         let texts =
             if self.has_texts() { rows.fields().zip(&self.layout.targets).map(text).sum() } else { 0 };
-        self.taken += (self.layout.row_size() + size_of::<u64>() + texts) as u64;
+        self.take_rows(1, texts)
+    }
+
+    /// So many rows, and bytes of text.
+    fn take_rows(&mut self, rows: usize, texts: usize) -> Result<(), ReadError> {
+        self.taken += (rows * (self.layout.row_size() + size_of::<u64>()) + texts) as u64;
         if self.taken > self.limit {
             let path = self.path.to_path_buf();
             return Err(ReadError::TooManySamples { path, limit: Size(self.limit) });

@@ -5,7 +5,11 @@ use std::path::Path;
 use csv_core::{ReadRecordResult, Reader, ReaderBuilder};
 use memchr::{memchr_iter, memchr3};
 
-use super::{date, number, text::Text};
+use super::{
+    csv_pieces::{Format, Piece},
+    date, number,
+    text::Text,
+};
 use crate::{
     file::{Limits, limits::Size},
     recording::read_error::ReadError,
@@ -36,6 +40,7 @@ pub(crate) struct Rows<'a> {
     /// The text ended within the row: its line has no end.
     pub(crate) cut: bool,
     separator: u8,
+    pieces: Vec<Piece>,
 }
 
 impl<'a> Rows<'a> {
@@ -54,6 +59,7 @@ impl<'a> Rows<'a> {
             comments: 0,
             cut: false,
             separator: b',',
+            pieces: Vec::new(),
         })
     }
 
@@ -132,32 +138,34 @@ impl<'a> Rows<'a> {
     /// it is anything else. Such a line needs no splitting: most numbers are parsed as they are passed over.
     pub(crate) fn numbers(&mut self, values: &mut [f64]) -> Result<Option<Numbers<'_>>, ReadError> {
         self.skip_blank_lines()?;
-        let count = values.len();
-        let (separator, input) = (self.separator, self.text.next()?);
-        let Some(ends) = self.ends.get_mut(..count) else { return Ok(None) };
-        let mut at = 0;
-        for (k, (value, end)) in values.iter_mut().zip(ends).enumerate() {
-            let is_end = |byte: Option<&u8>| match byte {
-                Some(b'\n' | b'\r') => k + 1 == count,
-                other => other == Some(&separator) && k + 1 < count,
-            };
-            let rest = &input[at..];
-            let whole = number::leading(rest).filter(|(_, length)| is_end(rest.get(*length)));
-            let other = || {
-                let length = memchr3(separator, b'\n', b'\r', rest).filter(|end| is_end(rest.get(*end)))?;
-                Some((number::parse(&rest[..length]).ok()?, length))
-            };
-            let Some((found, length)) = whole.or_else(other) else { return Ok(None) };
-            (*value, *end) = (found, at + length);
-            at += length + 1;
-        }
-        if at > self.limits.line() {
-            return Ok(None);
-        }
+        let format = self.format(values.len());
+        let input = self.text.next()?;
+        let Some(ends) = self.ends.get_mut(..values.len()) else { return Ok(None) };
+        let Some(at) = format.line(input, values, ends) else { return Ok(None) };
         (self.line, self.cut) = (self.next_line, false);
         self.next_line += u64::from(input[at - 1] == b'\n');
         self.text.consume(at);
         Ok(Some(Numbers { line: self.text.consumed(at), ends: &self.ends }))
+    }
+
+    /// Reads lines that consist of so many numbers each, on several cores, as far as they are at hand and no more than so many: pieces of the
+    /// text, with the lines of the file. `None`, and nothing is read, where they are few.
+    pub(crate) fn pieces(&mut self, columns: usize, most: usize) -> Result<Option<&[Piece]>, ReadError> {
+        let format = self.format(columns);
+        if !format.read(self.text.next()?, most, &mut self.pieces) {
+            return Ok(None);
+        }
+        for piece in &mut self.pieces {
+            piece.lines.iter_mut().for_each(|line| *line += self.next_line);
+            self.next_line += piece.ends;
+            (self.line, self.cut) = (piece.lines.last().copied().unwrap_or(self.line), false);
+            self.text.consume(piece.length);
+        }
+        Ok(Some(&self.pieces))
+    }
+
+    fn format(&self, columns: usize) -> Format {
+        Format { separator: self.separator, columns, longest: self.limits.line() }
     }
 
     /// Splits the next line at its separators, which is what the parser makes of it, some times as fast. False, and nothing is

@@ -9,6 +9,7 @@ pub(crate) mod clock;
 pub(crate) mod column_guess;
 pub(crate) mod columns;
 pub(crate) mod csv;
+mod csv_pieces;
 pub(crate) mod csv_rows;
 pub(crate) mod date;
 pub mod euroc;

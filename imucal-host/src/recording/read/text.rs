@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Bytes of a chunk.
-const CHUNK: usize = 1 << 16;
+const CHUNK: usize = 1 << 19;
 /// What gzip makes of samples, roughly.
 const COMPRESSION: u64 = 5;
 
