@@ -60,12 +60,11 @@ impl Format {
     }
 
     /// Reads the lines of a text into `pieces`, whose memory is used again, up to the last that is whole, or to the first that is anything but
-    /// numbers. False, and nothing is read, of a text that is too short to be cut, or may have more than so many rows.
-    pub(crate) fn read(&self, text: &[u8], most: usize, pieces: &mut Vec<Piece>) -> bool {
+    /// numbers. False, and nothing is read, of a text that is too short to be cut.
+    pub(crate) fn read(&self, text: &[u8], pieces: &mut Vec<Piece>) -> bool {
         let Some(end) = memrchr(b'\n', text) else { return false };
         let text = &text[..=end];
-        // A row has a digit and a separator for each column.
-        if text.len() < LEAST || text.len() / (2 * self.columns) > most {
+        if text.len() < LEAST {
             return false;
         }
         let texts = cut(text);
@@ -156,7 +155,7 @@ mod tests {
         one.read(text.as_bytes(), &FORMAT);
         // What pieces held before does not matter.
         let mut pieces = vec![one.clone(); 2];
-        assert!(FORMAT.read(text.as_bytes(), usize::MAX, &mut pieces));
+        assert!(FORMAT.read(text.as_bytes(), &mut pieces));
         let all = joined(&pieces);
         assert_eq!(all, joined(&[one]));
         assert_eq!((all.0[2].len(), &all.1[..5], all.2), (20_000, &[0, 1, 2, 4, 5][..], text.len()));
@@ -167,7 +166,7 @@ mod tests {
         for (at, odd) in [(300, "1,2,\"3\"\n"), (9000, "1,2\n"), (19_000, "1,2,3,4\n"), (500, "1,2,x\n")] {
             let (before, after) = (text(at), text(20_000 - at));
             let mut pieces = Vec::new();
-            assert!(FORMAT.read(format!("{before}{odd}{after}").as_bytes(), usize::MAX, &mut pieces));
+            assert!(FORMAT.read(format!("{before}{odd}{after}").as_bytes(), &mut pieces));
             let (_, lines, length) = joined(&pieces);
             assert_eq!((lines.len(), length), (at, before.len()), "{odd}");
             assert!(pieces.last().unwrap().stopped);
@@ -177,9 +176,8 @@ mod tests {
     #[test]
     fn a_line_that_is_not_whole_is_left_and_few_lines_are_not_read() {
         let (text, mut pieces) = (text(20_000), Vec::new());
-        assert!(FORMAT.read(&text.as_bytes()[..text.len() - 3], usize::MAX, &mut pieces));
+        assert!(FORMAT.read(&text.as_bytes()[..text.len() - 3], &mut pieces));
         assert_eq!(joined(&pieces).1.len(), 19_999);
-        assert!(!FORMAT.read(text.as_bytes(), 20_000, &mut pieces));
-        assert!(!FORMAT.read(&text.as_bytes()[..LEAST / 2], usize::MAX, &mut pieces));
+        assert!(!FORMAT.read(&text.as_bytes()[..LEAST / 2], &mut pieces));
     }
 }

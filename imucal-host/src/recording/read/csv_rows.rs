@@ -148,11 +148,11 @@ impl<'a> Rows<'a> {
         Ok(Some(Numbers { line: self.text.consumed(at), ends: &self.ends }))
     }
 
-    /// Reads lines that consist of so many numbers each, on several cores, as far as they are at hand and no more than so many: pieces of the
-    /// text, with the lines of the file. `None`, and nothing is read, where they are few.
-    pub(crate) fn pieces(&mut self, columns: usize, most: usize) -> Result<Option<&[Piece]>, ReadError> {
+    /// Reads lines that consist of so many numbers each, on several cores, as far as they are at hand: pieces of the text,
+    /// with the lines of the file. `None`, and nothing is read, where they are few.
+    pub(crate) fn pieces(&mut self, columns: usize) -> Result<Option<&[Piece]>, ReadError> {
         let format = self.format(columns);
-        if !format.read(self.text.next()?, most, &mut self.pieces) {
+        if !format.read(self.text.next()?, &mut self.pieces) {
             return Ok(None);
         }
         for piece in &mut self.pieces {
