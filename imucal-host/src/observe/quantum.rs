@@ -174,8 +174,8 @@ fn code(step: f64, x: f64) -> i64 {
 /// Codes of samples are further apart than noise leaves an error of the mean.
 fn goes_over_many(step: f64, samples: &[f64]) -> bool {
     let (mut low, mut high) = (i64::MAX, i64::MIN);
-    samples.iter().any(|x| {
-        (low, high) = (low.min(code(step, *x)), high.max(code(step, *x)));
+    samples.iter().map(|x| code(step, *x)).any(|code| {
+        (low, high) = (low.min(code), high.max(code));
         high - low > DITHER
     })
 }

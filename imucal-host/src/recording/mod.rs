@@ -3,7 +3,10 @@
 //! Outside of this module everything is in SI units (s, m/s², rad/s, µT, °C, rad); the files' units
 //! live in [`mod@unit`] and the manifest alone.
 
-use std::path::{Path, PathBuf};
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+};
 
 pub mod check;
 mod epoch;
@@ -224,7 +227,7 @@ impl Recording {
     ///
     /// As [`Recording::write`].
     pub fn write_into(&self, path: &Path, files: &mut OutputSet) -> Result<Written, WriteError> {
-        write::writer::write([self], path, files)
+        write::writer::write_whole(self, path, files)
     }
 
     /// As [`Recording::write_into`], of consecutive parts in constant memory. The files are those that the whole would give.
@@ -238,6 +241,38 @@ impl Recording {
         files: &mut OutputSet,
     ) -> Result<Written, WriteError> {
         write::writer::write(parts, path, files)
+    }
+
+    /// Consecutive rows of it, without its warnings. Panics where a column has no such rows.
+    fn part(&self, rows: Range<usize>) -> Self {
+        fn of<T: Clone>(column: Option<&Vec<T>>, rows: &Range<usize>) -> Option<Vec<T>> {
+            column.map(|column| column[rows.clone()].to_vec())
+        }
+        let extra = |column: &ExtraColumn| ExtraColumn {
+            name: column.name.clone(),
+            values: column.values[rows.clone()].to_vec(),
+        };
+        Self {
+            name: self.name.clone(),
+            path: self.path.clone(),
+            manifest: self.manifest.clone(),
+            time: self.time[rows.clone()].to_vec(),
+            epoch: self.epoch,
+            acc: self.acc.as_ref().map(|triple| triple.part(&rows)),
+            gyr: self.gyr.as_ref().map(|triple| triple.part(&rows)),
+            mag: self.mag.as_ref().map(|triple| triple.part(&rows)),
+            temperature: of(self.temperature.as_ref(), &rows),
+            gimbal: of(self.gimbal.as_ref(), &rows),
+            reference: of(self.reference.as_ref(), &rows),
+            position: of(self.position.as_ref(), &rows),
+            simulated: self
+                .simulated
+                .as_ref()
+                .map(|simulated| simulated.at(&rows.clone().collect::<Vec<_>>())),
+            segment: of(self.segment.as_ref(), &rows),
+            extra: self.extra.iter().map(extra).collect(),
+            warnings: Vec::new(),
+        }
     }
 
     /// Number of rows.

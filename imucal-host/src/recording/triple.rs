@@ -1,5 +1,7 @@
 //! Samples of one triad and their relation to what the file holds.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 
 use super::{order_statistics::median, unit::Unit};
@@ -48,6 +50,12 @@ pub struct Triple {
 }
 
 impl Triple {
+    /// Those of consecutive rows.
+    pub(super) fn part(&self, rows: &Range<usize>) -> Self {
+        let Self { unit, nominal, full_scale, single, .. } = *self;
+        Self { values: self.values[rows.clone()].to_vec(), unit, nominal, full_scale, single }
+    }
+
     /// The samples in the file's unit and the device's precision: what the sensor put out.
     pub fn raw_samples(&self) -> impl Iterator<Item = Vector3<f32>> {
         self.values.iter().map(|value| value.map(|x| self.nominal.to_raw(x) as f32))

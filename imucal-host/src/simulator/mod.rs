@@ -4,6 +4,7 @@
 //! name, no function of the platform.
 
 pub mod chain;
+mod clean;
 pub mod climate;
 pub mod conditions;
 mod converter;

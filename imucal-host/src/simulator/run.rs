@@ -1,10 +1,9 @@
 //! A recording of the flight motion simulator: programme, unit, effects and a seed.
 
-use rayon::prelude::*;
-
 use super::{
     SimulationError,
     chain::Chain,
+    clean::Clean,
     conditions::Conditions,
     converter::{self, Chance},
     dose::Dose,
@@ -14,7 +13,7 @@ use super::{
     unit::{UnitKind, UnitUnderTest},
 };
 use crate::{
-    effect::{Effect, Input},
+    effect::Effect,
     recording::{Manifest, Recording, SensorKind, manifest::Axis},
 };
 
@@ -123,14 +122,12 @@ impl Simulation {
         let chain = Chain::new(&self.doses);
         let rows = (schedule.duration() * self.rate).floor() as usize;
         let time: Vec<f64> = (0..rows).map(|k| k as f64 / self.rate).collect();
-        let mut input = chain.inputs(&schedule, &time);
-        input.par_iter_mut().for_each(|row| *row = row.turned(&unit.c_t_q));
+        let Clean { outputs, temperature } = Clean::of(&unit, &schedule, &chain, &time)?;
         let mut random = Random::new(self.seed, Purpose::Noise);
         let manifest = self.manifest(&schedule, &unit);
         let mut recording = Recording::new(name, manifest.clone(), time);
-        for kind in SensorKind::ALL {
+        for (kind, clean) in SensorKind::ALL.into_iter().zip(outputs) {
             let triad = unit.triad(kind);
-            let clean = chain.output(kind, &triad.triad, &input)?;
             let chance =
                 self.noise.then(|| Chance { random: &mut random, interval: 1.0 / self.rate, shaken: &[] });
             let samples = converter::samples(kind, triad, &chain, clean, &recording.time, chance);
@@ -142,15 +139,15 @@ impl Simulation {
                 SensorKind::Mag => recording.mag = triple,
             }
         }
-        recording.temperature = Some(self.thermometer(&input));
+        recording.temperature = Some(self.thermometer(&temperature));
         recording.gimbal = Some(self.encoders(&schedule, &recording.time));
         Ok(recording)
     }
 
-    fn thermometer(&self, input: &[Input]) -> Vec<f64> {
+    fn thermometer(&self, temperature: &[f64]) -> Vec<f64> {
         let mut random = Random::new(self.seed, Purpose::Thermometer);
-        let read = |row: &Input| converter::thermometer(row.temperature, self.noise.then_some(&mut random));
-        input.iter().map(read).collect()
+        let read = |of: &f64| converter::thermometer(*of, self.noise.then_some(&mut random));
+        temperature.iter().map(read).collect()
     }
 
     fn encoders(&self, schedule: &Schedule, time: &[f64]) -> Vec<[f64; 3]> {

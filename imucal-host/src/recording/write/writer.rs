@@ -28,6 +28,25 @@ pub struct Written {
     pub left_out: Option<Warning>,
 }
 
+/// Rows of a recording that are turned into file units at a time, where they are written as text.
+const ROWS: usize = 1 << 16;
+
+/// Writes a recording to `path` and its manifest next to it. A text is the same by parts, which take less memory; what a column of
+/// another format holds follows from all rows.
+pub(crate) fn write_whole(
+    recording: &Recording,
+    path: &Path,
+    files: &mut OutputSet,
+) -> Result<Written, WriteError> {
+    let rows = recording.rows();
+    if rows <= ROWS || !matches!(Format::of(path), Ok(Format::Csv | Format::CsvGz)) {
+        return write([recording], path, files);
+    }
+    check_lengths(recording, path)?;
+    let parts = (0..rows).step_by(ROWS).map(|from| recording.part(from..rows.min(from + ROWS)));
+    write(parts, path, files)
+}
+
 /// Writes the samples of consecutive parts to `path` and the manifest of the first next to it.
 pub(crate) fn write<R: Borrow<Recording>>(
     parts: impl IntoIterator<Item = R>,

@@ -18,6 +18,7 @@ use crate::{
     simulator::{
         Dose, NoiseLevel, Place, SimulationError, UnitKind,
         chain::Chain,
+        clean::Clean,
         climate::Climate,
         converter::{self, Chance},
         random::{Purpose, Random},
@@ -201,8 +202,7 @@ impl RobotScene {
         let doses = self.all_doses();
         let chain = Chain::new(&doses);
         let time = times(self.duration, self.real_rate);
-        let mut input = chain.inputs(&motion, &time);
-        input.iter_mut().for_each(|row| *row = row.turned(&unit.c_t_q));
+        let Clean { outputs, temperature } = Clean::of(&unit, &motion, &chain, &time)?;
         let shown: Vec<f64> = time.iter().map(|time| self.shown(*time)).collect();
         let manifest = unit.manifest(self.place.site(), motion.rig(), self.counts);
         let kept = self.kept(time.len());
@@ -212,9 +212,8 @@ impl RobotScene {
         let mut random = Random::new(self.seed, Purpose::Noise);
         let mut shaken = Random::new(self.seed, Purpose::Vibration);
         let vibration = Vibration::draw(self.kind, self.vibration, &mut shaken);
-        for kind in SensorKind::ALL {
+        for (kind, clean) in SensorKind::ALL.into_iter().zip(outputs) {
             let triad = unit.triad(kind);
-            let clean = chain.output(kind, &triad.triad, &input)?;
             let shaken = match self.noise && self.vibration > 0.0 {
                 true => vibration.rows(kind, &motion.trajectory, &shown, self.real_rate, &mut shaken),
                 false => Vec::new(),
@@ -234,9 +233,8 @@ impl RobotScene {
             }
         }
         let mut random = Random::new(self.seed, Purpose::Thermometer);
-        let mut read =
-            |row: &Input| converter::thermometer(row.temperature, self.noise.then_some(&mut random));
-        let temperature: Vec<f64> = input.iter().map(&mut read).collect();
+        let read = |of: &f64| converter::thermometer(*of, self.noise.then_some(&mut random));
+        let temperature: Vec<f64> = temperature.iter().map(read).collect();
         recording.temperature = Some(kept.iter().map(|row| temperature[*row]).collect());
         Ok(recording)
     }

@@ -185,6 +185,61 @@ fn a_recording_that_contradicts_itself_is_not_written() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
+/// As many rows, each that of [`full`] with other times.
+fn long(rows: usize) -> Recording {
+    fn cycled<T: Clone>(column: &[T], rows: usize) -> Vec<T> {
+        column.iter().cycle().take(rows).cloned().collect()
+    }
+    let (mut long, short) = (full(), full());
+    long.time = (0..rows).map(|row| row as f64 / 128.0).collect();
+    let values = cycled(&short.acc.unwrap().values, rows);
+    long.acc = long.manifest.triple(SensorKind::Acc, values).ok();
+    long.temperature = short.temperature.map(|column| cycled(&column, rows));
+    long.gimbal = short.gimbal.map(|column| cycled(&column, rows));
+    long.reference = short.reference.map(|column| cycled(&column, rows));
+    long.position = short.position.map(|column| cycled(&column, rows));
+    long.simulated =
+        short.simulated.map(|simulated| simulated.at(&(0..rows).map(|row| row % 3).collect::<Vec<_>>()));
+    long.segment = short.segment.map(|column| cycled(&column, rows));
+    long.extra[0].values = cycled(&short.extra[0].values, rows);
+    long
+}
+
+#[test]
+fn a_long_text_is_the_same_by_parts_and_as_a_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["run.csv", "run.csv.gz"] {
+        let recording = long(2 * ROWS + 5);
+        let [by_parts, whole] = ["parts", "whole"].map(|part| folder.path().join(part).join(name));
+        for path in [&by_parts, &whole] {
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+        }
+        assert_eq!(recording.write(&by_parts).unwrap().rows, 2 * ROWS + 5);
+        let mut files = OutputSet::default();
+        write([&recording], &whole, &mut files).unwrap();
+        files.commit().unwrap();
+        assert!(fs::read(&by_parts).unwrap() == fs::read(&whole).unwrap(), "{name}");
+    }
+}
+
+#[test]
+fn a_fault_far_down_in_a_long_text_is_named_and_nothing_is_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.csv");
+    let refused = |change: fn(&mut Recording)| {
+        let mut recording = long(ROWS + 5);
+        change(&mut recording);
+        recording.write(&path).unwrap_err().to_string()
+    };
+    let short = refused(|recording| recording.segment.as_mut().unwrap().truncate(ROWS + 4));
+    assert_says(&short, &["column `segment`", "found 65540 rows, expected 65541"]);
+    let order = refused(|recording| recording.time[ROWS] = 0.0);
+    assert_says(&order, &["run.csv, row 65537, column `t`", "strictly increasing"]);
+    let infinite = refused(|recording| recording.temperature.as_mut().unwrap()[ROWS + 1] = f64::INFINITY);
+    assert_says(&infinite, &["row 65538, column `temp`"]);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
 #[test]
 fn parts_that_do_not_follow_each_other_are_not_written() {
     let folder = tempfile::tempdir().unwrap();
