@@ -27,10 +27,15 @@ impl Recent {
 
     /// The row nearest to a time, s: as a rule soon after the last one.
     pub fn nearest(&mut self, times: &[f64], time: f64) -> usize {
+        // Most often the row behind the last one.
+        if times.get(self.row).is_some_and(|t| *t < time) && times.get(self.row + 1) == Some(&time) {
+            self.row += 1;
+            return self.row;
+        }
         let begins_before =
             self.row.checked_sub(1).is_none_or(|row| times.get(row).is_some_and(|t| *t < time));
         let from = if begins_before { self.row.min(times.len()) } else { 0 };
-        // Most rows come soon after the one before: steps from there, each twice the last, end behind it.
+        // Many come soon after the one before: steps from there, each twice the last, end behind it.
         let (mut low, mut high, mut step) = (from, from, 1);
         while times.get(high).is_some_and(|t| *t < time) {
             (low, high) = (high + 1, high + step);
@@ -75,7 +80,8 @@ mod tests {
         let asked = (0..300).map(|k| 0.009 * f64::from(k * 7 % 300) - 0.2);
         let in_order = (0..300).map(|k| 0.0081 * f64::from(k) - 0.2);
         let mut recent = Recent::default();
-        for time in asked.chain(in_order).chain([times[4], times[4], f64::NAN]) {
+        for time in asked.chain(in_order).chain([times[4], times[4], times[5], times[6], times[6], f64::NAN])
+        {
             let found = recent.nearest(&times, time);
             assert_eq!(found, nearest(&times, time), "{time}");
             let apart = |row: usize| (times[row] - time).abs();

@@ -10,16 +10,18 @@
 //! noise would make them, the cubic goes through those of a fifth of a second. Not modelled: readings that lag the gimbal.
 
 use crate::recording::order_statistics::std_of_median;
-use std::{f64::consts::TAU, sync::OnceLock};
+use std::{
+    f64::consts::TAU,
+    sync::{Arc, OnceLock},
+};
 
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 use super::{
     gimbal::{Pose, direction, pose},
     place::Place,
     recent::{Recent, nearest},
-    swing_fit::{Readings, SwingFit, window},
+    swing_fit::{Readings, window},
     truth::{Motion, Recorded, at_pose, on_rig},
 };
 use crate::{
@@ -47,16 +49,29 @@ const FEWEST: usize = 2;
 /// The movement of a recorded rig.
 #[derive(Clone, Debug)]
 pub struct Replay {
-    time: Vec<f64>,
-    swings: Vec<[Swing; 3]>,
     moving: Vec<bool>,
     known: Vec<bool>,
-    temperature: Vec<f64>,
+    brisk: Smoothed,
+    steady: Option<Smoothed>,
+}
+
+/// The movement by cubics of one length.
+#[derive(Clone, Debug)]
+struct Smoothed {
+    time: Arc<[f64]>,
+    rows: Vec<Row>,
     axes: [Axis; 3],
     place: Place,
-    steady: Option<Box<Replay>>,
-    /// Of the rows that were asked for: of the steady movement they are few.
-    poses: Vec<OnceLock<Box<Pose>>>,
+    remembers: bool,
+}
+
+/// What the movement is at a row: together, since it is asked for together.
+#[derive(Clone, Debug)]
+struct Row {
+    swings: [Swing; 3],
+    temperature: f64,
+    /// Where it was asked for: of the steady movement at few rows.
+    pose: OnceLock<Box<Pose>>,
 }
 
 impl Replay {
@@ -65,37 +80,28 @@ impl Replay {
     pub fn new(
         time: &[f64],
         encoders: &[[f64; 3]],
-        temperature: Vec<f64>,
+        temperature: &[f64],
         axes: [Axis; 3],
         place: Place,
     ) -> Option<Self> {
         let angles = unwrapped(encoders)?;
-        let interval = (time.last()? - time.first()?) / (time.len().max(2) - 1) as f64;
-        let noise = noise(&angles);
-        let rows = |reach: f64| ((reach / interval).round() as usize).max(FEWEST);
-        let (short, long) = (rows(REACH.0), rows(reach(&noise, interval)));
+        let readings = Readings { time, angles: &angles };
+        let (interval, noise) = (readings.interval(), noise(&angles));
+        let readings_in = |reach: f64| ((reach / interval).round() as usize).max(FEWEST);
+        let (short, long) = (readings_in(REACH.0), readings_in(reach(&noise, interval)));
         let moving = moving(time, &angles, &noise);
-        let known = known(encoders, long);
-        let of = |reach: usize, poses: usize| {
-            let (swings, known) = swings(time, &angles, &noise, &moving, known.clone(), reach);
-            let (time, moving, temperature) = (time.to_vec(), moving.clone(), temperature.clone());
-            Self {
-                time,
-                swings,
-                moving,
-                known,
-                temperature,
-                axes,
-                place,
-                steady: None,
-                poses: vec![OnceLock::new(); poses],
-            }
-        };
-        let rows = time.len();
-        let steady = (long > short).then(|| Box::new(of(long, rows)));
-        Some(Self { steady, ..of(short, if rows > REMEMBERED { 0 } else { rows }) })
+        // Noise of a rate is about that of a reading in the time between two.
+        let jerk = noise.map(|noise| JERK + NOISES * noise / interval);
+        let (near, jerked) = rows(&readings, &moving, temperature, short, Some(&jerk));
+        let time: Arc<[f64]> = time.into();
+        let of = |rows, remembers| Smoothed { time: Arc::clone(&time), rows, axes, place, remembers };
+        let steady = (long > short).then(|| of(rows(&readings, &moving, temperature, long, None).0, true));
+        let brisk = of(near, time.len() <= REMEMBERED);
+        Some(Self { known: known(encoders, long, &jerked, short), moving, brisk, steady })
     }
+}
 
+impl Smoothed {
     /// An exact rig on a level base, so many seconds after a row.
     fn machine(&self, row: usize, since: f64) -> Machine {
         let swing = |swing: Swing| Swing {
@@ -103,18 +109,18 @@ impl Replay {
             rate: swing.rate + since * swing.acceleration,
             acceleration: swing.acceleration,
         };
-        let gimbals = self.swings.get(row).copied().unwrap_or_default().map(swing);
+        let gimbals = self.rows.get(row).map(|row| row.swings).unwrap_or_default().map(swing);
         Machine { gimbals, ..Machine::exact(self.axes.map(direction)) }
     }
 
     /// The pose of an exact rig at a row; `None` in a long recording, whose poses are computed as they are needed.
     fn pose(&self, row: usize) -> Option<&Pose> {
-        let known = self.poses.get(row)?;
+        let known = &self.rows.get(row).filter(|_| self.remembers)?.pose;
         Some(known.get_or_init(|| Box::new(pose(&self.machine(row, 0.0)))))
     }
 }
 
-impl Motion for Replay {
+impl Motion for Smoothed {
     fn duration(&self) -> f64 {
         self.time.last().copied().unwrap_or(0.0)
     }
@@ -125,7 +131,7 @@ impl Motion for Replay {
         let exact = self.machine(row, since);
         let mut machine = exact;
         rig(&mut machine);
-        let temperature = self.temperature.get(row).copied().unwrap_or_default();
+        let temperature = self.rows.get(row).map_or(0.0, |row| row.temperature);
         let as_recorded = since == 0.0 && machine.turns_like(&exact);
         match as_recorded.then(|| self.pose(row)).flatten() {
             Some(pose) => {
@@ -137,7 +143,7 @@ impl Motion for Replay {
     }
 
     fn encoders(&self, time: f64) -> Option<[f64; 3]> {
-        self.swings.get(nearest(&self.time, time)).map(|swings| swings.map(|swing| swing.angle))
+        self.rows.get(nearest(&self.time, time)).map(|row| row.swings.map(|swing| swing.angle))
     }
 
     fn rig(&self) -> Rig {
@@ -146,6 +152,28 @@ impl Motion for Replay {
 
     fn place(&self) -> Place {
         self.place
+    }
+}
+
+impl Motion for Replay {
+    fn duration(&self) -> f64 {
+        self.brisk.duration()
+    }
+
+    fn truth_among(&self, time: f64, rig: &dyn Fn(&mut Machine), recent: &mut Recent) -> Truth {
+        self.brisk.truth_among(time, rig, recent)
+    }
+
+    fn encoders(&self, time: f64) -> Option<[f64; 3]> {
+        self.brisk.encoders(time)
+    }
+
+    fn rig(&self) -> Rig {
+        self.brisk.rig()
+    }
+
+    fn place(&self) -> Place {
+        self.brisk.place()
     }
 }
 
@@ -159,15 +187,13 @@ impl Recorded for Replay {
         &self.known
     }
 
-    fn swings(&self) -> Option<&[[Swing; 3]]> {
-        Some(self.steady.as_ref().map_or(&self.swings, |steady| &steady.swings))
+    fn swings(&self, row: usize) -> Option<[Swing; 3]> {
+        let steady = self.steady.as_ref().unwrap_or(&self.brisk);
+        steady.rows.get(row).map(|row| row.swings)
     }
 
     fn steady(&self) -> &dyn Motion {
-        match &self.steady {
-            Some(steady) => &**steady,
-            None => self,
-        }
+        self.steady.as_ref().unwrap_or(&self.brisk)
     }
 }
 
@@ -195,13 +221,21 @@ fn reach(noise: &[f64; 3], interval: f64) -> f64 {
     (0.5 * span).clamp(REACH.0, REACH.1)
 }
 
-/// Rows about which all readings were measured.
-fn known(encoders: &[[f64; 3]], reach: usize) -> Vec<bool> {
+/// Rows about which all readings were measured, as far as the longer cubics reach, and no gimbal jerked, as far as the
+/// shorter ones do.
+fn known(encoders: &[[f64; 3]], long: usize, jerked: &[bool], short: usize) -> Vec<bool> {
     let mut known = vec![true; encoders.len()];
-    for (row, _) in encoders.iter().enumerate().filter(|(_, row)| row.iter().any(|angle| !angle.is_finite()))
-    {
-        let to = (row + 2 * reach + 1).min(known.len());
-        known[row.saturating_sub(2 * reach)..to].fill(false);
+    let mut forget = |row: usize, reach: usize| {
+        let to = (row + reach + 1).min(encoders.len());
+        known[row.saturating_sub(reach)..to].fill(false);
+    };
+    for (row, angles) in encoders.iter().enumerate() {
+        if angles.iter().any(|angle| !angle.is_finite()) {
+            forget(row, 2 * long);
+        }
+        if jerked[row] {
+            forget(row, short);
+        }
     }
     known
 }
@@ -245,41 +279,28 @@ fn moving(time: &[f64], angles: &[[f64; 3]], noise: &[f64; 3]) -> Vec<bool> {
         .collect()
 }
 
-/// Each row's swing by cubics through so many readings to each side, and at which of the rows it is known.
-fn swings(
-    time: &[f64],
-    angles: &[[f64; 3]],
-    noise: &[f64; 3],
+/// Each row by cubics through so many readings to each side, and at which of them a wider one has a rate that is further
+/// from theirs than `jerk`, rad/s; without it none is looked for.
+fn rows(
+    readings: &Readings,
     moving: &[bool],
-    mut known: Vec<bool>,
+    temperature: &[f64],
     reach: usize,
-) -> (Vec<[Swing; 3]>, Vec<bool>) {
-    let interval = (time[time.len() - 1] - time[0]) / (time.len().max(2) - 1) as f64;
+    jerk: Option<&[f64; 3]>,
+) -> (Vec<Row>, Vec<bool>) {
     // What hardly moves does so slowly: more readings give its rate.
-    let patient = ((WINDOW / interval).round() as usize).max(reach);
-    let readings = Readings::new(time, angles);
-    let of = |row: usize| {
-        if !moving[row] {
-            return (readings.swing(row, patient), false);
-        }
-        let (narrow, wide) = (window(time.len(), row, reach), window(time.len(), row, reach + 1));
-        let mut fit = SwingFit::of(&readings, row, narrow.clone());
-        let near = fit.swing();
-        (wide.start..narrow.start).chain(narrow.end..wide.end).for_each(|k| fit.add(k));
-        let wide = fit.swing();
-        // Noise of a rate is about that of a reading in the time between two.
-        let jerked = (0..3).any(|gimbal| {
-            let apart = (near[gimbal].rate - wide[gimbal].rate).abs();
-            apart > JERK + NOISES * noise[gimbal] / interval
-        });
-        (near, jerked)
-    };
-    let (swings, jerked): (Vec<[Swing; 3]>, Vec<bool>) = (0..time.len()).into_par_iter().map(of).unzip();
-    for (row, _) in jerked.iter().enumerate().filter(|(_, jerked)| **jerked) {
-        let to = (row + reach + 1).min(known.len());
-        known[row.saturating_sub(reach)..to].fill(false);
-    }
-    (swings, known)
+    let patient = ((WINDOW / readings.interval()).round() as usize).max(reach);
+    readings.each(
+        |row| if moving[row] { reach } else { patient },
+        |row, fit| {
+            let swings = fit.swing();
+            let jerked = jerk.filter(|_| moving[row]).is_some_and(|jerk| {
+                let wide = fit.wider(window(moving.len(), row, reach + 1)).swing();
+                (0..3).any(|gimbal| (swings[gimbal].rate - wide[gimbal].rate).abs() > jerk[gimbal])
+            });
+            (Row { swings, temperature: temperature[row], pose: OnceLock::new() }, jerked)
+        },
+    )
 }
 
 #[cfg(test)]
@@ -292,7 +313,7 @@ mod tests {
         let wrap = |a: f64| a - TAU * (a / TAU).round();
         let encoders: Vec<[f64; 3]> = time.iter().map(|t| [wrap(angle(*t)), 0.3, -PI]).collect();
         let axes = [Axis::Z, Axis::Y, Axis::X];
-        Replay::new(&time, &encoders, vec![25.0; 1000], axes, Place::ankara()).unwrap()
+        Replay::new(&time, &encoders, &[25.0; 1000], axes, Place::ankara()).unwrap()
     }
 
     #[test]
@@ -323,10 +344,10 @@ mod tests {
         let mut recent = Recent::default();
         // On a row, and between two.
         for (alter, time) in alters.iter().flat_map(|alter| [(alter, 4.0), (alter, 4.003)]) {
-            let row = nearest(&replay.time, time);
-            let mut machine = replay.machine(row, time - replay.time[row]);
+            let row = nearest(&replay.brisk.time, time);
+            let mut machine = replay.brisk.machine(row, time - replay.brisk.time[row]);
             alter(&mut machine);
-            let expected = on_rig(time, &machine, &replay.place, 25.0, &mut Recent::default());
+            let expected = on_rig(time, &machine, &replay.place(), 25.0, &mut Recent::default());
             assert_eq!(replay.truth_among(time, alter, &mut recent), expected, "{machine:?}");
         }
     }
@@ -338,10 +359,10 @@ mod tests {
         let encoders: Vec<[f64; 3]> =
             (0..600).map(|k| [angle(k) + 1e-4 * ((k * k) as f64).sin(), 0.0, 0.0]).collect();
         let axes = [Axis::Z, Axis::Y, Axis::X];
-        let replay = Replay::new(&time, &encoders, vec![25.0; 600], axes, Place::ankara()).unwrap();
+        let replay = Replay::new(&time, &encoders, &[25.0; 600], axes, Place::ankara()).unwrap();
         assert!(replay.moving()[..285].iter().all(|moves| !moves));
         assert!(replay.moving()[300..].iter().all(|moves| *moves));
-        assert!(replay.swings().unwrap()[100][0].rate.abs() < 1e-3);
+        assert!(replay.swings(100).unwrap()[0].rate.abs() < 1e-3);
     }
 
     #[test]

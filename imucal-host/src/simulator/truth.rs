@@ -52,8 +52,9 @@ pub trait Recorded: Motion {
     /// Whether the recording gives the attitude, row by row.
     fn known(&self) -> &[bool];
 
-    /// Swings of the gimbals at each row, outermost first, those of [`steady`](Self::steady); `None` without gimbals.
-    fn swings(&self) -> Option<&[[Swing; 3]]> {
+    /// Swings of the gimbals at a row, outermost first, those of [`steady`](Self::steady); `None` without gimbals or behind the last
+    /// row.
+    fn swings(&self, _row: usize) -> Option<[Swing; 3]> {
         None
     }
 

@@ -30,10 +30,9 @@ const WARMING: f64 = 30.0;
 const FADING: [f64; 3] = [5.0, 20.0, 60.0];
 /// The drivers of a scene: those that vary in it. `given` is what each sensor puts out, block by block.
 pub fn drivers(scene: &ForwardModel<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<Covariate> {
-    let mut drivers = match scene.swings {
+    let swings: Option<Vec<[Swing; 3]>> = scene.blocks.iter().map(|block| scene.swings(block)).collect();
+    let mut drivers = match swings {
         Some(swings) => {
-            let middle = |b: &Block| swings.get((b.rows.start + b.rows.end) / 2).copied().unwrap_or_default();
-            let swings: Vec<[Swing; 3]> = scene.blocks.iter().map(middle).collect();
             let mut drivers = of_gimbals(&swings);
             let square = |swings: &[Swing; 3]| swings.iter().map(|s| s.rate * s.rate).sum();
             drivers.push(recent_motion(swings.iter().map(square), &scene.blocks));

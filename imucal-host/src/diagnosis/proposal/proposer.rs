@@ -77,7 +77,7 @@ pub fn proposed(
         known().sum::<f64>() / known().count().max(1) as f64
     });
     let held = Held {
-        gimbals: scene.swings.is_some(),
+        gimbals: scene.blocks.first().is_some_and(|block| scene.swings(block).is_some()),
         temperature,
         field: scene.settings.source.gives_field() && scene.kinds.contains(&SensorKind::Mag),
     };

@@ -80,7 +80,7 @@ pub fn reference(
                         .into(),
                 );
             }
-            let replay = Replay::new(&recording.time, gimbal, temperature, axes, place);
+            let replay = Replay::new(&recording.time, gimbal, &temperature, axes, place);
             Box::new(replay.ok_or("no row has a reading of all three encoders")?)
         }
         (None, None, Some(pose)) => {

@@ -46,8 +46,6 @@ pub struct ForwardModel<'a> {
     pub(super) view: Option<GravityObservables>,
     /// Sensors that are there.
     pub kinds: Vec<SensorKind>,
-    /// Swings of the gimbals at each row; `None` without gimbals.
-    pub swings: Option<&'a [[Swing; 3]]>,
     /// Usable rows of each block, by sensor.
     pub counts: [Vec<usize>; 3],
     /// Variance of a sample in each block, by sensor, against the usual one; none where all are alike.
@@ -114,7 +112,6 @@ impl<'a> ForwardModel<'a> {
             view: None,
             blocks,
             kinds,
-            swings: motion.swings(),
             counts,
             motion,
             vibration: Default::default(),
@@ -192,6 +189,11 @@ impl<'a> ForwardModel<'a> {
     /// Sensors whose blocks an effect may alter: by way of an attitude, others than its own.
     pub fn reach(&self, effect: &Effect) -> &'static [SensorKind] {
         self.settings.residual.coupled.unwrap_or(effect.sensors)
+    }
+
+    /// Swings of the gimbals in the middle of a block; `None` without gimbals.
+    pub fn swings(&self, block: &Block) -> Option<[Swing; 3]> {
+        self.motion.swings((block.rows.start + block.rows.end) / 2)
     }
 
     /// The movement is known at a row.

@@ -55,11 +55,8 @@ impl ForwardModel<'_> {
 
     /// That of consecutive blocks.
     fn residual_of(&self, chain: &Chain<'_>, blocks: &[Block]) -> Result<Means, DiagnosisError> {
-        let (from, to) = match blocks {
-            [first, .., last] => (first.rows.start, last.rows.end),
-            [only] => (only.rows.start, only.rows.end),
-            [] => (0, 0),
-        };
+        let ends = blocks.first().zip(blocks.last());
+        let (from, to) = ends.map_or((0, 0), |(first, last)| (first.rows.start, last.rows.end));
         let input = chain.inputs(self.motion, &self.recording.time[from..to]);
         // A sensor's output is let go before the next one's is made: it may be as long as the recording.
         let of = |kind: &SensorKind| {

@@ -123,7 +123,7 @@ fn information<'m>(
     recording.time.iter_mut().for_each(|time| *time += later);
     let place = simulation.schedule().ok()?.place();
     let temperature = recording.temperature.clone()?;
-    let replay = Replay::new(&recording.time, recording.gimbal.as_deref()?, temperature, axes, place)?;
+    let replay = Replay::new(&recording.time, recording.gimbal.as_deref()?, &temperature, axes, place)?;
     let settings = Settings::default();
     let usable = SensorKind::ALL.map(|_| vec![true; recording.rows()]);
     let scene = ForwardModel::new(&recording, usable, &replay, linear.scene.triads, &settings);

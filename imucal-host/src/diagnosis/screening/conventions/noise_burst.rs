@@ -10,7 +10,7 @@
 //! and all stretches are counted in its probability. Its ends are then moved to the rows where the likelihood is
 //! greatest.
 
-use crate::recording::order_statistics::std_of_median;
+use crate::recording::order_statistics::{mean_without_largest, std_of_median};
 use std::ops::Range;
 
 use nalgebra::Vector3;
@@ -165,12 +165,7 @@ fn normalise(bends: &[Bend], windows: &mut [Window], moves: bool) -> Option<Vect
 
 /// Mean squares without the largest quarter.
 fn trimmed(bends: &[Bend]) -> Vector3<f64> {
-    Vector3::from_fn(|axis, _| {
-        let mut squares: Vec<f64> = bends.iter().map(|bend| bend.square[axis]).collect();
-        squares.sort_unstable_by(f64::total_cmp);
-        let kept = squares.len() - squares.len() / 4;
-        squares.iter().take(kept).sum::<f64>() / kept as f64
-    })
+    Vector3::from_fn(|axis, _| mean_without_largest(bends.iter().map(|bend| bend.square[axis]).collect(), 4))
 }
 
 /// A stretch of windows.

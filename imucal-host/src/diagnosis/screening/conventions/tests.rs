@@ -8,7 +8,7 @@ use crate::{
 fn replay(recording: &Recording) -> Replay {
     let axes: [Axis; 3] = recording.manifest.rig.as_ref().unwrap().axes.clone().unwrap().try_into().unwrap();
     let temperature = recording.temperature.clone().unwrap();
-    Replay::new(&recording.time, recording.gimbal.as_ref().unwrap(), temperature, axes, Place::ankara())
+    Replay::new(&recording.time, recording.gimbal.as_ref().unwrap(), &temperature, axes, Place::ankara())
         .unwrap()
 }
 
