@@ -26,7 +26,7 @@ use super::{
 use crate::{
     noise::Noise,
     observe::{
-        quantum::quantum,
+        quantum::ConverterSteps,
         rest::{RestDetector, Samples},
     },
     recording::{Recording, SensorKind, Triple, check::integrity::Integrity, unit::STANDARD_GRAVITY},
@@ -36,7 +36,7 @@ use crate::{
 /// Accelerometer and gyroscope; the directions at the rests, where the accelerometer passed.
 pub(crate) fn calibrate(
     recording: &Recording,
-    integrity: &Integrity,
+    (integrity, steps): (&Integrity, &ConverterSteps<'_>),
     options: &Options,
     progress: &(dyn Fn(&str) + Sync),
     calibration: &mut Calibration,
@@ -72,7 +72,7 @@ pub(crate) fn calibrate(
         return None;
     };
     progress("fitting the accelerometer");
-    let shown = at_rest.noise(chosen);
+    let shown = at_rest.noise(chosen, steps.of(SensorKind::Acc));
     let AccResult { outcome: acc_outcome, used, noise } =
         at_rest.accelerometer(&cuts, chosen, &shown, options, calibration);
     let mut trials: Vec<_> = cuts.iter().map(Cut::trial).collect();
@@ -81,7 +81,7 @@ pub(crate) fn calibrate(
         recording,
         usable: &usable_gyr,
         interval: at_rest.interval,
-        step: wanted.map_or_else(Vector3::zeros, |gyr| quantum(&gyr.values, &usable_gyr)),
+        step: wanted.map_or_else(Vector3::zeros, |_| steps.of(SensorKind::Gyr)),
         directions: directions.as_ref(),
         thermometry: thermometry.as_ref(),
     };
@@ -165,9 +165,8 @@ impl<'a> Rests<'a> {
         RestDetector::new(samples, self.interval)
     }
 
-    fn noise(&self, chosen: &Cut) -> RestNoise {
+    fn noise(&self, chosen: &Cut, step: Vector3<f64>) -> RestNoise {
         let (time, values) = (&self.recording.time, &self.acc.values);
-        let step = quantum(values, &self.usable);
         AtRest { time, values, usable: &self.usable, interval: self.interval, rows: &chosen.rows, step }
             .noise()
     }

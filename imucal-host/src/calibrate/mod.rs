@@ -4,7 +4,7 @@ use imucal_core::observation::Moments;
 use nalgebra::Vector3;
 
 use crate::{
-    observe::held,
+    observe::{held, quantum::ConverterSteps},
     recording::{
         Recording, SensorKind, Triple,
         check::{integrity, integrity::Integrity},
@@ -89,7 +89,9 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         read_warnings: recording.warnings.iter().map(ToString::to_string).collect(),
     };
     integrity_warnings(&integrity, &mut calibration.warnings);
-    let directions = inertial::calibrate(recording, &integrity, options, progress, &mut calibration);
+    let steps = ConverterSteps::new(recording, &integrity);
+    let known = (&integrity, &steps);
+    let directions = inertial::calibrate(recording, known, options, progress, &mut calibration);
     if let Some(mag) = recording.mag.as_ref().filter(|_| !options.skip.contains(&SensorKind::Mag)) {
         progress("fitting the magnetometer");
         let field = recording.manifest.site.field_ned_ut.map(|f| Vector3::from(f).norm());
@@ -123,7 +125,7 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
     progress("checking the order and signs of the axes");
     handedness::mirror::check(recording, &mut calibration);
     progress("testing the residuals");
-    examination::examine::examine(recording, &integrity, &mut calibration);
+    examination::examine::examine(recording, &integrity, &steps, &mut calibration);
     few_left_over(&mut calibration);
     calibration
 }

@@ -19,7 +19,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{Continuous, ContinuousCDF, Normal, StudentsT};
 
 use super::{blocked_cholesky, restricted::Restricted};
 
@@ -30,8 +30,10 @@ const UPPER: f64 = 0.975;
 /// The share below five standard errors, at least: where noise may be of two sizes, most errors are small and some are
 /// not, and 97.5 % say nothing of the rest.
 const FIVE: f64 = 0.9999;
-/// Halvings of the bracket of a quantile: to 1e-12 of it.
-const HALVINGS: usize = 40;
+/// Steps to a quantile, at most, and the last one over it.
+const STEPS: usize = 60;
+/// See [`STEPS`].
+const EXACT: f64 = 1e-12;
 /// Sizes s² above one, each so many times the one before, and the largest.
 const SIZES: (f64, f64) = (1.2, 1e6);
 /// How many times larger than the noise its bounds may be, squared.
@@ -196,13 +198,12 @@ impl Parts<'_> {
     ) -> Option<Vec<(f64, Sizes)>> {
         let ([data, unit], log_determinant) =
             self.parts.whitened(ratio, [residuals.clone(), jacobian.clone()])?;
-        let of_column = |column: usize| {
-            let found = Restricted::of_rows(&data.columns(column, 1).into(), unit.clone(), log_determinant);
+        let of_column = |found: Restricted| {
             let (log, sizes) = self.sizes(found.left, found.freedom as f64);
             let log = log + found.log_volume;
             log.is_finite().then_some((log, sizes))
         };
-        (0..residuals.ncols()).map(of_column).collect()
+        Restricted::of_rows(&data, unit, log_determinant).into_iter().map(of_column).collect()
     }
 
     /// Logarithm of the evidence over s², and its posterior.
@@ -264,7 +265,10 @@ impl Parts<'_> {
 }
 
 /// The point below which there is such a share of a mixture of one distribution at several widths with weights.
-fn upper_point(spreads: &[(f64, f64)], distribution: &impl ContinuousCDF<f64, f64>, upper: f64) -> f64 {
+fn upper_point<D>(spreads: &[(f64, f64)], distribution: &D, upper: f64) -> f64
+where
+    D: Continuous<f64, f64> + ContinuousCDF<f64, f64>,
+{
     let point = distribution.inverse_cdf(upper);
     let ends = spreads.iter().map(|(_, spread)| spread * point);
     let (mut low, mut high) = ends.fold((f64::INFINITY, 0.0), |(l, h), x| (f64::min(l, x), f64::max(h, x)));
@@ -272,17 +276,28 @@ fn upper_point(spreads: &[(f64, f64)], distribution: &impl ContinuousCDF<f64, f6
         return high;
     }
     let all: f64 = spreads.iter().map(|(weight, _)| weight).sum();
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        let below: f64 =
-            spreads.iter().map(|(weight, spread)| weight * distribution.cdf(middle / spread)).sum();
+    // Newton's steps from below stay below, since the share is concave above zero; halving is for errors of rounding.
+    let mut at = low;
+    for _ in 0..STEPS {
+        let share = |(weight, spread): &(f64, f64)| {
+            let x = at / spread;
+            (weight * distribution.cdf(x), weight * distribution.pdf(x) / spread)
+        };
+        let (below, density) =
+            spreads.iter().map(share).fold((0.0, 0.0), |sums, share| (sums.0 + share.0, sums.1 + share.1));
+        let next = at + (upper * all - below) / density;
         if below < upper * all {
-            low = middle;
+            low = at;
         } else {
-            high = middle;
+            high = at;
+        }
+        let last =
+            std::mem::replace(&mut at, if next > low && next < high { next } else { 0.5 * (low + high) });
+        if (at - last).abs() <= EXACT * at {
+            break;
         }
     }
-    high
+    at
 }
 
 #[cfg(test)]
@@ -325,6 +340,21 @@ pub(super) mod tests {
             values.mean().abs() <= NORMAL * errors.covariance[(0, 0)].sqrt()
         });
         hold.count() as f64 / 2000.0
+    }
+
+    #[test]
+    fn below_a_quantile_of_a_mixture_lies_its_share() {
+        let normal = Normal::standard();
+        // As wide as one another, much wider, and next to none that are.
+        for spreads in [[(0.5, 1.0), (0.5, 1.2)], [(0.9, 1.0), (0.1, 1e3)], [(1.0 - 1e-6, 1.0), (1e-6, 1e6)]]
+        {
+            for upper in [UPPER, FIVE] {
+                let point = upper_point(&spreads, &normal, upper);
+                let share: f64 =
+                    spreads.iter().map(|(weight, spread)| weight * normal.cdf(point / spread)).sum();
+                assert!((share - upper).abs() < 1e-13, "{spreads:?} {upper}: {point}, {share}");
+            }
+        }
     }
 
     #[test]

@@ -16,9 +16,9 @@
 //! in minutes. Likelihood: restricted, μ and S integrated out (Patterson & Thompson 1971). Not modelled: drift that begins
 //! beyond a rest's length; a share of the prior is kept for that (`KEPT`).
 
-use std::{collections::BTreeMap, ops::Range};
+use std::ops::Range;
 
-use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
+use nalgebra::{Cholesky, DMatrix, Vector3};
 use rayon::prelude::*;
 
 use super::{Span, flicker, white};
@@ -65,8 +65,12 @@ impl Within {
         times: &[f64],
         variance: impl Fn(f64) -> f64 + Sync,
     ) -> Vec<(f64, f64)> {
+        if self.is_empty() {
+            return prior.to_vec();
+        }
+        let drift = self.drift(times);
         let logs: Option<Vec<f64>> =
-            prior.par_iter().map(|(ratio, _)| self.log(variance(*ratio), times)).collect();
+            prior.par_iter().map(|(ratio, _)| self.log(variance(*ratio), &drift)).collect();
         let Some(logs) = logs else { return prior.to_vec() };
         let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let likely: Vec<f64> =
@@ -79,24 +83,23 @@ impl Within {
         mixed.collect()
     }
 
+    /// Σ K_T of the longest stretch; that of a shorter one is its first part.
+    fn drift(&self, times: &[f64]) -> DMatrix<f64> {
+        let longest = self.stretches.iter().map(Vec::len).max().unwrap_or(0);
+        let spans: Vec<Span> =
+            (0..longest).map(|k| white::AVERAGED * k as f64..white::AVERAGED * (k + 1) as f64).collect();
+        let all: Vec<f64> = std::iter::once(SHORTEST).chain(times.iter().copied()).collect();
+        flicker::covariance_of(&spans, &flicker::of_times(&all, all.len() as f64))
+    }
+
     /// Log-likelihood of r over all axes; `None` where nothing is left over.
-    fn log(&self, r: f64, times: &[f64]) -> Option<f64> {
-        let mut factors: BTreeMap<usize, Factor> = BTreeMap::new();
-        for stretch in &self.stretches {
-            let count = stretch.len();
-            if let std::collections::btree_map::Entry::Vacant(entry) = factors.entry(count) {
-                entry.insert(Factor::of(count, r, times)?);
-            }
-        }
+    fn log(&self, r: f64, drift: &DMatrix<f64>) -> Option<f64> {
+        let factor = Factor::of(r, drift)?;
         let freedom: usize = self.stretches.iter().map(|stretch| stretch.len() - 1).sum();
-        let volume: f64 = self.stretches.iter().map(|stretch| factors[&stretch.len()].log_volume).sum();
+        let volume: f64 = self.stretches.iter().map(|stretch| factor.log_volume(stretch.len())).sum();
+        let left: Vector3<f64> = self.stretches.iter().map(|stretch| factor.left(stretch)).sum();
         let axes = (0..3).filter(|axis| self.distinct(*axis) >= DISTINCT);
-        let log = |axis: usize| {
-            let left: f64 =
-                self.stretches.iter().map(|stretch| factors[&stretch.len()].left(stretch, axis)).sum();
-            volume - 0.5 * freedom as f64 * left.ln()
-        };
-        let logs: Vec<f64> = axes.map(log).collect();
+        let logs: Vec<f64> = axes.map(|axis| volume - 0.5 * freedom as f64 * left[axis].ln()).collect();
         (freedom > 0 && !logs.is_empty()).then(|| logs.iter().sum()).filter(|log: &f64| log.is_finite())
     }
 
@@ -112,36 +115,53 @@ impl Within {
     }
 }
 
-/// Covariance of so many means in succession, factorised.
+/// Covariance of means in succession, C = L Lᵀ. The factor of fewer means is its first part.
 struct Factor {
-    factor: Cholesky<f64, nalgebra::Dyn>,
-    /// C⁻¹1 and 1ᵀC⁻¹1.
-    weight: (DVector<f64>, f64),
-    /// −½ ln|C| − ½ ln 1ᵀC⁻¹1.
-    log_volume: f64,
+    lower: DMatrix<f64>,
+    /// L⁻¹1.
+    ones: Vec<f64>,
 }
 
 impl Factor {
-    fn of(count: usize, r: f64, times: &[f64]) -> Option<Self> {
-        let spans: Vec<Span> =
-            (0..count).map(|k| white::AVERAGED * k as f64..white::AVERAGED * (k + 1) as f64).collect();
-        let all: Vec<f64> = std::iter::once(SHORTEST).chain(times.iter().copied()).collect();
-        let drift = flicker::covariance_of(&spans, &flicker::of_times(&all, all.len() as f64 * r));
-        let factor = Cholesky::new(DMatrix::identity(count, count) / white::AVERAGED + drift)?;
-        let weights = factor.solve(&DVector::repeat(count, 1.0));
-        let total = weights.sum();
-        let log_volume = -0.5 * (factor.ln_determinant() + total.ln());
-        Some(Self { factor, weight: (weights, total), log_volume })
+    fn of(r: f64, drift: &DMatrix<f64>) -> Option<Self> {
+        let count = drift.nrows();
+        let white = DMatrix::identity(count, count) / white::AVERAGED;
+        let lower = Cholesky::new(white + drift * r)?.unpack();
+        let ones = whitened(&lower, vec![Vector3::repeat(1.0); count]).iter().map(|one| one.x).collect();
+        Some(Self { lower, ones })
     }
 
-    /// Sum of squares about the best mean, whitened.
-    fn left(&self, stretch: &[Vector3<f64>], axis: usize) -> f64 {
-        // About one of them first: a mean may be far from zero compared with its noise.
-        let values = DVector::from_fn(stretch.len(), |k, _| stretch[k][axis] - stretch[0][axis]);
-        let mean = self.weight.0.dot(&values) / self.weight.1;
-        let about = values.add_scalar(-mean);
-        about.dot(&self.factor.solve(&about))
+    /// −½ ln|C| − ½ ln 1ᵀC⁻¹1 of so many means.
+    fn log_volume(&self, count: usize) -> f64 {
+        let log_root: f64 = self.lower.diagonal().iter().take(count).map(|entry| entry.ln()).sum();
+        -log_root - 0.5 * self.ones[..count].iter().map(|one| one * one).sum::<f64>().ln()
     }
+
+    /// Sum of squares about the best mean, whitened, of each axis.
+    fn left(&self, stretch: &[Vector3<f64>]) -> Vector3<f64> {
+        // About one of them first: a mean may be far from zero compared with its noise.
+        let values = whitened(&self.lower, stretch.iter().map(|value| value - stretch[0]).collect());
+        let (mut sum, mut total) = (Vector3::zeros(), 0.0);
+        for (value, one) in values.iter().zip(&self.ones) {
+            sum += value * *one;
+            total += one * one;
+        }
+        let mean = sum / total;
+        let about = values.iter().zip(&self.ones).map(|(value, one)| value - mean * *one);
+        about.map(|about| about.component_mul(&about)).sum()
+    }
+}
+
+/// L⁻¹ values, by the first rows of L.
+fn whitened(lower: &DMatrix<f64>, mut values: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
+    for at in 0..values.len() {
+        let value = values[at] / lower[(at, at)];
+        values[at] = value;
+        for (later, entry) in values.iter_mut().zip(lower.column(at).iter()).skip(at + 1) {
+            *later -= value * *entry;
+        }
+    }
+    values
 }
 
 #[cfg(test)]
@@ -167,6 +187,29 @@ mod tests {
         let within = Within::of(&time, &values, &vec![true; values.len()], &rests);
         let prior = [(0.0, 0.5), (0.5, 0.1), (2.0, 0.1), (8.0, 0.1), (32.0, 0.2)];
         within.weigh(&prior, &[10.0, 100.0], |ratio| ratio)[0].1
+    }
+
+    #[test]
+    fn the_factor_of_many_means_is_that_of_fewer_too() {
+        let stretch =
+            |count: usize| (0..count).map(|k| Vector3::new(k as f64, 5.0, (k * k % 7) as f64)).collect();
+        let within = Within { stretches: [12, 5].map(stretch).to_vec() };
+        let drift = within.drift(&[10.0, 100.0]);
+        let factor = Factor::of(0.7, &drift).unwrap();
+        for stretch in &within.stretches {
+            let count = stretch.len();
+            let white = DMatrix::identity(count, count) / white::AVERAGED;
+            let whole = (white + drift.view((0, 0), (count, count)) * 0.7).cholesky().unwrap();
+            let weights = whole.solve(&DMatrix::repeat(count, 1, 1.0));
+            let volume = -0.5 * (whole.ln_determinant() + weights.sum().ln());
+            assert!((factor.log_volume(count) - volume).abs() < 1e-12, "{count}");
+            for axis in 0..3 {
+                let values = DMatrix::from_fn(count, 1, |k, _| stretch[k][axis]);
+                let about = values.add_scalar(-weights.dot(&values) / weights.sum());
+                let left = about.dot(&whole.solve(&about));
+                assert!((factor.left(stretch)[axis] - left).abs() < 1e-12 * (1.0 + left), "{count} {axis}");
+            }
+        }
     }
 
     #[test]

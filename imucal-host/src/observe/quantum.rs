@@ -3,10 +3,36 @@
 use std::{
     collections::HashSet,
     hash::{BuildHasherDefault, Hasher},
+    sync::{LazyLock, OnceLock},
 };
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
+
+use crate::recording::{Recording, SensorKind, check::integrity::Integrity};
+
+/// The steps of a recording's converters, each found where it is first asked for.
+#[derive(Debug)]
+pub struct ConverterSteps<'a> {
+    recording: &'a Recording,
+    integrity: &'a Integrity,
+    found: [OnceLock<Vector3<f64>>; 3],
+}
+
+impl<'a> ConverterSteps<'a> {
+    /// Of what is usable in a recording.
+    pub fn new(recording: &'a Recording, integrity: &'a Integrity) -> Self {
+        Self { recording, integrity, found: Default::default() }
+    }
+
+    /// Step of each axis of a sensor, as [`quantum`] finds it; zero without the sensor.
+    pub fn of(&self, kind: SensorKind) -> Vector3<f64> {
+        *self.found[kind as usize].get_or_init(|| {
+            let there = self.recording.sensor(kind).zip(self.integrity.sensor(kind));
+            there.map_or_else(Vector3::zeros, |(triple, found)| quantum(&triple.values, &found.usable))
+        })
+    }
+}
 
 /// Smallest difference between two values that an axis shows; zero for an axis that shows but one.
 ///
@@ -82,12 +108,8 @@ pub fn variances_of_means<I: Iterator<Item = f64>>(step: f64, rests: impl Iterat
     if rests.iter().all(Option::is_none) {
         return vec![0.0; rests.len()];
     }
-    let by_sigma: Vec<Vec<Option<(f64, f64)>>> = (0..SIGMAS.1)
-        .map(|k| {
-            let table = table(SIGMAS.0 * SIGMAS.2.powi(k));
-            rests.iter().map(|codes| codes.as_ref().map(|codes| codes.given(&table))).collect()
-        })
-        .collect();
+    let given = |table: &Vec<f64>| rests.iter().map(|codes| Some(codes.as_ref()?.given(table))).collect();
+    let by_sigma: Vec<Vec<Option<(f64, f64)>>> = TABLES.iter().map(given).collect();
     let logs: Vec<f64> =
         by_sigma.iter().map(|rests| rests.iter().flatten().map(|(log, _)| log).sum()).collect();
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -106,6 +128,8 @@ pub fn variances_of_means<I: Iterator<Item = f64>>(step: f64, rests: impl Iterat
 const MOVING: f64 = 0.003;
 /// Steps between the outermost codes from which noise makes the mean exact.
 const DITHER: i64 = 5;
+/// Codes between the outermost of samples that are counted each in its place.
+const PLACES: u64 = 1 << 12;
 /// Values a step.
 const VALUES: i32 = 40;
 /// Least σ, how many, and how many times the one before each is, in steps: to one step.
@@ -128,12 +152,9 @@ impl Codes {
         if MOVING * (samples.len() as f64) < 1.0 && goes_over_many(step, &samples) {
             return None;
         }
-        let mut codes: Vec<i64> = samples.iter().map(|x| code(step, *x)).collect();
-        codes.sort_unstable();
-        let mut counts: Vec<(i64, f64)> =
-            codes.chunk_by(|a, b| a == b).map(|alike| (alike[0], alike.len() as f64)).collect();
+        let mut counts = counted(samples.iter().map(|x| code(step, *x)).collect());
         let most = counts.iter().max_by(|a, b| a.1.total_cmp(&b.1))?.0;
-        let total = codes.len() as f64;
+        let total = samples.len() as f64;
         counts.retain(|(code, count)| (*code - most).abs() < 2 || *count > MOVING * total);
         let extent = counts.last()?.0 - counts.first()?.0;
         if extent > DITHER {
@@ -171,6 +192,21 @@ fn code(step: f64, x: f64) -> i64 {
     (x / step).round() as i64
 }
 
+/// Each code and its count, ascending.
+fn counted(mut codes: Vec<i64>) -> Vec<(i64, f64)> {
+    let ends = codes.iter().min().zip(codes.iter().max());
+    let Some((low, high)) = ends.map(|(low, high)| (*low, *high)) else { return Vec::new() };
+    // Noise goes over few codes, most of the time.
+    if high.abs_diff(low) < PLACES {
+        let mut counts = vec![0u32; high.abs_diff(low) as usize + 1];
+        codes.iter().for_each(|code| counts[code.abs_diff(low) as usize] += 1);
+        let there = (0..).zip(counts).filter(|(_, count)| *count > 0);
+        return there.map(|(place, count)| (low + place, f64::from(count))).collect();
+    }
+    codes.sort_unstable();
+    codes.chunk_by(|a, b| a == b).map(|alike| (alike[0], alike.len() as f64)).collect()
+}
+
 /// Codes of samples are further apart than noise leaves an error of the mean.
 fn goes_over_many(step: f64, samples: &[f64]) -> bool {
     let (mut low, mut high) = (i64::MAX, i64::MIN);
@@ -179,6 +215,10 @@ fn goes_over_many(step: f64, samples: &[f64]) -> bool {
         high - low > DITHER
     })
 }
+
+/// Of each σ.
+static TABLES: LazyLock<Vec<Vec<f64>>> =
+    LazyLock::new(|| (0..SIGMAS.1).map(|k| table(SIGMAS.0 * SIGMAS.2.powi(k))).collect());
 
 /// Logarithm of the probability of a code, by its distance from the value in grid steps.
 fn table(sigma: f64) -> Vec<f64> {
@@ -223,6 +263,17 @@ mod tests {
             stated += variance.sqrt() / step / 300.0;
         }
         (square.sqrt(), stated)
+    }
+
+    #[test]
+    fn codes_are_counted_whether_they_are_near_each_other_or_far() {
+        let expected = [(-3, 2.0), (0, 1.0), (7, 3.0)];
+        assert_eq!(counted(vec![7, -3, 7, 0, -3, 7]), expected);
+        let far = i64::MAX;
+        let of_all = counted(vec![7, far, -3, 7, 0, -3, 7]);
+        assert_eq!((&of_all[..3], of_all[3]), (&expected[..], (far, 1.0)));
+        assert_eq!(counted(vec![far, far]), [(far, 2.0)]);
+        assert_eq!(counted(Vec::new()), []);
     }
 
     #[test]

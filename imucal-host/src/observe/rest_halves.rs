@@ -42,11 +42,12 @@ impl MeanVariance {
     }
 }
 
-/// Variance of a rest's mean; `None` where no rest is long enough.
+/// Variance of a rest's mean, of samples from a converter of such steps; `None` where no rest is long enough.
 pub fn mean_variance(
     values: &[Vector3<f64>],
     usable: &[bool],
     rests: &[Range<usize>],
+    step: &Vector3<f64>,
 ) -> Option<MeanVariance> {
     let differences = differences(values, usable, rests, 2);
     let count = differences.len();
@@ -54,7 +55,6 @@ pub fn mean_variance(
         return None;
     }
     let sum: Vector3<f64> = differences.iter().map(|d| d.map(|d| 0.25 * d * d)).sum();
-    let step = quantum::quantum(values, usable);
     let of_axis = |axis: usize| {
         let samples = |rest: &Range<usize>| rest.clone().filter(|k| usable[*k]).map(move |k| values[k][axis]);
         let variances = quantum::variances_of_means(step[axis], rests.iter().map(samples));
@@ -98,7 +98,8 @@ mod tests {
         let mut random = Random::new(1, Purpose::Noise);
         let values: Vec<_> = (0..20_000).map(|_| random.normals() * 0.1).collect();
         let rests: Vec<_> = (0..200).map(|k| 100 * k..100 * (k + 1)).collect();
-        let found = mean_variance(&values, &[true; 20_000], &rests).unwrap();
+        let step = quantum::quantum(&values, &[true; 20_000]);
+        let found = mean_variance(&values, &[true; 20_000], &rests, &step).unwrap();
         assert_eq!(found.count, 200);
         let variance = found.with_slower(1.0);
         assert!(variance.iter().all(|v| (v / 1e-4 - 1.0).abs() < 0.3), "{variance}");
@@ -107,7 +108,8 @@ mod tests {
     #[test]
     fn a_mean_of_coarse_steps_is_no_finer_than_a_step() {
         let values: Vec<_> = (0..100).map(|k| Vector3::repeat(if k < 50 { 0.2 } else { 0.5 })).collect();
-        let found = mean_variance(&values, &[true; 100], &[0..50, 50..100]).unwrap();
+        let step = quantum::quantum(&values, &[true; 100]);
+        let found = mean_variance(&values, &[true; 100], &[0..50, 50..100], &step).unwrap();
         let variance = found.with_slower(1.0);
         assert!((0.7..1.1).contains(&(variance.x / (0.09 / 12.0))), "{variance}");
     }

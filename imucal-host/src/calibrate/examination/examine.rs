@@ -41,6 +41,7 @@ use crate::{
     },
     observe::{
         held,
+        quantum::ConverterSteps,
         rest_halves::{self, MeanVariance},
         turn::Rates,
     },
@@ -70,9 +71,14 @@ pub const HELD: f64 = 0.47;
 const EARTH_RATE: f64 = 7.29e-5;
 
 /// Fills the suspicions of each fit that keeps its limits.
-pub fn examine(recording: &Recording, integrity: &Integrity, calibration: &mut Calibration) {
+pub fn examine(
+    recording: &Recording,
+    integrity: &Integrity,
+    steps: &ConverterSteps<'_>,
+    calibration: &mut Calibration,
+) {
     let rests = calibration.segmentation.as_ref().map_or_else(Vec::new, |cut| cut.rests.clone());
-    let scene = Scene { recording, integrity, rests: &rests, at_rest: [const { OnceLock::new() }; 3] };
+    let scene = Scene { recording, integrity, steps, rests: &rests, at_rest: Default::default() };
     let accelerometer_rms =
         calibration.sensor(SensorKind::Acc).and_then(SensorOutcome::passed).map(|fit| fit.rms);
     let square = matches!(
@@ -116,6 +122,7 @@ pub fn examine(recording: &Recording, integrity: &Integrity, calibration: &mut C
 struct Scene<'a> {
     recording: &'a Recording,
     integrity: &'a Integrity,
+    steps: &'a ConverterSteps<'a>,
     rests: &'a [Range<usize>],
     /// How well the means of rests are known, by sensor.
     at_rest: [OnceLock<Option<MeanVariance>>; 3],
@@ -125,7 +132,7 @@ impl Scene<'_> {
     fn at_rest(&self, kind: SensorKind) -> Option<MeanVariance> {
         *self.at_rest[kind as usize].get_or_init(|| {
             let values = &self.recording.sensor(kind)?.values;
-            rest_halves::mean_variance(values, self.usable(kind), self.rests)
+            rest_halves::mean_variance(values, self.usable(kind), self.rests, &self.steps.of(kind))
         })
     }
 
