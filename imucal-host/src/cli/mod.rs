@@ -127,7 +127,8 @@ pub fn run() -> ExitCode {
     output::set_volume(cli.volume());
     interrupt::watch();
     let result = match cli.command {
-        Command::Calibrate(arguments) => calibrate::run(&arguments),
+        // On a thread of the pool, which works itself where another one would first wake the pool and wait: its parts are short.
+        Command::Calibrate(arguments) => rayon::scope(|_| calibrate::run(&arguments)),
         Command::Batch(arguments) => batch::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments),
         Command::Apply(arguments) => apply::run(&arguments),
