@@ -92,6 +92,8 @@ fn turns(block: &Block<f32>) {
     let carrier = reach!(model::turn::Carrier::new(&Triad::identity()));
     let mut attitude = nalgebra::Matrix3::<f32>::identity();
     reach!(model::turn::Carrier::carry(&carrier, &mut attitude, block, 0.02));
+    reach!(model::turn::Carrier::carry_with_derivative(&carrier, &mut attitude, block, 0.02));
+    reach!(model::turn::Carrier::vector(&carrier, block, 0.02));
     let turns = [turn];
     let carried = TurnModel { turns: &turns, form: FULL };
     reach!(model::turn::TurnModel::rows(&carried, &theta, &mut none()));

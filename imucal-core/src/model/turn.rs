@@ -54,10 +54,26 @@ impl<T: Scalar> Carrier<T> {
         Self { blocks: BlockRotation::new(triad), still: triad.gain * triad.bias }
     }
 
+    /// Rotation vector of a block of some duration, s, rad: linear in the block's sums and its duration.
+    #[inline]
+    pub fn vector(&self, block: &Block<T>, duration: T) -> Vector3<T> {
+        self.blocks.vector(block, duration, &self.still)
+    }
+
     /// Turns an attitude on by a block of some duration, s.
     #[inline]
     pub fn carry(&self, c: &mut Matrix3<T>, block: &Block<T>, duration: T) {
-        rotation::turn(c, &self.blocks.vector(block, duration, &self.still));
+        rotation::turn(c, &self.vector(block, duration));
+    }
+
+    /// The same. Returns M = C J_l(φ), of C before the block: where the block's rotation vector φ changes by δφ, every attitude
+    /// after it is multiplied by `exp([M δφ]×)` from the left, to first order.
+    #[inline]
+    pub fn carry_with_derivative(&self, c: &mut Matrix3<T>, block: &Block<T>, duration: T) -> Matrix3<T> {
+        let (step, jacobian) = exp_with_jacobian(&self.vector(block, duration));
+        let m = product(c, &jacobian);
+        *c = product(c, &step);
+        m
     }
 }
 
@@ -75,14 +91,12 @@ pub fn attitude<T: Scalar>(triad: &Triad<T>, turn: &Turn<'_, T>) -> Matrix3<T> {
 fn attitude_with_derivative<T: Scalar>(triad: &Triad<T>, turn: &Turn<'_, T>) -> (Matrix3<T>, ByEntries<T>) {
     let mut c = Matrix3::identity();
     let mut sums = DerivativeSums::new();
-    let rotation = BlockRotation::new(triad);
-    let still = triad.gain * triad.bias;
+    let carrier = Carrier::new(triad);
     for (index, block) in turn.blocks.iter().enumerate() {
         let duration = turn.durations.get(index);
         let (angle, coning) = reduce(&triad.bias, block, duration);
-        let (step, jacobian) = exp_with_jacobian(&rotation.vector(block, duration, &still));
-        sums.add(&product(&c, &jacobian), &angle, &coning, block, duration);
-        c = product(&c, &step);
+        let m = carrier.carry_with_derivative(&mut c, block, duration);
+        sums.add(&m, &angle, &coning, block, duration);
     }
     (c, sums.by_entries(&triad.gain))
 }

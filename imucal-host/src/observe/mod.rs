@@ -1,5 +1,6 @@
 //! From samples to observations: rests, turns between them, and clouds.
 
+pub mod block_change;
 pub mod cloud;
 pub mod compression;
 pub mod held;

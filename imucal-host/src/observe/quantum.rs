@@ -188,8 +188,9 @@ impl Codes {
     }
 }
 
+/// The nearest multiple of the step. `f64::round` is a call on x86-64, this is not.
 fn code(step: f64, x: f64) -> i64 {
-    (x / step).round() as i64
+    (x / step + 0.5_f64.copysign(x)) as i64
 }
 
 /// Each code and its count, ascending.

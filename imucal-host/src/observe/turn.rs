@@ -10,6 +10,7 @@ use imucal_core::observation::{Block, Durations, Turn};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
+    block_change::BlockChange,
     compression,
     compression::{Compressed, is_jump},
 };
@@ -168,7 +169,7 @@ fn measured(rates: Rates<'_>, rows: &Range<usize>) -> Result<Vec<usize>, TurnGap
     }
 }
 
-/// The rates of a turn, bias taken off, to be altered and integrated again.
+/// The rates of a turn, bias taken off, of which something else may be made.
 #[derive(Clone, Debug)]
 pub struct TurnSamples {
     /// Rates, rad/s, and how long each is held, s.
@@ -189,16 +190,14 @@ impl TurnSamples {
         Ok(Self { samples: measured.iter().enumerate().map(sample).collect() })
     }
 
-    /// The largest component of any rate, rad/s.
-    pub fn largest(&self) -> f64 {
-        self.samples.iter().map(|(rate, _)| rate.amax()).fold(0.0, f64::max)
+    /// Whether any rate is not zero.
+    pub fn moves(&self) -> bool {
+        self.samples.iter().any(|(rate, _)| rate.amax() > 0.0)
     }
 
-    /// The turn, were its rates what `altered` makes of them.
-    pub fn altered(&self, turn: &TurnData, altered: impl Fn(Vector3<f64>) -> Vector3<f64>) -> TurnData {
-        let samples = self.samples.iter().map(|(rate, held)| (altered(*rate), *held));
-        let (blocks, durations) = compression::blocks(samples, BLOCK, |_| ());
-        TurnData { blocks, durations, rows: turn.rows.clone(), ..*turn }
+    /// How each block changes where rates w become w + ε f(w_j) e_j, to first order in ε, by function and axis j.
+    pub fn changes<const N: usize>(&self, of: [fn(f64) -> f64; N]) -> Vec<[BlockChange; N]> {
+        self.samples.chunks(usize::from(BLOCK)).map(|samples| BlockChange::of(samples, of)).collect()
     }
 }
 

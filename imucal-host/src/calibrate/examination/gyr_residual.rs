@@ -1,36 +1,40 @@
 //! What the residual of a gyroscope's turns could follow: columns for [`crate::calibrate::fit::score_test`].
 //!
 //! ```text
-//! w' = w + ε e_j f(w),   f = w_j³, w_j², |w_j|, 1
-//! z  = (r(w') − r(w)) / ε
+//! w' = w + ε f(w_j) e_j,   f(w) = w³, w², |w|, 1
+//! z  = ∂r(w')/∂ε = [Cᵀ u_before]× Cᵀ Σ M_k ∂φ_k/∂ε
 //! ```
 //!
-//! Each turn is integrated again with rates that differ a little: soft saturation is a cubic term, vibration and
-//! asymmetry are even ones, and a bias that differs in motion from that at rest is the last. Gains that follow a course
-//! take the model's own derivatives times the course. Source: ours, from models.md 3. Not tested: g-sensitivity, which
-//! turns between rests hardly show.
+//! | symbol | meaning |
+//! | --- | --- |
+//! | r, C, u_before | residual and attitude of a turn, and the direction before it ([`imucal_core::model::turn`]) |
+//! | φ_k, M_k | rotation vector of a block, and how its change turns the attitude ([`Carrier::carry_with_derivative`]) |
+//!
+//! Soft saturation is a cubic term, vibration and asymmetry are even ones, and a bias that differs in motion from that at
+//! rest is the last. Gains that follow a course take the model's own derivatives times the course. Source: ours, from
+//! models.md 3. Not tested: g-sensitivity, which turns between rests hardly show.
 
 use imucal_core::{
-    model::{parameterisation::FULL_GAIN, turn::TurnModel},
-    observation::Turn,
+    model::{
+        parameterisation::FULL_GAIN,
+        turn::{Carrier, TurnModel},
+    },
+    triad::Triad,
 };
-use nalgebra::{DMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, Matrix3, SVector, Vector3};
 use rayon::prelude::*;
 
 use super::{norm_residual::Columns, residual_driver::Course};
 use crate::{
     calibrate::{
-        fit::rows::{Residuals, Rows},
+        fit::{parallel_turns::ParallelTurns, rows::Rows},
         outcome::KnownTurn,
         suspicion::Follows,
     },
-    observe::turn::{Rates, TurnData, TurnSamples},
+    observe::turn::{Rates, TurnSamples},
 };
 
-/// Rates are altered by this share of the largest.
-const SHARE: f64 = 1e-3;
-
-/// How a rate is altered, and what a residual with it follows.
+/// A function of a rate, and what a residual with it follows.
 type Alteration = (&'static str, fn(f64) -> f64);
 
 /// Name of the columns of a bias that is another in motion.
@@ -44,53 +48,48 @@ const ALTERATIONS: [Alteration; 4] = [
     (MOTION, |_| 1.0),
 ];
 
-fn known<'a>(turns: &'a [KnownTurn], data: &'a [TurnData]) -> Vec<Turn<'a, f64>> {
-    turns.iter().zip(data).map(|(turn, data)| data.between(turn.before, turn.after)).collect()
-}
-
 /// Residuals and derivatives of the turns by the gain's nine entries.
 pub fn rows(turns: &[KnownTurn], theta: &SVector<f64, 9>) -> Rows<9> {
-    let data: Vec<TurnData> = turns.iter().map(|turn| turn.data.clone()).collect();
-    Rows::of(&TurnModel { turns: &known(turns, &data), form: FULL_GAIN }, theta)
+    let known: Vec<_> = turns.iter().map(|turn| turn.data.between(turn.before, turn.after)).collect();
+    Rows::of(&ParallelTurns(TurnModel { turns: &known, form: FULL_GAIN }), theta)
 }
 
-/// Residuals with altered rates, less those without, by the alteration's size; `None` where nothing moves. `most` is the largest rate
-/// of any turn, rad/s.
-fn column(
-    turns: &[KnownTurn],
-    samples: &[TurnSamples],
-    (theta, as_is): (&SVector<f64, 9>, &[f64]),
-    most: f64,
-    (axis, of): (usize, fn(f64) -> f64),
-) -> Option<Vec<f64>> {
-    let size = SHARE * most / of(most);
-    let altered = |mut rate: Vector3<f64>| {
-        rate[axis] += size * of(rate[axis]);
-        rate
-    };
-    let again = |(turn, samples): (&KnownTurn, &TurnSamples)| {
-        samples.altered(&turn.data, altered).stretched(&turn.stretch)
-    };
-    let data: Vec<TurnData> = turns.iter().zip(samples).map(again).collect();
-    let altered = Residuals::of(&TurnModel { turns: &known(turns, &data), form: FULL_GAIN }, theta);
-    (size > 0.0).then(|| altered.iter().zip(as_is).map(|(a, b)| (a - b) / size).collect())
+/// How a turn's residual changes with its rates, of each function a column for each axis.
+fn changes(
+    turn: &KnownTurn,
+    samples: &TurnSamples,
+    gain: &Matrix3<f64>,
+) -> [Matrix3<f64>; ALTERATIONS.len()] {
+    let carrier = |gain| Carrier::new(&Triad { gain, bias: Vector3::zeros() });
+    // Changes are those of rates that were not stretched.
+    let (integrated, changed) = (carrier(*gain), carrier(gain * turn.stretch));
+    let known = turn.data.between(turn.before, turn.after);
+    let mut c = Matrix3::identity();
+    let mut turned = [Matrix3::zeros(); ALTERATIONS.len()];
+    let changes = samples.changes(ALTERATIONS.map(|(_, of)| of));
+    for (index, (block, changes)) in known.blocks.iter().zip(&changes).enumerate() {
+        let m = integrated.carry_with_derivative(&mut c, block, known.durations.get(index));
+        for (turned, change) in turned.iter_mut().zip(changes) {
+            let by_axis = [0, 1, 2].map(|axis| changed.vector(&change.by(axis), 0.0));
+            *turned += m * Matrix3::from_columns(&by_axis);
+        }
+    }
+    let residual = c.tr_mul(&turn.before).cross_matrix() * c.transpose();
+    turned.map(|turned| residual * turned)
 }
 
 /// The columns of rates that are altered.
-fn altered(
-    turns: &[KnownTurn],
-    samples: &[TurnSamples],
-    (theta, rows): (&SVector<f64, 9>, &Rows<9>),
-) -> Vec<Columns> {
-    let count = rows.residuals.len();
-    let most = samples.iter().map(TurnSamples::largest).fold(0.0, f64::max);
-    let altered = ALTERATIONS.par_iter().filter_map(|(name, of)| {
-        let of_axis = |axis| column(turns, samples, (theta, &rows.residuals), most, (axis, *of));
-        let axes: Vec<_> = (0..3).into_par_iter().map(of_axis).collect::<Option<_>>()?;
-        let values = DMatrix::from_fn(count, 3, |row, axis| axes[axis][row]);
-        Some(Columns { follows: Follows::Rate, name: (*name).into(), values })
-    });
-    altered.collect()
+fn altered(turns: &[KnownTurn], samples: &[TurnSamples], theta: &SVector<f64, 9>) -> Vec<Columns> {
+    let gain = FULL_GAIN.triad(theta).gain;
+    let changes: Vec<_> =
+        turns.par_iter().zip(samples).map(|(turn, samples)| changes(turn, samples, &gain)).collect();
+    let moved = samples.iter().any(TurnSamples::moves);
+    let of_name = |(k, (name, _)): (usize, &Alteration)| Columns {
+        follows: Follows::Rate,
+        name: (*name).into(),
+        values: DMatrix::from_fn(3 * turns.len(), 3, |row, axis| changes[row / 3][k][(row % 3, axis)]),
+    };
+    ALTERATIONS.iter().enumerate().filter(|_| moved).map(of_name).collect()
 }
 
 /// All columns to test, three an axis, of courses over the turns.
@@ -105,7 +104,7 @@ pub fn columns(
     let samples: Result<Vec<_>, _> =
         turns.par_iter().map(|turn| TurnSamples::of(rates, &turn.data)).collect();
     // Turns that were integrated once can be again.
-    let mut all = samples.map_or_else(|_| Vec::new(), |samples| altered(turns, &samples, (theta, rows)));
+    let mut all = samples.map_or_else(|_| Vec::new(), |samples| altered(turns, &samples, theta));
     all.extend(courses.iter().map(|course| Columns {
         follows: course.follows,
         name: format!("{}, as a gain makes it that changes", course.name),

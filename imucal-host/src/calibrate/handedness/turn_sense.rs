@@ -69,26 +69,44 @@ pub fn of(recording: &Recording, rests: &[Range<usize>], acc: &Triad<f64>, facto
     let (data, ends) = turns(recording, rests, acc)?;
     let turns: Vec<Turn<'_, f64>> =
         data.iter().zip(&ends).map(|(turn, [before, after])| turn.between(*before, *after)).collect();
-    if let Some(code) = carried(&turns, 1.0) {
+    if let Some(code) = carried(&turns) {
         return Some(Sense { code, factor: 1.0 });
     }
     let factors = FACTORS.iter().filter(|_| factors).flat_map(|(factor, _)| [*factor, factor.recip()]);
-    let errors = factors.map(|factor| (error(&turns, &(Matrix3::identity() * factor)), factor));
+    let errors = factors.map(|factor| (error(&turns, factor), factor));
     let (least, factor) = errors.min_by(|a, b| a.0.total_cmp(&b.0))?;
     (least < NEAR).then_some(Sense { code: 0, factor })
 }
 
-/// The order of the axes that carries gravity at a factor, if any does.
-fn carried(turns: &[Turn<'_, f64>], factor: f64) -> Option<usize> {
-    let error = |code: &usize| {
-        let p = axis_swap::signed_permutation(*code).unwrap_or_else(Matrix3::identity);
-        (error(turns, &(p * factor)), *code)
-    };
-    let errors: Vec<(f64, usize)> = (0..axis_swap::CODES).into_par_iter().map(|code| error(&code)).collect();
+/// The order of the axes that carries gravity, if any does.
+fn carried(turns: &[Turn<'_, f64>]) -> Option<usize> {
+    let attitudes = [1.0, -1.0].map(|factor| attitudes(turns, factor));
+    let errors: Vec<(f64, usize)> =
+        (0..axis_swap::CODES).filter_map(|code| Some((error_of(turns, &attitudes, code)?, code))).collect();
     let least = errors.iter().map(|(error, _)| *error).fold(f64::INFINITY, f64::min);
     let alike = errors.into_iter().filter(|(error, _)| *error <= ALIKE * least);
     let simplest = alike.map(|(_, code)| code).min_by_key(|code| changes(*code));
     simplest.filter(|_| least < NEAR)
+}
+
+/// Median error of the directions that rates in an order of the axes carry, rad; from the attitudes after the turns as
+/// they are, and with their rates reversed.
+///
+/// P is a rotation Q or its reverse, and `exp([Q φ]×) = Q exp([φ]×) Qᵀ`: no order has to be integrated by itself.
+fn error_of(turns: &[Turn<'_, f64>], attitudes: &[Vec<Matrix3<f64>>; 2], code: usize) -> Option<f64> {
+    let p = axis_swap::signed_permutation(code)?;
+    let sense = p.determinant();
+    let (q, attitudes) = (p * sense, &attitudes[usize::from(sense < 0.0)]);
+    let chord = |(t, c): (&Turn<'_, f64>, &Matrix3<f64>)| {
+        (c.tr_mul(&q.tr_mul(&t.before)) - q.tr_mul(&t.after)).norm()
+    };
+    median(turns.iter().zip(attitudes).map(chord).collect())
+}
+
+/// Attitudes after turns whose rates are multiplied by a factor.
+fn attitudes(turns: &[Turn<'_, f64>], factor: f64) -> Vec<Matrix3<f64>> {
+    let triad = Triad { gain: Matrix3::identity() * factor, bias: Vector3::zeros() };
+    turns.par_iter().map(|t| turn::attitude(&triad, t)).collect()
 }
 
 /// How much a code changes: axes out of place, then signs.
@@ -98,10 +116,10 @@ fn changes(code: usize) -> (u32, u32) {
     (moved, (code % 8).count_ones())
 }
 
-/// Median error of the carried directions, rad.
-fn error(turns: &[Turn<'_, f64>], gain: &Matrix3<f64>) -> f64 {
-    let triad = Triad { gain: *gain, bias: Vector3::zeros() };
-    let chords = turns.iter().map(|t| (turn::attitude(&triad, t).tr_mul(&t.before) - t.after).norm());
+/// Median error of the directions that rates carry, multiplied by a factor, rad.
+fn error(turns: &[Turn<'_, f64>], factor: f64) -> f64 {
+    let chord = |(t, c): (&Turn<'_, f64>, Matrix3<f64>)| (c.tr_mul(&t.before) - t.after).norm();
+    let chords = turns.iter().zip(attitudes(turns, factor)).map(chord);
     median(chords.collect()).unwrap_or(f64::INFINITY)
 }
 
@@ -147,4 +165,34 @@ fn mean(values: &[Vector3<f64>], rows: &Range<usize>) -> Vector3<f64> {
     let (sum, count) =
         measured.fold((Vector3::zeros(), 0.0), |(sum, count), value| (sum + value, count + 1.0));
     sum / count
+}
+
+#[cfg(test)]
+mod tests {
+    use imucal_core::observation::{Block, Durations};
+
+    use super::*;
+
+    #[test]
+    fn orders_of_the_axes_carry_directions_as_if_each_was_integrated() {
+        let vector = |k: usize| Vector3::new((k as f64).sin(), (2.3 * k as f64).cos(), 0.4 * (k % 3) as f64);
+        let blocks: Vec<_> = (0..40)
+            .map(|k| Block { s0: vector(k) * 0.1, s1: vector(k + 1), c: vector(k + 2) * 0.02 })
+            .collect();
+        let turn = |k: usize| Turn {
+            blocks: &blocks[k..k + 20],
+            durations: Durations::Each(&[0.05; 20]),
+            before: vector(k + 3).normalize(),
+            after: vector(k + 4).normalize(),
+        };
+        let turns: Vec<_> = (0..7).map(turn).collect();
+        let both = [1.0, -1.0].map(|factor| attitudes(&turns, factor));
+        for code in 0..axis_swap::CODES {
+            let triad = Triad { gain: axis_swap::signed_permutation(code).unwrap(), bias: Vector3::zeros() };
+            let chord = |t: &Turn<'_, f64>| (turn::attitude(&triad, t).tr_mul(&t.before) - t.after).norm();
+            let expected = median(turns.iter().map(chord).collect()).unwrap();
+            let found = error_of(&turns, &both, code).unwrap();
+            assert!((found - expected).abs() < 1e-12, "{code}: {found} {expected}");
+        }
+    }
 }
