@@ -211,10 +211,10 @@ impl Steadiness {
         };
         let mut norms: Vec<f64> =
             triple.values.iter().step_by(step).map(norm).filter(|norm| norm.is_finite()).collect();
-        norms.sort_unstable_by(f64::total_cmp);
         let last = norms.len().checked_sub(1).filter(|last| *last >= 9)?;
-        let median = norms[last / 2];
-        Some(Self { median, spread: (norms[last - last / 10] - norms[last / 10]) / median })
+        let mut at = |rank: usize| *norms.select_nth_unstable_by(rank, f64::total_cmp).1;
+        let [low, median, high] = [last / 10, last / 2, last - last / 10].map(&mut at);
+        Some(Self { median, spread: (high - low) / median })
     }
 }
 
