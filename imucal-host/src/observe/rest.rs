@@ -207,7 +207,8 @@ fn without_turning(quiet: Vec<bool>, rate: &[Vector3<f64>]) -> Vec<bool> {
     let bias = Vector3::from_fn(|axis, _| of_axis(&|w| w[axis]).unwrap_or(0.0));
     let spread = of_axis(&|w| (w - bias).norm()).unwrap_or(0.0) / MEDIAN_SIZE;
     let limit = (TURNING * spread).clamp(TURNING_LIMITS.0, TURNING_LIMITS.1);
-    quiet.iter().zip(rate).map(|(still, w)| *still && (w - bias).norm() <= limit).collect()
+    let limit = limit * limit;
+    quiet.iter().zip(rate).map(|(still, w)| *still && (w - bias).norm_squared() <= limit).collect()
 }
 
 /// Variance of the initial rest, or of the quietest tenth where the recording does not begin at rest.
