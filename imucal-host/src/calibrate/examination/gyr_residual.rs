@@ -112,3 +112,45 @@ pub fn columns(
     }));
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observe::turn::{BiasPath, compress};
+
+    #[test]
+    fn columns_are_how_residuals_differ_where_rates_do() {
+        let time: Vec<f64> = (0..120).map(|k| 0.01 * f64::from(k)).collect();
+        let rate = |t: &f64| Vector3::new((5.0 * t).sin(), 0.8 * (3.0 * t).cos(), 0.6 - t);
+        let values: Vec<_> = time.iter().map(rate).collect();
+        let stretch = Matrix3::new(1.02, 0.01, 0.0, -0.01, 0.98, 0.02, 0.0, 0.01, 1.01);
+        let path = BiasPath { before: (0.1, Vector3::zeros()), after: (1.1, Vector3::zeros()) };
+        let usable = vec![true; time.len()];
+        let rests = (0, &(0..20), 1, &(100..120));
+        let turn = |values: &[Vector3<f64>]| {
+            let rates = Rates { time: &time, values, usable: &usable, interval: 0.01 };
+            let data = compress(rates, rests, &path).unwrap().stretched(&stretch);
+            KnownTurn { data, before: Vector3::new(0.6, 0.0, 0.8), after: Vector3::z(), stretch }
+        };
+        let gain = Matrix3::new(1.03, 0.02, -0.01, 0.01, 0.97, 0.03, 0.0, -0.02, 1.01);
+        let theta = FULL_GAIN.theta(&Triad { gain, bias: Vector3::zeros() });
+        let turns = [turn(&values)];
+        let rates = Rates { time: &time, values: &values, usable: &usable, interval: 0.01 };
+        let found = columns(&turns, rates, &theta, &rows(&turns, &theta), &[]);
+        for (columns, (name, f)) in found.iter().zip(ALTERATIONS) {
+            for axis in 0..3 {
+                let residuals = |size: f64| {
+                    let altered: Vec<_> =
+                        values.iter().map(|w| w + Vector3::ith(axis, size * f(w[axis]))).collect();
+                    rows(&[turn(&altered)], &theta).residuals
+                };
+                let (above, below) = (residuals(1e-4), residuals(-1e-4));
+                for (row, (above, below)) in above.iter().zip(&below).enumerate() {
+                    let error = (above - below) / 2e-4 - columns.values[(row, axis)];
+                    assert!(error.abs() < 1e-7, "{name}, axis {axis}: {error}");
+                }
+            }
+        }
+        assert_eq!(found.len(), ALTERATIONS.len());
+    }
+}
