@@ -15,7 +15,8 @@ pub struct Cloud {
 /// The usable samples, without those that only repeat the one before: a sensor slower than the recording would
 /// otherwise count each of its samples several times.
 pub fn cloud(values: &[Vector3<f64>], usable: &[bool]) -> Cloud {
-    let mut cloud = Cloud::default();
+    let mut cloud =
+        Cloud { points: Vec::with_capacity(values.len()), rows: Vec::with_capacity(values.len()) };
     for (row, (value, good)) in values.iter().zip(usable).enumerate() {
         let repeats = cloud.points.last().is_some_and(|last| last.value == *value);
         if *good && !repeats {

@@ -17,15 +17,15 @@ use imucal_core::{
         norm::NormModel,
         parameterisation::{DIAGONAL, FULL_GAIN, UPPER_TRIANGULAR},
     },
-    observation::ShellPoint,
     triad::Triad,
 };
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::{
-    gyr_residual, norm_residual,
-    norm_residual::Columns,
+    cloud_score, gyr_residual,
+    gyr_residual::Columns,
+    norm_residual::{Shell, terms},
     residual_driver::Course,
     tested::{Tested, judged},
     turning_rest::Turning,
@@ -54,13 +54,6 @@ pub const CHANCE: f64 = 5e-4;
 pub const CHANCE_OF_EXCESS: f64 = 5e-3;
 /// Standard errors by which an entry moves where it matters.
 pub const MATERIAL: f64 = 2.5;
-/// Blocks that a cloud is cut into: few where its noise is alike for long, many where turns change what it does.
-const BLOCKS: [usize; 2] = [30, 100];
-/// Share of a cloud's squared residual below which nothing is said: of so many points any slow noise passes a test, and
-/// what follows time is slow; what follows direction comes back with it.
-fn least_explained(follows: Follows) -> f64 {
-    if follows == Follows::Direction { 0.015 } else { 0.04 }
-}
 /// Standard errors of the bias by which it may differ in motion from that at rest.
 const BIAS_ERRORS: f64 = 3.0;
 /// Variance between rests over that within them, as 1/f noise has it over a hundred rests' time: log₂ of that is 7.
@@ -162,11 +155,8 @@ impl Scene<'_> {
     }
 
     fn courses(&self, rows: &[usize]) -> Vec<Course> {
-        let times: Vec<f64> = rows.iter().map(|row| self.recording.time[*row]).collect();
-        let temperature = self.recording.temperature.as_deref();
-        let temperatures: Vec<f64> =
-            rows.iter().map(|row| temperature.map_or(f64::NAN, |t| t[*row])).collect();
-        Course::all(&times, &temperatures)
+        let at = |values: &[f64]| rows.iter().map(|row| values[*row]).collect::<Vec<f64>>();
+        Course::all(at(&self.recording.time), self.recording.temperature.as_deref().map(at))
     }
 
     fn of_norm<const P: usize>(
@@ -175,53 +165,44 @@ impl Scene<'_> {
         shell: &Shell<'_>,
         form: Parameterisation<P>,
     ) -> Vec<Suspicion> {
-        let model = NormModel { points: shell.points, norm: shell.norm, form };
-        let all: Vec<usize> = (0..P).collect();
-        let fitted = || {
-            let rows = Rows::of(&model, &form.theta(shell.triad));
-            let count = rows.residuals.len();
-            // The residual has nothing of the terms of temperature left, and their freedom is gone.
-            let independent = count.saturating_sub(shell.warm);
-            let test = ScoreTest::new(&rows.residuals, rows.derivatives(count, &all), independent)?;
-            Some((test, rows.residuals))
+        let (tests, further) = match kind {
+            SensorKind::Mag => (cloud_score::tested(shell, form, &self.courses(shell.places)), [None, None]),
+            _ => self.of_rests(shell, form).unwrap_or_default(),
         };
-        let at: Vec<usize> = match kind {
-            SensorKind::Mag => shell.places.to_vec(),
-            _ => shell.places.iter().map(|rest| self.middle(*rest)).collect(),
-        };
-        let followed = || {
-            let direction = |p: &ShellPoint<f64>| shell.triad.correct(&p.value).normalize();
-            (shell.points.iter().map(direction).collect::<Vec<_>>(), self.courses(&at))
-        };
-        let (Some((test, residuals)), (directions, courses)) = rayon::join(fitted, followed) else {
-            return Vec::new();
-        };
-        let count = residuals.len();
-        let mut tests: Vec<Tested> = norm_residual::columns(&directions, &courses, kind == SensorKind::Acc)
-            .par_iter()
-            .filter_map(|make| {
-                let columns = make();
-                let score = match kind {
-                    SensorKind::Mag => {
-                        test.test_in_blocks(&columns.values, &BLOCKS, least_explained(columns.follows))
-                    }
-                    _ => test.test(&columns.values, columns.values.ncols()),
-                };
-                Some(Tested::of(&columns, score?))
-            })
-            .collect();
-        let (mut excess, mut turning) = (None, None);
-        if kind == SensorKind::Acc {
-            tests.extend(
-                self.single(&test, 1, count, &|k| format!("the rest at {:.0} s", self.recording.time[at[k]])),
-            );
-            excess = self.excess_of_rests(shell, &directions, &residuals, P + shell.warm);
-            turning =
-                self.turning(shell.norm).and_then(|t| t.of_accelerometer(shell.std.gain.diagonal().min()));
-        }
         let std: Vec<f64> =
             form.entries().iter().map(|entry| entry_of(&shell.std.gain, &shell.std.bias, *entry)).collect();
-        judged(tests, form.entries(), &std).into_iter().chain(excess).chain(turning).collect()
+        judged(tests, form.entries(), &std).into_iter().chain(further.into_iter().flatten()).collect()
+    }
+
+    /// Score tests of an accelerometer's rests, and what else speaks against them.
+    fn of_rests<const P: usize>(
+        &self,
+        shell: &Shell<'_>,
+        form: Parameterisation<P>,
+    ) -> Option<(Vec<Tested>, [Option<Suspicion>; 2])> {
+        let model = NormModel { points: shell.points, norm: shell.norm, form };
+        let all: Vec<usize> = (0..P).collect();
+        let rows = Rows::of(&model, &form.theta(shell.triad));
+        let count = rows.residuals.len();
+        // The residual has nothing of the terms of temperature left, and their freedom is gone.
+        let independent = count.saturating_sub(shell.warm);
+        let test = ScoreTest::new(&rows.residuals, rows.derivatives(count, &all), independent)?;
+        let at: Vec<usize> = shell.places.iter().map(|rest| self.middle(*rest)).collect();
+        let (directions, courses) = (shell.directions(shell.points), self.courses(&at));
+        let mut tests: Vec<Tested> = terms(count, &courses, true)
+            .into_par_iter()
+            .filter_map(|term| {
+                let columns = term.columns(0, &directions);
+                let score = test.test(&columns, columns.ncols())?;
+                Some(Tested { follows: term.follows, name: term.name, score })
+            })
+            .collect();
+        let name = |rest: usize| format!("the rest at {:.0} s", self.recording.time[at[rest]]);
+        tests.extend(self.single(&test, 1, count, &name));
+        let excess = self.excess_of_rests(shell, &directions, &rows.residuals, P + shell.warm);
+        let turning =
+            self.turning(shell.norm).and_then(|t| t.of_accelerometer(shell.std.gain.diagonal().min()));
+        Some((tests, [excess, turning]))
     }
 
     /// Each observation of so many residuals against all others.
@@ -392,17 +373,6 @@ impl Scene<'_> {
     fn duration(&self, rows: &Range<usize>) -> f64 {
         self.recording.time[rows.end - 1] - self.recording.time[rows.start]
     }
-}
-
-/// A norm fit as its evidence keeps it.
-struct Shell<'a> {
-    points: &'a [ShellPoint<f64>],
-    places: &'a [usize],
-    norm: f64,
-    triad: &'a Triad<f64>,
-    std: &'a Triad<f64>,
-    /// Parameters of temperature that were estimated with it.
-    warm: usize,
 }
 
 fn entry_of(gain: &Matrix3<f64>, bias: &Vector3<f64>, entry: u8) -> f64 {

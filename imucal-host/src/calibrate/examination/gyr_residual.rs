@@ -24,7 +24,7 @@ use imucal_core::{
 use nalgebra::{DMatrix, Matrix3, SVector, Vector3};
 use rayon::prelude::*;
 
-use super::{norm_residual::Columns, residual_driver::Course};
+use super::residual_driver::Course;
 use crate::{
     calibrate::{
         fit::{parallel_turns::ParallelTurns, rows::Rows},
@@ -33,6 +33,17 @@ use crate::{
     },
     observe::turn::{Rates, TurnSamples},
 };
+
+/// Columns of one test.
+#[derive(Clone, Debug)]
+pub struct Columns {
+    /// What a residual with them follows.
+    pub follows: Follows,
+    /// In words, after "follows".
+    pub name: String,
+    /// A row a residual.
+    pub values: DMatrix<f64>,
+}
 
 /// A function of a rate, and what a residual with it follows.
 type Alteration = (&'static str, fn(f64) -> f64);
@@ -108,7 +119,7 @@ pub fn columns(
     all.extend(courses.iter().map(|course| Columns {
         follows: course.follows,
         name: format!("{}, as a gain makes it that changes", course.name),
-        values: DMatrix::from_fn(count, 3, |row, axis| rows.jacobian[row][4 * axis] * course.values[row / 3]),
+        values: DMatrix::from_fn(count, 3, |row, axis| rows.jacobian[row][4 * axis] * course.value(row / 3)),
     }));
     all
 }

@@ -7,6 +7,7 @@
 //! Statistics: Rao's score test of the residual against time, temperature, direction, rate and neighbours, with the number
 //! of tests counted; a suspicion that changes no parameter by much is left out.
 
+mod cloud_score;
 pub mod examine;
 pub mod gyr_residual;
 pub mod norm_residual;

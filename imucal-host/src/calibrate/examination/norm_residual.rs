@@ -11,6 +11,7 @@
 //! and all spherical harmonics of degree 3 and 4 where there are observations enough; those of degree 0 to 2 are gain
 //! and bias. Source: ours, from the norm form. Not tested: what a norm is blind to, that is any rotation.
 
+use imucal_core::{observation::ShellPoint, triad::Triad};
 use nalgebra::{DMatrix, Vector3};
 
 use super::residual_driver::Course;
@@ -19,89 +20,133 @@ use crate::calibrate::suspicion::Follows;
 /// Harmonics of a degree are tested where so many observations stand for each.
 const EACH: usize = 5;
 
-/// Columns of one test.
+/// A norm fit as its evidence keeps it.
+pub(super) struct Shell<'a> {
+    pub points: &'a [ShellPoint<f64>],
+    pub places: &'a [usize],
+    pub norm: f64,
+    pub triad: &'a Triad<f64>,
+    pub std: &'a Triad<f64>,
+    /// Parameters of temperature that were estimated with it.
+    pub warm: usize,
+}
+
+impl Shell<'_> {
+    /// Calibrated directions of some points.
+    pub fn directions(&self, points: &[ShellPoint<f64>]) -> Vec<Vector3<f64>> {
+        points.iter().map(|point| self.triad.correct(&point.value).normalize()).collect()
+    }
+}
+
+/// What a residual does with its direction; see the module's equation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// δ = e_j u_j³.
+    Cubic,
+    /// δ = e_j u_j².
+    Quadratic,
+    /// δ = e_j |u_j|.
+    BySign,
+    /// δ = e_j u'_j.
+    Hysteresis,
+    /// Harmonics of degree 3.
+    Third,
+    /// Harmonics of degree 4.
+    Fourth,
+    /// δ = e_j.
+    Bias,
+    /// δ = e_j u_j.
+    Gain,
+}
+
+impl Shape {
+    /// A row a direction, in the order of time.
+    pub fn columns(self, directions: &[Vector3<f64>]) -> DMatrix<f64> {
+        match self {
+            Self::Cubic => by_axis(directions, |u| u * u * u * u),
+            Self::Quadratic => by_axis(directions, |u| u * u * u),
+            Self::BySign => by_axis(directions, |u| u * u.abs()),
+            Self::Hysteresis => DMatrix::from_fn(directions.len(), 3, |row, axis| {
+                directions[row][axis] * directions[row.saturating_sub(1)][axis]
+            }),
+            Self::Third => harmonics(directions, third),
+            Self::Fourth => harmonics(directions, fourth),
+            Self::Bias => by_axis(directions, |u| u),
+            Self::Gain => by_axis(directions, |u| u * u),
+        }
+    }
+}
+
+/// One test: a shape, and the course that it is multiplied with.
 #[derive(Clone, Debug)]
-pub struct Columns {
-    /// What a residual with them follows.
+pub struct Term<'a> {
+    /// What a residual with it follows.
     pub follows: Follows,
     /// In words, after "follows".
     pub name: String,
-    /// A row an observation.
-    pub values: DMatrix<f64>,
+    /// What it does with the direction.
+    pub shape: Shape,
+    /// What it does with the observation.
+    pub course: Option<&'a Course>,
 }
 
-/// The columns of one test, made when they are wanted: of a long cloud all together would fill the memory.
-pub type Maker<'a> = Box<dyn Fn() -> Columns + Sync + Send + 'a>;
+impl Term<'_> {
+    /// Its columns at observations that follow each other, the first of them `first`.
+    pub fn columns(&self, first: usize, directions: &[Vector3<f64>]) -> DMatrix<f64> {
+        let mut columns = self.shape.columns(directions);
+        if let Some(course) = self.course {
+            for (row, mut values) in columns.row_iter_mut().enumerate() {
+                values *= course.value(first + row);
+            }
+        }
+        columns
+    }
+}
 
-/// All columns to test, of calibrated directions in the order of the courses.
-/// With `memory` the direction before is tested as well.
-pub fn columns<'a>(directions: &'a [Vector3<f64>], courses: &'a [Course], memory: bool) -> Vec<Maker<'a>> {
+/// All terms to test of so many observations. With `memory` the direction before is tested as well.
+pub fn terms(observations: usize, courses: &[Course], memory: bool) -> Vec<Term<'_>> {
+    let of_direction = |shape: Shape, name: &str| {
+        let name = name.to_owned();
+        Term { follows: Follows::Direction, name, shape, course: None }
+    };
     let mut all = vec![
-        of_direction(directions, "direction, as cubic terms make it", |u| u * u * u * u),
-        of_direction(directions, "direction, as quadratic terms make it", |u| u * u * u),
-        of_direction(directions, "direction, as gains make it that differ by sign", |u| u * u.abs()),
+        of_direction(Shape::Cubic, "direction, as cubic terms make it"),
+        of_direction(Shape::Quadratic, "direction, as quadratic terms make it"),
+        of_direction(Shape::BySign, "direction, as gains make it that differ by sign"),
     ];
     if memory {
-        all.push(Box::new(|| Columns {
-            follows: Follows::Direction,
-            name: "the direction before, as hysteresis makes it".into(),
-            values: DMatrix::from_fn(directions.len(), 3, |row, axis| {
-                directions[row][axis] * directions[row.saturating_sub(1)][axis]
-            }),
-        }));
+        all.push(of_direction(Shape::Hysteresis, "the direction before, as hysteresis makes it"));
     }
-    all.extend(harmonics(directions, third));
-    all.extend(harmonics(directions, fourth));
+    for (shape, degree) in [(Shape::Third, 3), (Shape::Fourth, 4)] {
+        // A degree has 2n + 1 harmonics, next to nine of gain and bias.
+        if observations >= EACH * (2 * degree + 1 + 9) {
+            all.push(of_direction(shape, &format!("direction, by harmonics of degree {degree}")));
+        }
+    }
     for course in courses {
-        all.push(of_course(directions, course, "bias", |value, u| u * value));
-        all.push(of_course(directions, course, "gain", |value, u| u * u * value));
+        for (shape, kind) in [(Shape::Bias, "bias"), (Shape::Gain, "gain")] {
+            let name = format!("{}, as a {kind} makes it that changes", course.name);
+            all.push(Term { follows: course.follows, name, shape, course: Some(course) });
+        }
     }
     all
 }
 
-fn of_direction<'a>(
-    directions: &'a [Vector3<f64>],
-    name: &'a str,
-    of: impl Fn(f64) -> f64 + Sync + Send + 'a,
-) -> Maker<'a> {
-    Box::new(move || Columns {
-        follows: Follows::Direction,
-        name: name.into(),
-        values: by_axis(directions, |_, u| of(u)),
-    })
-}
-
-fn of_course<'a>(
-    directions: &'a [Vector3<f64>],
-    course: &'a Course,
-    kind: &'a str,
-    of: impl Fn(f64, f64) -> f64 + Sync + Send + 'a,
-) -> Maker<'a> {
-    Box::new(move || Columns {
-        follows: course.follows,
-        name: format!("{}, as a {kind} makes it that changes", course.name),
-        values: by_axis(directions, |row, u| of(course.values[row], u)),
-    })
-}
-
-/// All harmonics of the degree that has so many, where there are observations enough.
 fn harmonics<const COUNT: usize>(
     directions: &[Vector3<f64>],
     of: fn(&Vector3<f64>) -> [f64; COUNT],
-) -> Option<Maker<'_>> {
-    let make = move || {
-        let values: Vec<[f64; COUNT]> = directions.iter().map(of).collect();
-        Columns {
-            follows: Follows::Direction,
-            name: format!("direction, by harmonics of degree {}", COUNT / 2),
-            values: DMatrix::from_fn(directions.len(), COUNT, |row, k| values[row][k]),
+) -> DMatrix<f64> {
+    let mut columns = DMatrix::zeros(directions.len(), COUNT);
+    for (row, direction) in directions.iter().enumerate() {
+        for (column, value) in of(direction).into_iter().enumerate() {
+            columns[(row, column)] = value;
         }
-    };
-    (directions.len() >= EACH * (COUNT + 9)).then(|| Box::new(make) as Maker<'_>)
+    }
+    columns
 }
 
-fn by_axis(directions: &[Vector3<f64>], of: impl Fn(usize, f64) -> f64) -> DMatrix<f64> {
-    DMatrix::from_fn(directions.len(), 3, |row, axis| of(row, directions[row][axis]))
+fn by_axis(directions: &[Vector3<f64>], of: impl Fn(f64) -> f64) -> DMatrix<f64> {
+    DMatrix::from_fn(directions.len(), 3, |row, axis| of(directions[row][axis]))
 }
 
 /// A basis of degree 3, with some of degree 1 in it.

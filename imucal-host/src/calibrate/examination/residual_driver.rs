@@ -1,9 +1,9 @@
 //! What a residual is tested against: a name, what it follows, and a shape over the observations.
 
-use crate::calibrate::suspicion::Follows;
-
-/// Parts of the recording at whose borders a step is looked for.
-const PARTS: usize = 8;
+use crate::calibrate::{
+    fit::blocked_score::{PARTS, step_begin},
+    suspicion::Follows,
+};
 
 /// A function of the observation with which a parameter could change.
 #[derive(Clone, Debug)]
@@ -12,30 +12,62 @@ pub struct Course {
     pub follows: Follows,
     /// In words, after "follows".
     pub name: String,
+    shape: Shape,
+}
+
+#[derive(Clone, Debug)]
+enum Shape {
     /// Its value at each observation, without the mean.
-    pub values: Vec<f64>,
+    Values(Vec<f64>),
+    Step(Step),
+}
+
+/// From 0 to 1 where a part of the observations begins, less the mean.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// The part, of [`PARTS`].
+    pub part: usize,
+    first: usize,
+    mean: f64,
 }
 
 impl Course {
-    fn new(follows: Follows, name: String, values: &[f64]) -> Option<Self> {
+    fn new(follows: Follows, name: String, mut values: Vec<f64>) -> Option<Self> {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
-        let values: Vec<f64> = values.iter().map(|v| v - mean).collect();
+        values.iter_mut().for_each(|value| *value -= mean);
         let most = values.iter().map(|v| v.abs()).fold(0.0, f64::max);
-        (most.is_finite() && most > 0.0).then_some(Self { follows, name, values })
+        (most.is_finite() && most > 0.0).then_some(Self { follows, name, shape: Shape::Values(values) })
     }
 
     /// Time, steps in time, and temperature where each observation has one.
-    pub fn all(times: &[f64], temperatures: &[f64]) -> Vec<Self> {
-        let mut courses = Vec::new();
-        courses.extend(Self::new(Follows::Time, "time".into(), times));
-        courses.extend(Self::new(Follows::Temperature, "temperature".into(), temperatures));
-        for part in 1..PARTS {
-            let first = part * times.len() / PARTS;
-            let Some(at) = times.get(first) else { continue };
-            let step: Vec<f64> = (0..times.len()).map(|k| f64::from(u8::from(k >= first))).collect();
-            courses.extend(Self::new(Follows::Time, format!("a step at {at:.0} s"), &step));
+    pub fn all(times: Vec<f64>, temperatures: Option<Vec<f64>>) -> Vec<Self> {
+        let steps: Vec<Self> = (1..PARTS).filter_map(|part| Self::step(&times, part)).collect();
+        let temperature = temperatures.and_then(|t| Self::new(Follows::Temperature, "temperature".into(), t));
+        Self::new(Follows::Time, "time".into(), times).into_iter().chain(temperature).chain(steps).collect()
+    }
+
+    fn step(times: &[f64], part: usize) -> Option<Self> {
+        let first = step_begin(part, times.len());
+        let at = times.get(first).filter(|_| first > 0)?;
+        let mean = (times.len() - first) as f64 / times.len() as f64;
+        let shape = Shape::Step(Step { part, first, mean });
+        Some(Self { follows: Follows::Time, name: format!("a step at {at:.0} s"), shape })
+    }
+
+    /// Its value at an observation, without the mean.
+    pub fn value(&self, observation: usize) -> f64 {
+        match &self.shape {
+            Shape::Values(values) => values[observation],
+            Shape::Step(step) => f64::from(u8::from(observation >= step.first)) - step.mean,
         }
-        courses
+    }
+
+    /// The step that it is, if it is one.
+    pub fn as_step(&self) -> Option<Step> {
+        match self.shape {
+            Shape::Values(_) => None,
+            Shape::Step(step) => Some(step),
+        }
     }
 }
 
@@ -44,13 +76,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_temperature_that_is_not_recorded_is_no_course() {
+    fn a_temperature_that_is_not_recorded_at_each_observation_is_no_course() {
         let times: Vec<f64> = (0..16).map(f64::from).collect();
-        let none = Course::all(&times, &[f64::NAN; 16]);
+        let none = Course::all(times.clone(), None);
         assert!(none.iter().all(|course| course.follows == Follows::Time));
         assert_eq!(none.len(), PARTS);
-        let warm = Course::all(&times, &times);
+        let warm = Course::all(times.clone(), Some(times));
         assert_eq!(warm.len(), PARTS + 1);
-        assert!(warm.iter().all(|course| course.values.iter().sum::<f64>().abs() < 1e-9));
+        assert!(warm.iter().all(|course| (0..16).map(|k| course.value(k)).sum::<f64>().abs() < 1e-9));
+        assert!(
+            Course::all(vec![0.0, 1.0], Some(vec![f64::NAN, 20.0]))
+                .iter()
+                .all(|c| c.follows == Follows::Time)
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     examine::{CHANCE, MATERIAL},
-    norm_residual::Columns,
+    gyr_residual::Columns,
 };
 use crate::calibrate::{
     fit::score_test::Score,

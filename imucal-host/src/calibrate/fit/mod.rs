@@ -18,12 +18,13 @@
 //! | [`rest_noise`], [`rest_covariance`], [`rest_bias`], [`shell_errors`] | errors of the observations |
 //! | [`alignment`], [`directions`] | the rotation between two triads, from directions that both see at rest |
 //! | [`lag`] | the latency of a reference |
-//! | [`score_test`] | Rao's score test of a residual against a covariate |
+//! | [`score_test`], [`blocked_score`] | Rao's score test of a residual against a covariate; of samples that are alike in time |
 //! | [`search`] | the particle swarm of the core |
 //! | [`compare`] | forms of a model by held-out residuals |
 
 pub mod alignment;
 pub mod autocorrelation;
+pub mod blocked_score;
 pub mod compare;
 pub mod directions;
 pub mod gyr_rig_fit;

@@ -14,6 +14,7 @@ use imucal_core::{
     triad::Triad,
 };
 use nalgebra::{SVector, Vector3};
+use rayon::prelude::*;
 
 use super::{
     held_out::{by_folds, by_steps, root_mean},
@@ -117,7 +118,7 @@ impl<const P: usize> NormProblem<'_, P> {
                     solver = self.solve(&points, *solver.theta());
                     used.iter().zip(&points).for_each(|(k, point)| all[*k] = *point);
                 }
-                let residuals = Residuals::of(&self.model(&points), solver.theta());
+                let residuals = self.residuals(&points, solver.theta());
                 ((solver, points), residuals)
             });
         let Kept { fit: (solver, points), used, left_out } = kept;
@@ -128,9 +129,9 @@ impl<const P: usize> NormProblem<'_, P> {
     fn expect_curvature(&self, points: &mut [ShellPoint<f64>], solver: &LevenbergMarquardt<f64, P>) {
         let triad = self.form.triad(solver.theta());
         let variance = solver.variance().unwrap_or(0.0);
-        for point in points {
+        points.par_iter_mut().with_min_len(PART).for_each(|point| {
             point.excess = curvature_excess(&triad, self.norm, &point.value, variance);
-        }
+        });
     }
 
     /// Rms residual of single observations left out of the fit in turn. Each time the fit takes one Gauss–Newton
@@ -145,6 +146,11 @@ impl<const P: usize> NormProblem<'_, P> {
             self.squared_sum(from_ref(&fit.points[k]), theta)
         });
         Some(root_mean(sum?, count))
+    }
+
+    fn residuals(&self, points: &[ShellPoint<f64>], theta: &SVector<f64, P>) -> Vec<f64> {
+        let of_part = |part: &[ShellPoint<f64>]| Residuals::of(&self.model(part), theta);
+        points.par_chunks(PART).map(of_part).collect::<Vec<_>>().concat()
     }
 
     fn squared_sum(&self, points: &[ShellPoint<f64>], theta: &SVector<f64, P>) -> f64 {

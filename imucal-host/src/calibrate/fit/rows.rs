@@ -89,12 +89,18 @@ pub(super) fn inverse(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let own = jacobian.rows(part.start, part.len());
         products += own.tr_mul(&own);
     }
+    inverse_of(&products)
+}
+
+/// The inverse of JᵀJ; `None` where J is not of full rank.
+pub(super) fn inverse_of(products: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let count = products.ncols();
     // Columns at unit length: parameters of different units would spoil the inverse.
     let length = products.diagonal().map(f64::sqrt);
     let scaled = |matrix: &DMatrix<f64>| {
         DMatrix::from_fn(count, count, |i, j| matrix[(i, j)] / (length[i] * length[j]))
     };
-    Some(scaled(&scaled(&products).try_inverse()?))
+    Some(scaled(&scaled(products).try_inverse()?))
 }
 
 impl<const P: usize> RowSink<f64, P> for Rows<P> {

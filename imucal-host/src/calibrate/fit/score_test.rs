@@ -12,10 +12,9 @@
 //! | F | Fisher–Snedecor (q, n − p − q) where those parameters are zero and the noise is white |
 //! | δ | by how much the p parameters would move if the q were estimated with them |
 //!
-//! The residual itself says how large the noise is, so that no noise is assumed. Samples that are alike in time are
-//! counted in blocks: the sums of `zᵢ rᵢ` over blocks, of the residual that is left, give their covariance (T²).
-//! Source: Rao 1948 (score test); Hotelling 1931; Liang & Zeger 1986 (blocks). Not modelled: noise that differs
-//! from observation to observation, and what the parameters do beyond first order.
+//! The residual itself says how large the noise is, so that no noise is assumed; samples that are alike in time are
+//! tested in [blocks](super::blocked_score). Source: Rao 1948. Not modelled: noise that differs from observation to
+//! observation, and what the parameters do beyond first order.
 
 use std::ops::Range;
 
@@ -32,12 +31,7 @@ const LEAST_LEFT: f64 = 1e-4;
 pub struct ScoreTest {
     residual: DVector<f64>,
     jacobian: DMatrix<f64>,
-    /// (JᵀJ)⁻¹.
-    inverse: DMatrix<f64>,
-    /// Jᵀr: at the optimum, what rounding leaves.
-    gradient: DVector<f64>,
-    /// Independent residuals less parameters.
-    freedom: f64,
+    optimum: Optimum,
 }
 
 /// What a test came to.
@@ -58,17 +52,20 @@ pub struct Score {
 impl ScoreTest {
     /// Of a fit with so many independent residuals; `None` where its derivatives are not of full rank.
     pub fn new(residuals: &[f64], jacobian: DMatrix<f64>, independent: usize) -> Option<Self> {
-        let freedom = independent as f64 - jacobian.ncols() as f64;
-        let inverse = inverse(&jacobian)?;
         let residual = DVector::from_column_slice(residuals);
-        let gradient = jacobian.tr_mul(&residual);
-        Some(Self { residual, jacobian, inverse, gradient, freedom })
+        let optimum = Optimum {
+            freedom: independent as f64 - jacobian.ncols() as f64,
+            inverse: inverse(&jacobian)?,
+            gradient: jacobian.tr_mul(&residual),
+            square: residual.norm_squared(),
+        };
+        Some(Self { residual, jacobian, optimum })
     }
 
     /// Tests columns of which `rank` are independent of each other, by the residual's own variance. `None` where the
     /// model has them already, or too few residuals are left.
     pub fn test(&self, columns: &DMatrix<f64>, rank: usize) -> Option<Score> {
-        self.judged(&self.regress(&self.products(columns))?, rank)
+        self.judged(&self.optimum.regress(&self.products(columns))?, rank)
     }
 
     /// Tests whether some residuals, which lie next to each other, follow nothing but themselves: a column for each.
@@ -79,85 +76,47 @@ impl ScoreTest {
             residual: self.residual.rows(from, count).into_owned(),
             model: self.jacobian.rows(from, count).transpose(),
         };
-        self.judged(&self.regress(&products)?, rank)
+        self.judged(&self.optimum.regress(&products)?, rank)
     }
 
     fn judged(&self, found: &Regression, rank: usize) -> Option<Score> {
-        let left = self.freedom - rank as f64;
+        let left = self.optimum.freedom - rank as f64;
         if left < 1.0 {
             return None;
         }
-        let score = self.score(found, left);
+        let score = self.optimum.score(found, left);
         let f = (score.explained / rank as f64) / ((1.0 - score.explained) / left);
         Some(Score { p: upper_tail(f, rank as f64, left)?, ..score })
     }
 
-    /// Tests columns of residuals that are alike in time, by what is left over in blocks of neighbours, as many as
-    /// each of `blocks` says: the largest probability counts. `None` as well where they explain no more than `least` of the
-    /// squared residual: of long recordings the blocks take most of the time.
-    pub fn test_in_blocks(&self, columns: &DMatrix<f64>, blocks: &[usize], least: f64) -> Option<Score> {
-        let found = self.regress(&self.products(columns)).filter(|found| found.explained > least)?;
-        let left = self.left(columns, &found);
-        let chances: Option<Vec<f64>> =
-            blocks.iter().map(|blocks| self.chance_in_blocks((columns, &left), &found, *blocks)).collect();
-        let p = chances?.into_iter().fold(0.0, f64::max);
-        Some(Score { p, ..self.score(&found, self.freedom - columns.ncols() as f64) })
-    }
-
-    /// Hotelling's T² of the whole sum of `zᵢ rᵢ`, by the covariance that the blocks' sums have once Z is estimated.
-    fn chance_in_blocks(
-        &self,
-        (columns, left): (&DMatrix<f64>, &DVector<f64>),
-        found: &Regression,
-        blocks: usize,
-    ) -> Option<f64> {
-        let (rows, q) = columns.shape();
-        let freedom = blocks as f64 - q as f64;
-        if freedom < 1.0 || rows < blocks {
-            return None;
-        }
-        let mut spread = DMatrix::zeros(q, q);
-        for block in 0..blocks {
-            let (from, to) = (block * rows / blocks, (block + 1) * rows / blocks);
-            let left = left.rows(from, to - from);
-            let by_model = self.jacobian.rows(from, to - from).tr_mul(&left);
-            let sum = columns.rows(from, to - from).tr_mul(&left) - found.taken.tr_mul(&by_model);
-            spread += &sum * sum.transpose();
-        }
-        let t2 = found.along.dot(&spread.cholesky()?.solve(&found.along));
-        // T² (B − q) / (q B) is Fisher–Snedecor's (q, B − q).
-        upper_tail(t2 * freedom / (q as f64 * blocks as f64), q as f64, freedom)
-    }
-
-    fn score(&self, found: &Regression, left: f64) -> Score {
-        Score {
-            p: 1.0,
-            coefficients: found.coefficients.clone(),
-            explained: found.explained,
-            shift: found.shift.clone(),
-            tighter: ((1.0 - found.explained) * self.freedom / left).sqrt(),
-        }
-    }
-
     fn products(&self, columns: &DMatrix<f64>) -> Products {
-        let (rows, count) = columns.shape();
-        let mut products = Products {
-            own: DMatrix::zeros(count, count),
-            residual: DVector::zeros(count),
-            model: DMatrix::zeros(self.jacobian.ncols(), count),
-        };
-        for part in parts(rows) {
-            let own = columns.rows(part.start, part.len());
-            products.own += own.tr_mul(&own);
-            products.residual += own.tr_mul(&self.residual.rows(part.start, part.len()));
-            products.model += self.jacobian.rows(part.start, part.len()).tr_mul(&own);
+        let mut products = Products::zeros(self.jacobian.ncols(), columns.ncols());
+        for part in parts(columns.nrows()) {
+            let rows = |matrix: &DMatrix<f64>| matrix.rows(part.start, part.len()).into_owned();
+            let residual = self.residual.rows(part.start, part.len()).into_owned();
+            products.take(&rows(&self.jacobian), &residual, &rows(columns));
         }
         products
     }
+}
 
+/// What a regression needs of a fit at its optimum.
+#[derive(Clone, Debug)]
+pub(super) struct Optimum {
+    /// (JᵀJ)⁻¹.
+    pub inverse: DMatrix<f64>,
+    /// Jᵀr: at the optimum, what rounding leaves.
+    pub gradient: DVector<f64>,
+    /// rᵀr.
+    pub square: f64,
+    /// Independent residuals less parameters.
+    pub freedom: f64,
+}
+
+impl Optimum {
     /// Regresses the residual on what the model leaves of columns: at least [`LEAST_LEFT`] of them, whose square loses half
     /// of the digits.
-    fn regress(&self, of: &Products) -> Option<Regression> {
+    pub fn regress(&self, of: &Products) -> Option<Regression> {
         let taken = &self.inverse * &of.model;
         let products = &of.own - of.model.tr_mul(&taken);
         let along = &of.residual - taken.tr_mul(&self.gradient);
@@ -169,46 +128,71 @@ impl ScoreTest {
         // Columns at unit length: parameters of different units would spoil the factorisation.
         let unit = products.map_with_location(|i, j, product| product / (length[i] * length[j]));
         let coefficients = -unit.cholesky()?.solve(&along.component_div(&length)).component_div(&length);
-        let explained = -along.dot(&coefficients) / self.residual.norm_squared();
+        let explained = -along.dot(&coefficients) / self.square;
         let shift = -(&taken * &coefficients);
         let finite = coefficients.iter().all(|c| c.is_finite());
         finite.then_some(Regression { along, coefficients, taken, shift, explained })
     }
 
-    /// r + M Z c.
-    fn left(&self, columns: &DMatrix<f64>, found: &Regression) -> DVector<f64> {
-        let mut left = self.residual.clone();
-        for part in parts(columns.nrows()) {
-            let mut left = left.rows_mut(part.start, part.len());
-            left.gemv(1.0, &columns.rows(part.start, part.len()), &found.coefficients, 1.0);
-            left.gemv(1.0, &self.jacobian.rows(part.start, part.len()), &found.shift, 1.0);
+    /// A score whose probability is not known yet, where so many degrees of freedom are left.
+    pub fn score(&self, found: &Regression, left: f64) -> Score {
+        Score {
+            p: 1.0,
+            coefficients: found.coefficients.clone(),
+            explained: found.explained,
+            shift: found.shift.clone(),
+            tighter: ((1.0 - found.explained) * self.freedom / left).sqrt(),
         }
-        left
     }
 }
 
 /// What a regression needs of columns.
-struct Products {
+#[derive(Clone, Debug)]
+pub(super) struct Products {
     /// ZᵀZ.
-    own: DMatrix<f64>,
+    pub own: DMatrix<f64>,
     /// Zᵀr.
-    residual: DVector<f64>,
+    pub residual: DVector<f64>,
     /// JᵀZ.
-    model: DMatrix<f64>,
+    pub model: DMatrix<f64>,
+}
+
+impl Products {
+    pub fn zeros(parameters: usize, columns: usize) -> Self {
+        Self {
+            own: DMatrix::zeros(columns, columns),
+            residual: DVector::zeros(columns),
+            model: DMatrix::zeros(parameters, columns),
+        }
+    }
+
+    /// Adds those of further rows.
+    pub fn take(&mut self, jacobian: &DMatrix<f64>, residual: &DVector<f64>, columns: &DMatrix<f64>) {
+        self.own += columns.tr_mul(columns);
+        self.residual += columns.tr_mul(residual);
+        self.model += jacobian.tr_mul(columns);
+    }
+
+    /// Adds those of other rows, whose columns are so many times as large.
+    pub fn add(&mut self, others: &Self, weight: f64) {
+        self.own += &others.own * (weight * weight);
+        self.residual += &others.residual * weight;
+        self.model += &others.model * weight;
+    }
 }
 
 /// The residual by what the model leaves of some columns.
-struct Regression {
+pub(super) struct Regression {
     /// (M Z)ᵀ r.
-    along: DVector<f64>,
+    pub along: DVector<f64>,
     /// c.
-    coefficients: DVector<f64>,
+    pub coefficients: DVector<f64>,
     /// (JᵀJ)⁻¹ Jᵀ Z.
-    taken: DMatrix<f64>,
+    pub taken: DMatrix<f64>,
     /// δ.
-    shift: DVector<f64>,
+    pub shift: DVector<f64>,
     /// Share of the squared residual that it takes.
-    explained: f64,
+    pub explained: f64,
 }
 
 /// Probability that a ratio of variances exceeds `f`; `None` where it is not one.
@@ -250,28 +234,6 @@ mod tests {
     }
 
     #[test]
-    fn blocks_hold_the_rate_where_neighbours_are_alike_and_rows_do_not() {
-        // One long harmonic of a quickly changing column, as a direction is.
-        let count = |blocks: bool| {
-            (0..200)
-                .filter(|seed| {
-                    let (test, _) = parabola(0.0, 0.8, *seed);
-                    let columns = DMatrix::from_fn(ROWS, 1, |row, _| libm::cos(row as f64 / 40.0));
-                    let score = if blocks {
-                        test.test_in_blocks(&columns, &[20], 0.0)
-                    } else {
-                        test.test(&columns, 1)
-                    };
-                    score.unwrap().p < 0.01
-                })
-                .count()
-        };
-        let (rows, blocks) = (count(false), count(true));
-        assert!(rows > 40, "{rows}");
-        assert!(blocks <= 12, "{blocks}");
-    }
-
-    #[test]
     fn a_parabola_is_found_and_moves_the_line_by_what_it_took_of_it() {
         let (test, columns) = parabola(5.0, 0.0, 1);
         let score = test.test(&columns, 1).unwrap();
@@ -288,16 +250,6 @@ mod tests {
         let (alone, by_columns) = (test.test_alone(30..32, 2).unwrap(), test.test(&columns, 2).unwrap());
         assert!((alone.p / by_columns.p - 1.0).abs() < 1e-9, "{alone:?} {by_columns:?}");
         assert!((alone.shift - by_columns.shift).amax() < 1e-12);
-    }
-
-    #[test]
-    fn what_is_left_is_the_residual_of_a_fit_with_the_columns() {
-        let (test, columns) = parabola(5.0, 0.0, 3);
-        let found = test.regress(&test.products(&columns)).unwrap();
-        let left = test.left(&columns, &found);
-        let share = left.norm_squared() / test.residual.norm_squared();
-        assert!((1.0 - found.explained - share).abs() < 1e-12);
-        assert!(columns.tr_mul(&left).amax() < 1e-9 && test.jacobian.tr_mul(&left).amax() < 1e-9);
     }
 
     #[test]

@@ -25,6 +25,7 @@ use imucal_core::{
     triad::Triad,
 };
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
+use rayon::prelude::*;
 
 use super::{
     norm_fit::{NormFit, NormProblem, Stated},
@@ -88,7 +89,7 @@ impl<const P: usize> ShellErrors<P> {
         let Some(noise) = RestCovariance::along(shown, &fit.used, &normals) else {
             return Self::new(fit.solver.covariance(), None);
         };
-        let rows = rows(problem, fit);
+        let rows = rows(problem, fit, &fit.points);
         let jacobian = DMatrix::from_fn(fit.points.len(), P, |row, k| rows.jacobian[row][k]);
         let errors = influence(&jacobian).and_then(|influence| {
             noise.errors(&DVector::from_column_slice(&rows.residuals), &jacobian, &influence)
@@ -102,17 +103,22 @@ impl<const P: usize> ShellErrors<P> {
         let classical = fit.solver.covariance();
         let variance = fit.solver.variance().unwrap_or(f64::INFINITY);
         let at: Vec<f64> = fit.used.iter().map(|k| at[*k]).collect();
-        let errors = fit.solver.factor().covariance(1.0).and_then(|unscaled| {
-            let triad = problem.form.triad(fit.solver.theta());
-            let (rows, normals) = rayon::join(|| rows(problem, fit), || normals(&triad, &fit.points));
-            blocked(&rows, &normals, (&at, shown), (&unscaled, variance))
-        });
+        let block = |of: Range<usize>| block(problem, fit, &at, of);
+        let errors = fit
+            .solver
+            .factor()
+            .covariance(1.0)
+            .and_then(|unscaled| blocked(&block, (&at, shown), (&unscaled, variance)));
         Self::new(classical, errors.as_ref())
     }
 }
 
-fn rows<const P: usize>(problem: &NormProblem<'_, P>, fit: &NormFit<P>) -> Rows<P> {
-    let model = NormModel { points: &fit.points, norm: problem.norm, form: problem.form };
+fn rows<const P: usize>(
+    problem: &NormProblem<'_, P>,
+    fit: &NormFit<P>,
+    points: &[ShellPoint<f64>],
+) -> Rows<P> {
+    let model = NormModel { points, norm: problem.norm, form: problem.form };
     Rows::of(&model, fit.solver.theta())
 }
 
@@ -134,17 +140,19 @@ struct Block<const P: usize> {
 }
 
 fn block<const P: usize>(
-    rows: &Rows<P>,
-    normals: &[Vector3<f64>],
+    problem: &NormProblem<'_, P>,
+    fit: &NormFit<P>,
     at: &[f64],
     points: Range<usize>,
 ) -> Block<P> {
+    let own = &fit.points[points.clone()];
+    let (rows, normals) = (rows(problem, fit, own), normals(&problem.form.triad(fit.solver.theta()), own));
     let mut seen = Matrix3::zeros();
     let (mut weighed, mut by) = (Vector3::zeros(), SMatrix::<f64, 3, P>::zeros());
-    for k in points.clone() {
-        seen += normals[k] * normals[k].transpose();
-        weighed += normals[k] * rows.residuals[k];
-        by += normals[k] * rows.jacobian[k].transpose();
+    for ((normal, residual), derivatives) in normals.iter().zip(&rows.residuals).zip(&rows.jacobian) {
+        seen += normal * normal.transpose();
+        weighed += normal * *residual;
+        by += normal * derivatives.transpose();
     }
     let eigen = seen.symmetric_eigen();
     let kept: Vec<usize> = (0..3).filter(|k| eigen.eigenvalues[*k] > SEEN * points.len() as f64).collect();
@@ -188,11 +196,10 @@ fn steps<'a, const P: usize>(
     covariance
 }
 
-/// Errors of all parameters; `None` where the points are too few for blocks. `unscaled` is (JᵀJ)⁻¹ and `variance` that
-/// of a point.
+/// Errors of all parameters; `None` where the points are too few for blocks, which `block` makes. `unscaled` is (JᵀJ)⁻¹ and
+/// `variance` that of a point.
 fn blocked<const P: usize>(
-    rows: &Rows<P>,
-    normals: &[Vector3<f64>],
+    block: &(impl Fn(Range<usize>) -> Block<P> + Sync),
     (at, shown): (&[f64], &RestNoise),
     (unscaled, variance): (&SMatrix<f64, P, P>, f64),
 ) -> Option<Errors> {
@@ -200,7 +207,7 @@ fn blocked<const P: usize>(
     let number = BLOCKS.0.min(count / BLOCKS.1);
     let bounds = |k: usize| k * count / number;
     let blocks: Vec<Block<P>> =
-        (0..number).map(|k| block(rows, normals, at, bounds(k)..bounds(k + 1))).collect();
+        (0..number).into_par_iter().map(|k| block(bounds(k)..bounds(k + 1))).collect();
     let length = at.last()? - at.first()?;
     let spans: Vec<Span> = blocks.iter().map(|block| block.span.clone()).collect();
     let times = TIMES.map(|time| time * length);

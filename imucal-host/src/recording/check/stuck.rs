@@ -1,6 +1,6 @@
 //! Stretches in which a sensor repeats itself.
 
-use std::ops::Range;
+use std::{iter, ops::Range};
 
 use nalgebra::Vector3;
 
@@ -12,29 +12,51 @@ const REPETITIONS: usize = 20;
 /// Rows in which all three axes repeat one value for too long. A sensor slower than the recording
 /// repeats each of its values for some rows; that run length is the measure. Missing rows end a run.
 pub(crate) fn find(time: &[f64], values: &[Vector3<f64>]) -> Vec<Range<usize>> {
-    let runs = runs(values);
-    let mut lengths: Vec<usize> = runs.iter().map(Range::len).collect();
-    lengths.sort_unstable();
-    // A single run is the whole recording and no measure of itself.
-    let usual = lengths.get(lengths.len() / 2).filter(|_| lengths.len() > 1).copied().unwrap_or(1);
+    // Runs by their length, and those that may be too long.
+    let (mut counts, mut repeated) = (Vec::new(), Vec::new());
+    for run in runs(values) {
+        let length = run.len();
+        if counts.len() <= length {
+            counts.resize(length + 1, 0);
+        }
+        counts[length] += 1;
+        if length > REPETITIONS {
+            repeated.push(run);
+        }
+    }
+    let usual = usual(&counts);
     let long = |run: &Range<usize>| {
         run.len() > REPETITIONS * usual && time[run.end - 1] - time[run.start] > DURATION
     };
-    runs.into_iter().filter(long).collect()
+    repeated.retain(long);
+    repeated
 }
 
-/// Maximal stretches of equal, measured rows.
-fn runs(values: &[Vector3<f64>]) -> Vec<Range<usize>> {
-    let mut runs: Vec<Range<usize>> = Vec::new();
-    for (row, value) in values.iter().enumerate() {
-        match runs.last_mut() {
-            // NaN equals nothing.
-            Some(run) if run.end == row && values[run.start] == *value => run.end += 1,
-            _ if value.iter().all(|component| component.is_finite()) => runs.push(row..row + 1),
-            _ => {}
-        }
+/// The median length of runs, of which there are so many of each length.
+fn usual(counts: &[usize]) -> usize {
+    let total: usize = counts.iter().sum();
+    if total < 2 {
+        // A single run is the whole recording and no measure of itself.
+        return 1;
     }
-    runs
+    let up_to = counts.iter().scan(0, |sum, count| {
+        *sum += count;
+        Some(*sum)
+    });
+    up_to.take_while(|up_to| *up_to <= total / 2).count()
+}
+
+/// Maximal stretches of equal, measured rows, in order.
+fn runs(values: &[Vector3<f64>]) -> impl Iterator<Item = Range<usize>> {
+    let mut next = 0;
+    iter::from_fn(move || {
+        let measured = |value: &Vector3<f64>| value.iter().all(|component| component.is_finite());
+        let start = next + values[next..].iter().position(measured)?;
+        // NaN equals nothing.
+        let length = values[start..].iter().take_while(|value| **value == values[start]).count();
+        next = start + length;
+        Some(start..next)
+    })
 }
 
 #[cfg(test)]
@@ -67,11 +89,20 @@ mod tests {
     }
 
     #[test]
+    fn the_usual_length_is_the_upper_median() {
+        assert_eq!(usual(&[]), 1);
+        assert_eq!(usual(&[0, 0, 0, 1]), 1);
+        assert_eq!(usual(&[0, 1, 0, 1]), 3);
+        assert_eq!(usual(&[0, 2, 0, 1]), 1);
+        assert_eq!(usual(&[0, 3, 4, 1]), 2);
+    }
+
+    #[test]
     fn missing_rows_end_a_run() {
         let mut values: Vec<_> = (0..200).map(noise).collect();
         values[60..160].fill(Vector3::new(1.0, 2.0, 3.0));
         values[110] = Vector3::repeat(f64::NAN);
         assert!(find(&time(200), &values).is_empty());
-        assert_eq!(runs(&values).len(), 60 + 2 + 40);
+        assert_eq!(runs(&values).count(), 60 + 2 + 40);
     }
 }
