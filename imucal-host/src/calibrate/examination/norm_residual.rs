@@ -60,7 +60,7 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// A row a direction, in the order of time.
+    /// A row a direction, in the order of time; for hysteresis, whose first row has none before it, all directions at once.
     pub fn columns(self, directions: &[Vector3<f64>]) -> DMatrix<f64> {
         match self {
             Self::Cubic => by_axis(directions, |u| u * u * u * u),

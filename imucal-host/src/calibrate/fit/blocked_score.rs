@@ -202,8 +202,8 @@ mod tests {
 
     const SAMPLES: usize = 2000;
 
-    /// A line fitted to noise that is alike in time by `kept`, and its test against one long harmonic of a quickly changing
-    /// column, as a direction is, alone and with a line.
+    /// The residual of a line fitted to noise that is alike in time by `kept`, its derivatives, and columns to test: a harmonic, as a
+    /// direction gives, and two of different periods.
     fn harmonic(kept: f64, seed: u64) -> (DVector<f64>, DMatrix<f64>, [DMatrix<f64>; 2]) {
         let mut random = Random::new(seed, Purpose::Noise);
         let x = |row: usize| row as f64 / SAMPLES as f64 - 0.5;
