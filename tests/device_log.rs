@@ -1,7 +1,6 @@
 //! The device's log: defmt frames over semihosting, decoded by the symbols of the image that wrote them.
 
-use defmt_decoder::{DecodeError, Table};
-use imucal_tests::firmware::{BOARDS, build, ready, run_with};
+use imucal_tests::firmware::{BOARDS, build, decoded, ready, run_with};
 
 #[test]
 fn the_log_of_a_fit_is_decoded_on_the_host() {
@@ -12,23 +11,7 @@ fn the_log_of_a_fit_is_decoded_on_the_host() {
         let output = run_with(board, "log", &["log"]);
         assert_eq!(output.status.code(), Some(0), "{output:?}");
         let image = build(board, "log", &["log"]).expect("it was built");
-        let table = Table::parse(&std::fs::read(image).expect("it was built")).expect("its symbols");
-        let table = table.expect("a table of defmt");
-        let mut decoder = table.new_stream_decoder();
-        decoder.received(&output.stdout);
-        let mut lines = Vec::new();
-        loop {
-            match decoder.decode() {
-                Ok(frame) => lines.push(format!(
-                    "{} {}",
-                    frame.level().expect("a level").as_str(),
-                    frame.display_message()
-                )),
-                Err(DecodeError::UnexpectedEof) => break,
-                Err(DecodeError::Malformed) => panic!("malformed after {lines:#?}"),
-            }
-        }
-        let log = lines.join("\n");
+        let log = decoded(&image, &output.stdout);
         for part in [
             "info record of 00300017",
             "warn an erased page: BadMagic",

@@ -1,5 +1,9 @@
 //! Sealing: what is hidden from a diagnosis is hashed before it runs, and opened after.
 
+use rand::{
+    TryRng,
+    rngs::{SysError, SysRng},
+};
 use sha2::{Digest, Sha256};
 
 /// A secret of which a whole set of cases follows.
@@ -11,10 +15,10 @@ impl Nonce {
     ///
     /// # Errors
     ///
-    /// [`getrandom::Error`], when the system gives no random numbers.
-    pub fn fresh() -> Result<Self, getrandom::Error> {
+    /// [`SysError`], when the system gives no random numbers.
+    pub fn fresh() -> Result<Self, SysError> {
         let mut bytes = [0; 32];
-        getrandom::fill(&mut bytes)?;
+        SysRng.try_fill_bytes(&mut bytes)?;
         Ok(Self(bytes))
     }
 

@@ -53,7 +53,7 @@ pub enum DeviceError {
     },
     /// The system gives no random number to begin a session with.
     #[error("no random number from the system: {0}")]
-    NoRandomNumber(getrandom::Error),
+    NoRandomNumber(rand::rngs::SysError),
     /// It says no.
     #[error("{address}: refused: {}", of_fault(.fault))]
     Refused {

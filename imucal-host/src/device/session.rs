@@ -9,6 +9,7 @@ use imucal_core::link::{
     Fault, Frame, FrameError, Header, Identity, Key, LastReset, MAX_FRAME, Nonces, Origin, Receiver, Reply,
     Request, Seal, Status, encode, split,
 };
+use rand::{TryRng, rngs::SysRng};
 
 use super::{Address, DeviceError, line::Line};
 
@@ -63,7 +64,7 @@ impl Session {
             keyed: false,
             capacity: imucal_core::link::Capacity { points: 0, poses: 0, turns: 0, blocks: 0, particles: 0 },
         };
-        let host = getrandom::u64().map_err(DeviceError::NoRandomNumber)?;
+        let host = SysRng.try_next_u64().map_err(DeviceError::NoRandomNumber)?;
         let line = Line::open(address, flash)?;
         let mut session = Self {
             address: address.to_string(),
