@@ -19,10 +19,10 @@ use crate::{
     },
     effect::{CATALOGUE, Effect, UnknownName, user},
     file::{Limits, OutputSet},
-    recording::{Manifest, manifest::Axis},
+    recording::{Format, Manifest, Written, manifest::Axis, transfer::write_as_made},
     report,
     simulator::{
-        Conditions, Dose, Programme, Simulation, UnitKind,
+        Conditions, Dose, Parts, Programme, Simulation, SimulationError, UnitKind,
         random::{Purpose, Random},
         robot::{MismatchKind, RobotKind, RobotScene},
     },
@@ -209,17 +209,34 @@ pub(super) fn say_doses(doses: &[Dose]) -> anyhow::Result<()> {
 /// Adds the recording to a set of files; what is to be said of it.
 fn write(simulation: &Simulation, out: &Path, files: &mut OutputSet) -> anyhow::Result<String> {
     let name = out.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let recording = simulation.record(&name)?;
-    let written = recording.write_into(out, files)?;
+    // What a column of a format other than text holds follows from all rows.
+    let written = match Format::of(out) {
+        Ok(Format::Csv | Format::CsvGz) => write_parts(simulation.parts(&name)?, out, files)?,
+        _ => simulation.record(&name)?.write_into(out, files)?,
+    };
     written.left_out.iter().for_each(|warning| warn(warning));
     Ok(format!(
         "{}: {} rows, {:.0} s of the programme {}, unit {}",
         out.display(),
-        recording.rows(),
-        recording.rows() as f64 / simulation.rate,
+        written.rows,
+        written.rows as f64 / simulation.rate,
         simulation.programme.name(),
         simulation.unit.name(),
     ))
+}
+
+/// Adds the recording that parts make up.
+fn write_parts(parts: Parts<'_>, out: &Path, files: &mut OutputSet) -> anyhow::Result<Written> {
+    let (made, written) = write_as_made(out, files, |writer| -> Result<(), SimulationError> {
+        for part in parts {
+            if writer.send(part?).is_err() {
+                break;
+            }
+        }
+        Ok(())
+    });
+    made?;
+    Ok(written?)
 }
 
 /// None, one, two or three effects in a quarter, nearly half, a fifth and a tenth of all cases, of any size from a third of

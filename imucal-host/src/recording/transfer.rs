@@ -1,4 +1,4 @@
-//! From a file to a file, part after part in constant memory: one thread reads and alters, another one writes.
+//! To a file, part after part in constant memory: one thread makes a part, or reads and alters it, another one writes.
 
 use std::{
     ops::ControlFlow,
@@ -45,16 +45,26 @@ pub fn transfer(
     files: &mut OutputSet,
     alter: impl FnMut(Recording) -> Option<Recording>,
 ) -> Result<Transferred, TransferError> {
-    let (read, written) = thread::scope(|scope| {
-        let (parts, altered) = sync_channel(WAITING);
-        let writer = scope.spawn(move || Recording::write_parts(altered, out, files));
-        let read = read(source, parts, alter);
-        (read, writer.join().unwrap_or_else(|panicked| panic::resume_unwind(panicked)))
-    });
+    let (read, written) = write_as_made(out, files, |parts| read(source, parts, alter));
     let mut warnings = read?;
     let Written { rows, left_out } = written?;
     warnings.extend(left_out);
     Ok(Transferred { rows, warnings })
+}
+
+/// Writes the parts that `make` sends into files of a set, while it makes the next; what `make` returned, and what was written. Nobody
+/// takes a part any more once the system has refused one.
+pub fn write_as_made<T>(
+    out: &Path,
+    files: &mut OutputSet,
+    make: impl FnOnce(SyncSender<Recording>) -> T,
+) -> (T, Result<Written, WriteError>) {
+    thread::scope(|scope| {
+        let (parts, made) = sync_channel(WAITING);
+        let writer = scope.spawn(move || Recording::write_parts(made, out, files));
+        let ended = make(parts);
+        (ended, writer.join().unwrap_or_else(|panicked| panic::resume_unwind(panicked)))
+    })
 }
 
 /// Sends what `alter` makes of each part, until it makes nothing of one or nobody takes it any more.

@@ -32,6 +32,11 @@ impl<'a> Chain<'a> {
         self.doses.iter().any(|dose| dose.effect.act.remembers())
     }
 
+    /// Some effect alters samples behind the converter, where it may repeat those of other rows.
+    pub fn alters_samples(&self) -> bool {
+        self.doses.iter().any(|dose| matches!(dose.effect.act, Act::Data(..)))
+    }
+
     /// The truth of each row: times of the sensor's clock, s.
     pub fn truth(&self, motion: &dyn Motion, times: &[f64]) -> Vec<Truth> {
         let row = |recent: &mut Recent, time: &f64| self.row(motion, *time, recent);

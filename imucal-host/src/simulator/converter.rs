@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{chain::Chain, random::Random, unit::TriadUnderTest};
+use super::{chain::Chain, random::Random, triad_noise::TriadNoise, unit::TriadUnderTest};
 use crate::{effect::SignalRun, recording::SensorKind};
 
 /// Noise and step of the thermometer, K.
@@ -11,10 +11,8 @@ const THERMOMETER: (f64, f64) = (0.03, 0.01);
 /// What a triad adds by chance.
 #[derive(Debug)]
 pub(super) struct Chance<'a> {
-    /// Of its noise.
-    pub random: &'a mut Random,
-    /// Between rows, s.
-    pub interval: f64,
+    /// Its noise, which goes on with these rows.
+    pub noise: &'a mut TriadNoise,
     /// What else shakes it, row by row, SI units; may be empty.
     pub shaken: &'a [Vector3<f64>],
 }
@@ -29,14 +27,17 @@ pub(super) fn samples(
     chance: Option<Chance<'_>>,
 ) -> Vec<Vector3<f64>> {
     let mut samples = clean;
-    let mut noise = vec![Vector3::zeros(); samples.len()];
     let rounds = chance.is_some();
-    if let Some(Chance { random, interval, shaken }) = chance {
-        noise.iter_mut().for_each(|noise| *noise = random.normals() * triad.noise);
-        let drift = triad.drift.draw(samples.len(), interval, random);
-        samples.iter_mut().zip(drift).for_each(|(sample, drift)| *sample += drift);
-        noise.iter_mut().zip(shaken).for_each(|(noise, shaken)| *noise += shaken);
-    }
+    let mut noise = match chance {
+        Some(Chance { noise, shaken }) => {
+            let drift = noise.drift(samples.len());
+            samples.iter_mut().zip(drift).for_each(|(sample, drift)| *sample += drift);
+            let mut white = noise.white(samples.len());
+            white.iter_mut().zip(shaken).for_each(|(noise, shaken)| *noise += shaken);
+            white
+        }
+        None => vec![Vector3::zeros(); samples.len()],
+    };
     let mut limit = triad.full_scale;
     chain.signal(kind, SignalRun { time, noise: &mut noise, limit: &mut limit });
     for (sample, noise) in samples.iter_mut().zip(&noise) {

@@ -70,13 +70,31 @@ impl Random {
         if let Some(spare) = self.spare.take() {
             return spare;
         }
+        let [u, v, s] = self.of_disc();
+        let factor = libm::sqrt(-2.0 * libm::log(s) / s);
+        self.spare = Some(v * factor);
+        u * factor
+    }
+
+    /// Goes on as if `count` standard normal numbers had been drawn.
+    pub fn skip_normals(&mut self, count: usize) {
+        let spare = usize::from(count > 0 && self.spare.take().is_some());
+        let left = count - spare;
+        for _ in 0..left / 2 {
+            self.of_disc();
+        }
+        if left % 2 == 1 {
+            self.normal();
+        }
+    }
+
+    /// A point of the unit disc and the square of its distance from the centre, which is not 0.
+    fn of_disc(&mut self) -> [f64; 3] {
         loop {
             let (u, v) = (2.0 * self.share() - 1.0, 2.0 * self.share() - 1.0);
             let s = u * u + v * v;
             if s > 0.0 && s < 1.0 {
-                let factor = libm::sqrt(-2.0 * libm::log(s) / s);
-                self.spare = Some(v * factor);
-                return u * factor;
+                return [u, v, s];
             }
         }
     }
@@ -106,6 +124,19 @@ mod tests {
         let moment = |k: i32| draws.iter().map(|x| x.powi(k)).sum::<f64>() / draws.len() as f64;
         assert!(moment(1).abs() < 0.01 && (moment(2) - 1.0).abs() < 0.015, "{} {}", moment(1), moment(2));
         assert!(moment(3).abs() < 0.03 && (moment(4) - 3.0).abs() < 0.1, "{} {}", moment(3), moment(4));
+    }
+
+    #[test]
+    fn skipped_numbers_are_those_that_would_have_been_drawn() {
+        let mut drawn = Random::new(5, Purpose::Noise);
+        let mut skipping = drawn.clone();
+        for count in [0, 1, 2, 3, 0, 7, 1, 1, 100, 5] {
+            for _ in 0..count {
+                drawn.normal();
+            }
+            skipping.skip_normals(count);
+            assert_eq!(drawn.clone().normals(), skipping.clone().normals(), "after {count} more");
+        }
     }
 
     #[test]

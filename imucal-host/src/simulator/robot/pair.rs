@@ -22,6 +22,7 @@ use crate::{
         climate::Climate,
         converter::{self, Chance},
         random::{Purpose, Random},
+        triad_noise::TriadNoise,
         truth::Motion,
         unit::UnitUnderTest,
     },
@@ -218,11 +219,9 @@ impl RobotScene {
                 true => vibration.rows(kind, &motion.trajectory, &shown, self.real_rate, &mut shaken),
                 false => Vec::new(),
             };
-            let chance = self.noise.then(|| Chance {
-                random: &mut random,
-                interval: 1.0 / self.real_rate,
-                shaken: &shaken,
-            });
+            let mut noise =
+                self.noise.then(|| TriadNoise::of(&mut random, triad, time.len(), 1.0 / self.real_rate));
+            let chance = noise.as_mut().map(|noise| Chance { noise, shaken: &shaken });
             let samples = converter::samples(kind, triad, &chain, clean, &time, chance);
             // Its own manifest has every conversion it needs.
             let triple = manifest.triple(kind, rows(samples)).ok();

@@ -6,9 +6,12 @@ use sha2::{Digest, Sha256};
 use super::*;
 use crate::{
     effect::{Act, CATALOGUE, Role, Stage, find},
-    simulator::place::EARTH_RATE,
+    recording::{
+        Recording,
+        SensorKind::{self, Acc, Mag},
+    },
+    simulator::{chain::Chain, place::EARTH_RATE},
 };
-use SensorKind::{Acc, Mag};
 
 /// A short recording with rests, rates and swings of temperature.
 fn short() -> Simulation {

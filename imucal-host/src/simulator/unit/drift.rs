@@ -56,31 +56,30 @@ pub struct Drift {
 }
 
 impl Drift {
-    /// One course of the drift; all but a walk are stationary from the beginning.
-    pub fn draw(&self, rows: usize, interval: f64, random: &mut Random) -> Vec<Vector3<f64>> {
+    /// One course of it, at rows `interval` s apart, of these numbers; all but a walk are stationary from the beginning.
+    pub(in crate::simulator) fn course(&self, interval: f64, mut random: Random) -> DriftCourse {
         if self.kind == DriftKind::Walk {
-            let step = self.sigma * libm::sqrt(interval / WALK);
-            let mut state = Vector3::zeros();
-            let mut walk = || {
-                let here = state;
-                state += random.normals() * step;
-                here
+            let fresh = self.sigma * libm::sqrt(interval / WALK);
+            return DriftCourse {
+                processes: vec![Process { state: Vector3::zeros(), kept: 1.0, fresh }],
+                random,
             };
-            return (0..rows).map(|_| walk()).collect();
         }
         let times = self.kind.times();
         let each = self.sigma / libm::sqrt(times.len() as f64);
-        let kept: Vec<f64> = times.iter().map(|time| libm::exp(-interval / time)).collect();
-        let fresh: Vec<f64> = kept.iter().map(|kept| each * libm::sqrt(1.0 - kept * kept)).collect();
-        let mut states: Vec<Vector3<f64>> = times.iter().map(|_| random.normals() * each).collect();
-        let mut course = Vec::with_capacity(rows);
-        for _ in 0..rows {
-            course.push(states.iter().fold(Vector3::zeros(), |sum, state| sum + state));
-            for ((state, kept), fresh) in states.iter_mut().zip(&kept).zip(&fresh) {
-                *state = *state * *kept + random.normals() * *fresh;
-            }
+        let mut process = |time: &f64| {
+            let kept = libm::exp(-interval / time);
+            Process { state: random.normals() * each, kept, fresh: each * libm::sqrt(1.0 - kept * kept) }
+        };
+        DriftCourse { processes: times.iter().map(&mut process).collect(), random }
+    }
+
+    /// How many normal numbers a course of so many rows draws.
+    pub(in crate::simulator) fn numbers(&self, rows: usize) -> usize {
+        match self.kind.times().len() {
+            0 => 3 * rows,
+            processes => 3 * processes * (1 + rows),
         }
-        course
     }
 
     /// Covariance of one axis between two times of the run, s.
@@ -95,6 +94,35 @@ impl Drift {
     }
 }
 
+/// A course of the drift, row by row, without end.
+#[derive(Clone, Debug)]
+pub(in crate::simulator) struct DriftCourse {
+    processes: Vec<Process>,
+    random: Random,
+}
+
+/// A Gauss–Markov process, or a walk.
+#[derive(Clone, Copy, Debug)]
+struct Process {
+    state: Vector3<f64>,
+    /// Share of the state that the next row keeps.
+    kept: f64,
+    /// Standard deviation of what is added in a row.
+    fresh: f64,
+}
+
+impl Iterator for DriftCourse {
+    type Item = Vector3<f64>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let here = self.processes.iter().fold(Vector3::zeros(), |sum, process| sum + process.state);
+        for Process { state, kept, fresh } in &mut self.processes {
+            *state = *state * *kept + self.random.normals() * *fresh;
+        }
+        Some(here)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,8 +130,8 @@ mod tests {
 
     #[test]
     fn the_drift_has_its_standard_deviation_and_is_slow() {
-        let mut random = Random::new(3, Purpose::Noise);
-        let course = Drift { sigma: 2.0, kind: DriftKind::Flicker }.draw(400_000, 1.0, &mut random);
+        let drift = Drift { sigma: 2.0, kind: DriftKind::Flicker };
+        let course: Vec<_> = drift.course(1.0, Random::new(3, Purpose::Noise)).take(400_000).collect();
         let rows = course.len() as f64;
         let variance = course.iter().map(|v| v.x * v.x).sum::<f64>() / rows;
         assert!((variance.sqrt() - 2.0).abs() < 0.2, "{variance}");
@@ -117,7 +145,12 @@ mod tests {
         for kind in DriftKind::ALL {
             let drift = Drift { sigma: 1.5, kind };
             let mut random = Random::new(8, Purpose::Noise);
-            let courses: Vec<_> = (0..3000).map(|_| drift.draw(61, 2.0, &mut random)).collect();
+            let mut course = || {
+                let course: Vec<_> = drift.course(2.0, random.clone()).take(61).collect();
+                random.skip_normals(drift.numbers(61));
+                course
+            };
+            let courses: Vec<_> = (0..3000).map(|_| course()).collect();
             for (one, other) in [(60, 60), (20, 60), (5, 8)] {
                 let products = courses.iter().map(|course| course[one].dot(&course[other]) / 3.0);
                 let found = products.sum::<f64>() / courses.len() as f64;

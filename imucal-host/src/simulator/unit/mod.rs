@@ -25,6 +25,7 @@ mod drift;
 mod gx2;
 mod mtx;
 
+pub(super) use drift::DriftCourse;
 pub use drift::{Drift, DriftKind};
 
 /// What a data sheet and raw recordings say of one triad, in SI units (m/s², rad/s, µT).
