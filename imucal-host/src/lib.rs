@@ -53,6 +53,8 @@
 
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod allocator;
+
 pub mod file;
 
 pub mod recording;

@@ -25,6 +25,8 @@ mod work;
 /// The compiled part of `imucal`; use the package's own names.
 #[pymodule]
 mod _native {
+    use pyo3::prelude::*;
+
     #[pymodule_export]
     use super::{
         calibration::{Calibration, calibrate, load},
@@ -35,4 +37,9 @@ mod _native {
         recording::{Recording, from_arrays, read, read_stream},
         simulation::simulate,
     };
+
+    #[pymodule_init]
+    fn init(_module: &Bound<'_, PyModule>) {
+        imucal_host::allocator::keep_freed_memory();
+    }
 }

@@ -6,6 +6,7 @@ use clap::{Parser, Subcommand};
 
 use self::{output::Volume, reading::Reading};
 use crate::{
+    allocator::keep_freed_memory,
     effect::{self, Effect},
     file::Limits,
     recording::Recording,
@@ -123,6 +124,7 @@ enum Ending {
 
 /// Runs the program: 0 done, 1 refused or a check failed, 2 bad usage or unreadable input.
 pub fn run() -> ExitCode {
+    keep_freed_memory();
     let cli = Cli::parse();
     output::set_volume(cli.volume());
     interrupt::watch();

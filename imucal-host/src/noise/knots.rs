@@ -10,11 +10,18 @@ use super::{Span, process::Process};
 /// Knots in order of time, and rows that count them.
 #[derive(Clone, Debug)]
 pub struct Knots {
+    /// Where they are.
+    pub(super) spacing: Spacing,
+    rows: Vec<Row>,
+}
+
+/// How far knots are from one another.
+#[derive(Clone, Debug)]
+pub struct Spacing {
     /// Distances from a knot to the next, s, and how many in succession are the same.
     distances: Vec<(f64, usize)>,
     /// Number of knots.
     pub count: usize,
-    rows: Vec<Row>,
 }
 
 /// One observation.
@@ -43,7 +50,8 @@ impl Knots {
             let share = at - knot as f64;
             Row { knot, weights: [1.0 - share, share], more: Vec::new() }
         };
-        Self { distances: vec![(spacing, count - 1)], count, rows: times.iter().map(row).collect() }
+        let rows = times.iter().map(row).collect();
+        Self { spacing: Spacing { distances: vec![(spacing, count - 1)], count }, rows }
     }
 
     /// Of means over spans in time order that do not overlap, of some drifts; one that begins where another ends shares a
@@ -63,13 +71,15 @@ impl Knots {
             rows.push(Row { knot: distances.len(), weights: [first; 2], more });
             distances.push((length, 1));
         }
-        Self { count: distances.len() + 1, distances, rows }
+        Self { spacing: Spacing { count: distances.len() + 1, distances }, rows }
     }
 
     pub(super) fn rows(&self) -> &[Row] {
         &self.rows
     }
+}
 
+impl Spacing {
     /// How a drift goes on from each knot to the next.
     pub(super) fn transitions(&self, drift: &Process) -> impl Iterator<Item = Transition> {
         self.distances
@@ -91,16 +101,16 @@ mod tests {
     #[test]
     fn spans_that_touch_share_a_knot() {
         let knots = Knots::over(&[0.0..4.0, 4.0..5.0, 7.0..9.0], &[Process { time: 10.0, sigma: 1.0 }]);
-        assert_eq!(knots.count, 5);
+        assert_eq!(knots.spacing.count, 5);
         assert_eq!(knots.rows.iter().map(|row| row.knot).collect::<Vec<_>>(), [0, 1, 3]);
-        assert_eq!(knots.distances, [(4.0, 1), (1.0, 1), (2.0, 1), (2.0, 1)]);
+        assert_eq!(knots.spacing.distances, [(4.0, 1), (1.0, 1), (2.0, 1), (2.0, 1)]);
     }
 
     #[test]
     fn an_instant_is_on_the_line_between_its_knots() {
         let knots = Knots::at(&[1.0, 2.0, 5.0], 2.5);
         let found: Vec<(usize, [f64; 2])> = knots.rows.iter().map(|row| (row.knot, row.weights)).collect();
-        assert_eq!((knots.count, found[0], found[1]), (3, (0, [1.0, 0.0]), (0, [0.6, 0.4])));
+        assert_eq!((knots.spacing.count, found[0], found[1]), (3, (0, [1.0, 0.0]), (0, [0.6, 0.4])));
         assert!((found[2].1[1] - 0.6).abs() < 1e-12 && found[2].0 == 1);
     }
 }

@@ -24,7 +24,7 @@ use std::{iter, ops::Range, sync::Arc};
 use nalgebra::DMatrix;
 
 use super::{
-    knots::{Knots, Row},
+    knots::{Knots, Row, Spacing},
     skyline::Skyline,
     sparse_rows::SparseRows,
     symmetric_product::{add_upper, by_columns},
@@ -48,8 +48,8 @@ pub struct RandomEffects {
     channels: Vec<Rows>,
     /// Drifts of a channel.
     pub(super) processes: usize,
-    /// Knots of the drifts.
-    pub(super) knots: Knots,
+    /// Knots of the drifts; their rows are in Z.
+    pub(super) knots: Spacing,
     /// The first state of each knot.
     pub(super) of_knots: Vec<usize>,
     /// The state of each offset.
@@ -86,11 +86,13 @@ impl RandomEffects {
     pub fn new(knots: Knots, channels: Vec<ChannelBlocks>, offsets: usize, processes: usize) -> Self {
         let (of_knots, offsets) = states(&knots, &channels, offsets, channels.len() * processes);
         let rows = |(at, channel): (usize, ChannelBlocks)| {
-            let mut z = SparseRows::default();
-            for (block, row) in knots.rows().iter().enumerate() {
+            let entries = |(block, row): (usize, _)| {
                 let shared = channel.offsets.row(block).iter().map(|(offset, u)| (offsets[*offset], *u));
-                z.push(drift_entries(row, &of_knots, at * processes, processes).chain(shared));
-            }
+                drift_entries(row, &of_knots, at * processes, processes).chain(shared)
+            };
+            let count = knots.rows().iter().enumerate().map(|row| entries(row).count()).sum();
+            let mut z = SparseRows::with_capacity(knots.rows().len(), count);
+            knots.rows().iter().enumerate().for_each(|row| z.push(entries(row)));
             Rows { weights: channel.weights, z }
         };
         let channels: Vec<Rows> = channels.into_iter().enumerate().map(rows).collect();
@@ -102,7 +104,7 @@ impl RandomEffects {
         }
         let weights = channels.iter().flat_map(|rows| &rows.weights);
         let log_determinant = weights.filter(|w| **w > 0.0).map(|w| -w.ln()).sum();
-        Self { channels, processes, knots, of_knots, offsets, gram, log_determinant }
+        Self { channels, processes, knots: knots.spacing, of_knots, offsets, gram, log_determinant }
     }
 
     /// Number of random numbers.
@@ -262,7 +264,7 @@ fn states(
     offsets: usize,
     width: usize,
 ) -> (Vec<usize>, Vec<usize>) {
-    let mut before = vec![knots.count - 1; offsets];
+    let mut before = vec![knots.spacing.count - 1; offsets];
     for channel in channels {
         for (block, row) in knots.rows().iter().enumerate() {
             let shared = channel.offsets.row(block).iter();
@@ -272,8 +274,9 @@ fn states(
     let mut ordered: Vec<usize> = (0..offsets).collect();
     ordered.sort_by_key(|offset| before[*offset]);
     let mut of_offsets = vec![0; offsets];
-    let (mut of_knots, mut state, mut next) = (Vec::with_capacity(knots.count), 0, ordered.iter().peekable());
-    for knot in 0..knots.count {
+    let (mut of_knots, mut state, mut next) =
+        (Vec::with_capacity(knots.spacing.count), 0, ordered.iter().peekable());
+    for knot in 0..knots.spacing.count {
         for offset in iter::from_fn(|| next.next_if(|offset| before[**offset] == knot)) {
             of_offsets[*offset] = state;
             state += 1;

@@ -14,6 +14,19 @@ impl SparseRows {
         Self { ends: vec![0; rows], entries: Vec::new() }
     }
 
+    /// No row yet, with memory for so many rows and entries: rows that grow as they come may take twice as much.
+    pub fn with_capacity(rows: usize, entries: usize) -> Self {
+        Self { ends: Vec::with_capacity(rows), entries: Vec::with_capacity(entries) }
+    }
+
+    /// Gives back the memory that its rows do not need.
+    #[must_use]
+    pub fn shrunk(mut self) -> Self {
+        self.ends.shrink_to_fit();
+        self.entries.shrink_to_fit();
+        self
+    }
+
     /// Appends a row; its columns differ from one another.
     pub fn push(&mut self, row: impl IntoIterator<Item = (usize, f64)>) {
         self.entries.extend(row);

@@ -1,7 +1,7 @@
 //! Recordings of any length, read by parts in constant memory.
 
 use std::{
-    fs, hint, mem,
+    fs, mem,
     ops::ControlFlow,
     path::{Path, PathBuf},
 };
@@ -16,17 +16,6 @@ use crate::file::Limits;
 const ROWS: usize = 1 << 16;
 /// Samples by which a sensor's unit is judged.
 const JUDGED: usize = 100;
-/// Bytes of the block that [`keep_freed_memory`] frees; the GNU allocator learns from blocks of up to 32 MiB.
-const FREED: usize = 31 << 20;
-
-/// Lets the next part have the memory of the last one.
-///
-/// The GNU allocator returns freed memory to the system above a threshold, 256 KiB at first, and takes it again page by
-/// page. A freed block raises that threshold to twice its own size. The block is never written, so that it costs nothing;
-/// other allocators ignore it. `benches/recordings.rs` shows the time and the memory.
-fn keep_freed_memory() {
-    drop(hint::black_box(Vec::<u8>::with_capacity(FREED)));
-}
 
 /// A recording's file and how it is read.
 #[derive(Clone, Copy, Debug)]
@@ -46,7 +35,8 @@ impl Recording {
     /// of warning once, and in [`Recording::warnings`] of no part. No part follows one that `take` breaks off at.
     ///
     /// A part of a text file has 65 536 rows; one of a Parquet file is a row group, and a MAT-file or a log is one part. Limits hold for one part, so that
-    /// the file may be of any length.
+    /// the file may be of any length. A program that has called [`keep_freed_memory`](crate::allocator::keep_freed_memory) gives the memory
+    /// of a part to the next one.
     ///
     /// # Errors
     ///
@@ -55,7 +45,6 @@ impl Recording {
         source: Source<'_>,
         take: &mut dyn FnMut(Self) -> ControlFlow<()>,
     ) -> Result<Vec<Warning>, ReadError> {
-        keep_freed_memory();
         let Source { path, mapping, manifest, limits } = source;
         let (format, manifest, warnings) = opened(path, mapping, manifest.cloned(), limits)?;
         let misled = misled(&warnings);

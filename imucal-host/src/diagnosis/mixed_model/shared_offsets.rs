@@ -63,7 +63,7 @@ impl SharedOffsets {
                     (0..turned.len()).map(move |gimbal| (turned.len() * node + gimbal, share * u(gimbal)))
                 }));
             }
-            rows
+            rows.shrunk()
         };
         let is_turned = |at: &usize| design.channels[*at].kind != SensorKind::Gyr;
         let (turned_alike, others): (Vec<usize>, Vec<usize>) =

@@ -3,6 +3,8 @@
 //! An error only when another unit of the contract explains the samples: a centrifuge is not at 1 g,
 //! and then a warning is all that can be said.
 
+use rayon::prelude::*;
+
 use crate::recording::{
     Recording,
     place::{Place, Places},
@@ -51,20 +53,27 @@ pub(crate) fn check_of(
     places: &Places,
     kinds: &[SensorKind],
 ) -> Result<(), ReadError> {
-    for kind in kinds.iter().copied() {
-        let Some(triple) = recording.sensor(kind) else {
-            continue;
-        };
-        let measured = |value: &nalgebra::Vector3<f64>| value.iter().any(|value| !value.is_nan());
-        let from = places.of(triple.values.iter().position(measured).unwrap_or(0));
-        if kind == SensorKind::Acc {
-            check_axes(recording, from, triple)?;
-        }
-        let fast = (kind == SensorKind::Gyr).then(|| check_rate(recording, from, triple)).flatten();
-        let size = check_size(recording, from, kind, triple)?;
-        recording.warnings.extend(size.or(fast));
+    let checked: Vec<_> = kinds.par_iter().map(|kind| check_sensor(recording, places, *kind)).collect();
+    for warning in checked {
+        recording.warnings.extend(warning?);
     }
     Ok(())
+}
+
+fn check_sensor(
+    recording: &Recording,
+    places: &Places,
+    kind: SensorKind,
+) -> Result<Option<Warning>, ReadError> {
+    let Some(triple) = recording.sensor(kind) else { return Ok(None) };
+    let measured = |value: &nalgebra::Vector3<f64>| value.iter().any(|value| !value.is_nan());
+    let from = places.of(triple.values.iter().position(measured).unwrap_or(0));
+    if kind == SensorKind::Acc {
+        check_axes(recording, from, triple)?;
+    }
+    let fast = (kind == SensorKind::Gyr).then(|| check_rate(recording, from, triple)).flatten();
+    let size = check_size(recording, from, kind, triple)?;
+    Ok(size.or(fast))
 }
 
 fn check_size(
