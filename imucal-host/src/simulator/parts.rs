@@ -102,14 +102,15 @@ impl<'a> Parts<'a> {
             // Its own manifest has every conversion it needs.
             manifest.triple(kind, samples).ok()
         });
-        let mut triples = triples.collect::<Vec<_>>().into_iter().flatten();
+        let mut triples = triples.collect::<Vec<_>>().into_iter();
+        let mut triple = || triples.next().flatten();
         let thermometer = &mut self.thermometer;
         let noisy = self.simulation.noise;
         let mut read = |of: f64| converter::thermometer(of, noisy.then_some(&mut *thermometer));
         let temperature = temperature.into_iter().map(&mut read).collect();
         let gimbal = self.encoders.read(&self.schedule, &time, noisy);
         let mut recording = Recording::new(&self.name, manifest.clone(), time);
-        (recording.acc, recording.gyr, recording.mag) = (triples.next(), triples.next(), triples.next());
+        (recording.acc, recording.gyr, recording.mag) = (triple(), triple(), triple());
         recording.temperature = Some(temperature);
         recording.gimbal = Some(gimbal);
         Ok(recording)
