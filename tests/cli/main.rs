@@ -29,6 +29,7 @@ mod outputs;
 mod overwriting;
 mod pages;
 mod printing;
+mod simulating;
 mod terminal;
 mod trials;
 mod watching;
