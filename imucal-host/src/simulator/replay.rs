@@ -290,7 +290,7 @@ fn rows(
 ) -> (Vec<Row>, Vec<bool>) {
     // What hardly moves does so slowly: more readings give its rate.
     let patient = ((WINDOW / readings.interval()).round() as usize).max(reach);
-    let (mut rows, jerked): (Vec<Row>, Vec<bool>) = readings.each(
+    readings.each(
         |row| if moving[row] { reach } else { patient },
         |row, fit| {
             let swings = fit.swing();
@@ -300,9 +300,7 @@ fn rows(
             });
             (Row { swings, temperature: temperature[row], pose: OnceLock::new() }, jerked)
         },
-    );
-    rows.shrink_to_fit();
-    (rows, jerked)
+    )
 }
 
 #[cfg(test)]
