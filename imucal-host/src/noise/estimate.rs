@@ -16,8 +16,6 @@
 //! variance. That there is none at all, a recording cannot show: without any, the error of a bias is said to be up to
 //! twice as large as it is (`tests/recovery_rig`).
 
-use std::sync::Arc;
-
 use nalgebra::{DMatrix, DVector, Vector3};
 use statrs::function::gamma::{gamma_lr, ln_gamma};
 
@@ -121,8 +119,8 @@ fn products(spans: &[Span], drift: f64, columns: &[Vec<Vec<f64>>; 3]) -> (DMatri
         offsets: SparseRows::empty(spans.len()),
     };
     let knots = Knots::over(spans, &processes);
-    let effects = Arc::new(RandomEffects::new(knots, vec![channel], 0, processes.len()));
-    let precision = Precision::new(Arc::clone(&effects), 0.0, &[&processes]);
+    let effects = RandomEffects::new(knots, vec![channel], 0, processes.len());
+    let precision = Precision::new(&effects.states, 0.0, &[&processes]);
     let of_axis = |columns: &Vec<Vec<f64>>| {
         let columns = columns.iter().map(Vec::as_slice).collect();
         precision.products(&effects.cross_products(&[columns]))

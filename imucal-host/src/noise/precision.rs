@@ -19,7 +19,7 @@ use nalgebra::DMatrix;
 
 use super::{
     process::Process,
-    random_effects::{CrossProducts, RandomEffects},
+    random_effects::{CrossProducts, RandomEffects, States},
     skyline::{Factor, Skyline},
     symmetric_product::{add_product, by_columns, by_rows},
 };
@@ -30,7 +30,6 @@ const PART: usize = 2048;
 /// Σ⁻¹ of the channels of some random effects.
 #[derive(Clone, Debug)]
 pub struct Precision {
-    effects: Arc<RandomEffects>,
     /// S.
     scales: Vec<f64>,
     factor: Factor,
@@ -41,25 +40,20 @@ pub struct Precision {
 impl Precision {
     /// From the random effects, the standard deviation of the offsets, and the drifts of each channel. Drifts that make the
     /// matrix indefinite by rounding are left out, and offsets as well where that is not enough.
-    pub fn new(effects: Arc<RandomEffects>, sigma: f64, drifts: &[&[Process]]) -> Self {
+    pub fn new(effects: &States, sigma: f64, drifts: &[&[Process]]) -> Self {
         let with = |sigma: f64, drifts: &[&[Process]]| {
-            let scales = scales(&effects, sigma, drifts);
-            let factor = matrix(&effects, &scales, drifts).factorised()?;
+            let scales = scales(effects, sigma, drifts);
+            let factor = matrix(effects, &scales, drifts).factorised()?;
             let drift = drifts.iter().flat_map(|own| own.iter());
             let of_drifts: f64 = drift.map(|drift| effects.knots.log_determinant(drift)).sum();
             let log_determinant = effects.log_determinant + factor.log_determinant + of_drifts;
-            Some(Self { effects: Arc::clone(&effects), scales, factor, log_determinant })
+            Some(Self { scales, factor, log_determinant })
         };
         with(sigma, drifts).or_else(|| with(sigma, &[])).or_else(|| with(0.0, &[])).unwrap_or_else(|| {
-            let (scales, factor) = (vec![0.0; effects.states()], Factor::identity(effects.states()));
+            let (scales, factor) = (vec![0.0; effects.count()], Factor::identity(effects.count()));
             let log_determinant = effects.log_determinant;
-            Self { effects: Arc::clone(&effects), scales, factor, log_determinant }
+            Self { scales, factor, log_determinant }
         })
-    }
-
-    /// What the blocks share.
-    pub fn effects(&self) -> &Arc<RandomEffects> {
-        &self.effects
     }
 
     /// Xᵀ Σ⁻¹ X.
@@ -87,13 +81,25 @@ impl Precision {
         self.factor.forward(states.as_mut_slice(), width);
         states
     }
+}
 
-    /// Σ⁻¹ x of one column over the blocks of a single channel.
+/// Σ⁻¹ of a single channel, and the rows of its blocks, by which further columns are multiplied.
+#[derive(Clone, Debug)]
+pub struct ChannelPrecision {
+    /// D⁻¹ and Z.
+    pub effects: Arc<RandomEffects>,
+    /// Σ⁻¹.
+    pub precision: Precision,
+}
+
+impl ChannelPrecision {
+    /// Σ⁻¹ x of one column.
     pub fn apply(&self, x: &[f64]) -> Vec<f64> {
+        let scales = &self.precision.scales;
         let mut u = self.effects.cross_products(&[vec![x]]).states.as_slice().to_vec();
-        u.iter_mut().zip(&self.scales).for_each(|(u, scale)| *u *= scale);
-        self.factor.solve(&mut u);
-        u.iter_mut().zip(&self.scales).for_each(|(u, scale)| *u *= scale);
+        u.iter_mut().zip(scales).for_each(|(u, scale)| *u *= scale);
+        self.precision.factor.solve(&mut u);
+        u.iter_mut().zip(scales).for_each(|(u, scale)| *u *= scale);
         let mut out = x.to_vec();
         self.effects.weighted_remainder(&u, &mut out);
         out
@@ -101,20 +107,20 @@ impl Precision {
 }
 
 /// S.
-fn scales(effects: &RandomEffects, sigma: f64, drifts: &[&[Process]]) -> Vec<f64> {
+fn scales(effects: &States, sigma: f64, drifts: &[&[Process]]) -> Vec<f64> {
     let of_drift = if drifts.is_empty() { 0.0 } else { 1.0 };
-    let mut scales = vec![of_drift; effects.states()];
+    let mut scales = vec![of_drift; effects.count()];
     effects.offsets.iter().for_each(|state| scales[*state] = sigma);
     scales
 }
 
 /// S Zᵀ D⁻¹ Z S + P.
-fn matrix(effects: &RandomEffects, scales: &[f64], drifts: &[&[Process]]) -> Skyline {
+fn matrix(effects: &States, scales: &[f64], drifts: &[&[Process]]) -> Skyline {
     let mut matrix = effects.gram.scaled(scales);
     effects.offsets.iter().for_each(|state| matrix.add(*state, *state, 1.0));
     if drifts.is_empty() {
         // Of scale zero: they count as nothing.
-        effects.drift_states().for_each(|state| matrix.add(state, state, 1.0));
+        effects.of_drifts().for_each(|state| matrix.add(state, state, 1.0));
     }
     for (channel, drifts) in drifts.iter().enumerate() {
         for (process, drift) in drifts.iter().enumerate() {
@@ -128,7 +134,7 @@ fn matrix(effects: &RandomEffects, scales: &[f64], drifts: &[&[Process]]) -> Sky
 /// Adds a drift's precision; `first` is the channel's first state at a knot.
 fn add_precision(
     matrix: &mut Skyline,
-    effects: &RandomEffects,
+    effects: &States,
     first: usize,
     (process, count): (usize, usize),
     drift: &Process,
@@ -208,6 +214,13 @@ pub(crate) mod tests {
             Self { times, channels: (0..channels).map(channel).collect() }
         }
 
+        /// Of the first channel.
+        pub fn precision(&self, drifts: &[Process]) -> ChannelPrecision {
+            let effects = self.effects(drifts.len());
+            let precision = Precision::new(&effects.states, SIGMA, &[drifts]);
+            ChannelPrecision { effects, precision }
+        }
+
         pub fn effects(&self, processes: usize) -> Arc<RandomEffects> {
             Arc::new(RandomEffects::new(Knots::at(&self.times, SPACING), self.channels.clone(), 2, processes))
         }
@@ -225,8 +238,8 @@ pub(crate) mod tests {
             };
             let shared = |row: usize, offset: usize| {
                 let (channel, block) = at(row);
-                let row = self.channels[channel].offsets.row(block);
-                row.iter().find(|(own, _)| *own == offset).map_or(0.0, |(_, u)| *u)
+                let mut row = self.channels[channel].offsets.row(block);
+                row.find(|(own, _)| *own == offset).map_or(0.0, |(_, u)| u)
             };
             let sigma = DMatrix::from_fn(measured.len(), measured.len(), |i, j| {
                 let ((one, a), (other, b)) = (at(measured[i]), at(measured[j]));
@@ -278,7 +291,7 @@ pub(crate) mod tests {
             for drifts in [&DRIFTS[..], &DRIFTS[..1], &[]] {
                 let effects = toy.effects(drifts.len());
                 let products = effects.cross_products(&of);
-                let precision = Precision::new(effects, SIGMA, &vec![drifts; channels]);
+                let precision = Precision::new(&effects.states, SIGMA, &vec![drifts; channels]);
                 let (expected, log_determinant) = toy.products(&x, drifts);
                 let found = precision.products(&products);
                 assert!((&found - &expected).amax() < 1e-9, "{blocks} {channels} {}", drifts.len());
@@ -293,7 +306,7 @@ pub(crate) mod tests {
     #[test]
     fn a_weighted_column_is_that_of_the_inverse_covariance() {
         let toy = Toy::new(40, 1);
-        let precision = Precision::new(toy.effects(2), SIGMA, &[&DRIFTS]);
+        let precision = toy.precision(&DRIFTS);
         let (sigma, measured) = toy.covariance(&DRIFTS);
         let x = DVector::from_fn(40, |k, _| ((k * k) as f64).sin());
         let found = DVector::from_vec(precision.apply(x.as_slice())).select_rows(&measured);
@@ -310,12 +323,12 @@ pub(crate) mod tests {
         let weights = spans.iter().map(|span| 1.0 / (own(span) + left(span))).collect();
         let channel = ChannelBlocks { weights, offsets: SparseRows::empty(4) };
         let effects = RandomEffects::new(Knots::over(&spans, &drifts), vec![channel], 0, 3);
-        let precision = Precision::new(Arc::new(effects), 0.0, &[&drifts]);
+        let precision = Precision::new(&effects.states, 0.0, &[&drifts]);
         let white = DVector::from_fn(4, |k, _| own(&spans[k]));
         let covariance = flicker::covariance_of(&spans, &drifts) + DMatrix::from_diagonal(&white);
         let x = DMatrix::from_fn(4, 2, |k, column| ((3 * k + column) as f64).cos());
         let expected = x.tr_mul(&covariance.clone().cholesky().unwrap().solve(&x));
-        let found = precision.products(&precision.effects().cross_products(&[slices(&x)]));
+        let found = precision.products(&effects.cross_products(&[slices(&x)]));
         assert!((found - expected).amax() < 1e-10);
         assert!((precision.log_determinant - covariance.determinant().ln()).abs() < 1e-10);
     }
@@ -326,12 +339,12 @@ pub(crate) mod tests {
         let x = columns(&toy, 3);
         let effects = toy.effects(2);
         let products = effects.cross_products(&x.iter().map(slices).collect::<Vec<_>>());
-        let none = Precision::new(Arc::clone(&effects), 0.0, &[]);
+        let none = Precision::new(&effects.states, 0.0, &[]);
         assert_eq!(none.products(&products), products.plain);
         // Numbers that are none leave what can be computed.
         let broken = [Process { time: 8.0, sigma: f64::NAN }, DRIFTS[1]];
-        let found = Precision::new(Arc::clone(&effects), SIGMA, &[&broken, &DRIFTS]);
-        let without = Precision::new(effects, SIGMA, &[]);
+        let found = Precision::new(&effects.states, SIGMA, &[&broken, &DRIFTS]);
+        let without = Precision::new(&effects.states, SIGMA, &[]);
         assert_eq!(found.products(&products), without.products(&products));
     }
 }

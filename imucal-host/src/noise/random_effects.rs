@@ -46,6 +46,15 @@ pub struct ChannelBlocks {
 #[derive(Clone, Debug)]
 pub struct RandomEffects {
     channels: Vec<Rows>,
+    /// The random numbers.
+    pub states: Arc<States>,
+}
+
+/// The random numbers of some channels, in the order of their elimination: all that a covariance needs of them, a
+/// small part of what the rows of Z take.
+#[derive(Clone, Debug)]
+pub struct States {
+    channels: usize,
     /// Drifts of a channel.
     pub(super) processes: usize,
     /// Knots of the drifts; their rows are in Z.
@@ -71,7 +80,7 @@ struct Rows {
 #[derive(Clone, Debug)]
 pub struct CrossProducts {
     /// The random effects.
-    pub effects: Arc<RandomEffects>,
+    pub effects: Arc<States>,
     /// Xᵀ D⁻¹ X.
     pub plain: DMatrix<f64>,
     /// Xᵀ D⁻¹ Z, a column a state.
@@ -87,7 +96,7 @@ impl RandomEffects {
         let (of_knots, offsets) = states(&knots, &channels, offsets, channels.len() * processes);
         let rows = |(at, channel): (usize, ChannelBlocks)| {
             let entries = |(block, row): (usize, _)| {
-                let shared = channel.offsets.row(block).iter().map(|(offset, u)| (offsets[*offset], *u));
+                let shared = channel.offsets.row(block).map(|(offset, u)| (offsets[offset], u));
                 drift_entries(row, &of_knots, at * processes, processes).chain(shared)
             };
             let count = knots.rows().iter().enumerate().map(|row| entries(row).count()).sum();
@@ -98,35 +107,21 @@ impl RandomEffects {
         let channels: Vec<Rows> = channels.into_iter().enumerate().map(rows).collect();
         let mut gram = Skyline::new(envelope(&channels, &of_knots, &offsets, processes));
         for (weight, row) in channels.iter().flat_map(Rows::iter).filter(|(weight, _)| *weight > 0.0) {
-            for (at, (one, a)) in row.iter().enumerate() {
-                row[..=at].iter().for_each(|(other, b)| gram.add(*one, *other, weight * a * b));
+            for (at, (one, a)) in row.clone().enumerate() {
+                row.clone().take(at + 1).for_each(|(other, b)| gram.add(one, other, weight * a * b));
             }
         }
         let weights = channels.iter().flat_map(|rows| &rows.weights);
         let log_determinant = weights.filter(|w| **w > 0.0).map(|w| -w.ln()).sum();
-        Self { channels, processes, knots: knots.spacing, of_knots, offsets, gram, log_determinant }
-    }
-
-    /// Number of random numbers.
-    pub fn states(&self) -> usize {
-        self.gram.size()
-    }
-
-    /// The states of all drifts.
-    pub(super) fn drift_states(&self) -> impl Iterator<Item = usize> {
-        let width = self.channels.len() * self.processes;
-        self.of_knots.iter().flat_map(move |knot| *knot..knot + width)
-    }
-
-    /// Whether blocks share more than drift.
-    pub fn has_offsets(&self) -> bool {
-        !self.offsets.is_empty()
+        let (knots, count) = (knots.spacing, channels.len());
+        let states = States { channels: count, processes, knots, of_knots, offsets, gram, log_determinant };
+        Self { channels, states: Arc::new(states) }
     }
 
     /// Of some columns, channel by channel.
-    pub fn cross_products(self: &Arc<Self>, columns: &[Columns<'_>]) -> CrossProducts {
+    pub fn cross_products(&self, columns: &[Columns<'_>]) -> CrossProducts {
         let count = columns.first().map_or(0, Vec::len);
-        let mut products = CrossProducts::zeros(self, count);
+        let mut products = CrossProducts::zeros(&self.states, count);
         for (rows, columns) in self.channels.iter().zip(columns) {
             rows.for_each_part(columns, |part, weighted, x| products.add(rows, part, weighted, x));
         }
@@ -135,11 +130,11 @@ impl RandomEffects {
 
     /// Of some columns of a single channel, and Fᵀ D⁻¹ X of these with others, which are given in parts.
     pub fn cross_products_with(
-        self: &Arc<Self>,
+        &self,
         columns: &Columns<'_>,
         others: &[DMatrix<f64>],
     ) -> (CrossProducts, DMatrix<f64>) {
-        let mut products = CrossProducts::zeros(self, columns.len());
+        let mut products = CrossProducts::zeros(&self.states, columns.len());
         let mut across = DMatrix::zeros(columns.len(), others.first().map_or(0, DMatrix::ncols));
         for rows in &self.channels {
             let mut others = others.iter();
@@ -156,9 +151,27 @@ impl RandomEffects {
     /// D⁻¹ (x − Z u) of one column of a single channel; puts it in the place of x.
     pub(super) fn weighted_remainder(&self, u: &[f64], x: &mut [f64]) {
         for (x, (weight, row)) in x.iter_mut().zip(self.channels.iter().flat_map(Rows::iter)) {
-            let shared: f64 = row.iter().map(|(state, z)| z * u[*state]).sum();
+            let shared: f64 = row.map(|(state, z)| z * u[state]).sum();
             *x = weight * (*x - shared);
         }
+    }
+}
+
+impl States {
+    /// Number of random numbers.
+    pub fn count(&self) -> usize {
+        self.gram.size()
+    }
+
+    /// Those of all drifts.
+    pub(super) fn of_drifts(&self) -> impl Iterator<Item = usize> {
+        let width = self.channels * self.processes;
+        self.of_knots.iter().flat_map(move |knot| *knot..knot + width)
+    }
+
+    /// Whether blocks share more than drift.
+    pub fn has_offsets(&self) -> bool {
+        !self.offsets.is_empty()
     }
 }
 
@@ -182,7 +195,7 @@ impl Rows {
         }
     }
 
-    fn iter(&self) -> impl Iterator<Item = (f64, &[(usize, f64)])> {
+    fn iter(&self) -> impl Iterator<Item = (f64, impl Iterator<Item = (usize, f64)> + Clone)> {
         self.weights.iter().enumerate().map(|(block, weight)| (*weight, self.z.row(block)))
     }
 }
@@ -202,11 +215,11 @@ fn gathered(columns: &[&[f64]], part: Range<usize>) -> DMatrix<f64> {
 }
 
 impl CrossProducts {
-    fn zeros(effects: &Arc<RandomEffects>, count: usize) -> Self {
+    fn zeros(effects: &Arc<States>, count: usize) -> Self {
         Self {
             effects: Arc::clone(effects),
             plain: DMatrix::zeros(count, count),
-            states: DMatrix::zeros(count, effects.states()),
+            states: DMatrix::zeros(count, effects.count()),
         }
     }
 
@@ -267,8 +280,8 @@ fn states(
     let mut before = vec![knots.spacing.count - 1; offsets];
     for channel in channels {
         for (block, row) in knots.rows().iter().enumerate() {
-            let shared = channel.offsets.row(block).iter();
-            shared.for_each(|(offset, _)| before[*offset] = before[*offset].min(row.knot));
+            let shared = channel.offsets.row(block);
+            shared.for_each(|(offset, _)| before[offset] = before[offset].min(row.knot));
         }
     }
     let mut ordered: Vec<usize> = (0..offsets).collect();
@@ -298,8 +311,8 @@ fn envelope(channels: &[Rows], knots: &[usize], offsets: &[usize], processes: us
         }
     }
     for (_, row) in channels.iter().flat_map(Rows::iter) {
-        let lowest = row.iter().map(|(state, _)| *state).min().unwrap_or(0);
-        row.iter().for_each(|(state, _)| first[*state] = first[*state].min(lowest));
+        let lowest = row.clone().map(|(state, _)| state).min().unwrap_or(0);
+        row.for_each(|(state, _)| first[state] = first[state].min(lowest));
     }
     first
 }

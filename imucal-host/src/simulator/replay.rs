@@ -41,7 +41,8 @@ const CREEP: f64 = 3e-3;
 const NOISES: f64 = 8.0;
 /// Two rates further apart than this, rad/s, and than their noise are those of a jerk.
 const JERK: f64 = 1e-3;
-/// The poses of so many rows are remembered, a quarter of a kilobyte each: of eleven minutes at 1 kHz.
+/// Poses are remembered of at most so many rows, a quarter of a kilobyte each: of eleven minutes at 1 kHz, two hours at
+/// 100 Hz.
 const REMEMBERED: usize = 700_000;
 /// At least this many readings to each side.
 const FEWEST: usize = 2;
@@ -59,19 +60,14 @@ pub struct Replay {
 #[derive(Clone, Debug)]
 struct Smoothed {
     time: Arc<[f64]>,
-    rows: Vec<Row>,
+    /// One a row, °C.
+    temperature: Arc<[f64]>,
+    /// Of each row.
+    swings: Vec<[Swing; 3]>,
+    /// Poses that were asked for: of the steady movement at few rows. None where all are computed as they are needed.
+    poses: Vec<OnceLock<Box<Pose>>>,
     axes: [Axis; 3],
     place: Place,
-    remembers: bool,
-}
-
-/// What the movement is at a row: together, since it is asked for together.
-#[derive(Clone, Debug)]
-struct Row {
-    swings: [Swing; 3],
-    temperature: f64,
-    /// Where it was asked for: of the steady movement at few rows.
-    pose: OnceLock<Box<Pose>>,
 }
 
 impl Replay {
@@ -92,11 +88,19 @@ impl Replay {
         let moving = moving(time, &angles, &noise);
         // Noise of a rate is about that of a reading in the time between two.
         let jerk = noise.map(|noise| JERK + NOISES * noise / interval);
-        let (near, jerked) = rows(&readings, &moving, temperature, short, Some(&jerk));
-        let time: Arc<[f64]> = time.into();
-        let of = |rows, remembers| Smoothed { time: Arc::clone(&time), rows, axes, place, remembers };
-        let steady = (long > short).then(|| of(rows(&readings, &moving, temperature, long, None).0, true));
-        let brisk = of(near, time.len() <= REMEMBERED);
+        let (near, jerked) = swings(&readings, &moving, short, Some(&jerk));
+        let (time, temperature): (Arc<[f64]>, Arc<[f64]>) = (time.into(), temperature.into());
+        let remembered = if time.len() <= REMEMBERED { time.len() } else { 0 };
+        let of = |swings| Smoothed {
+            time: Arc::clone(&time),
+            temperature: Arc::clone(&temperature),
+            swings,
+            poses: vec![OnceLock::new(); remembered],
+            axes,
+            place,
+        };
+        let steady = (long > short).then(|| of(swings(&readings, &moving, long, None).0));
+        let brisk = of(near);
         Some(Self { known: known(encoders, long, &jerked, short), moving, brisk, steady })
     }
 }
@@ -109,14 +113,13 @@ impl Smoothed {
             rate: swing.rate + since * swing.acceleration,
             acceleration: swing.acceleration,
         };
-        let gimbals = self.rows.get(row).map(|row| row.swings).unwrap_or_default().map(swing);
+        let gimbals = self.swings.get(row).copied().unwrap_or_default().map(swing);
         Machine { gimbals, ..Machine::exact(self.axes.map(direction)) }
     }
 
     /// The pose of an exact rig at a row; `None` in a long recording, whose poses are computed as they are needed.
     fn pose(&self, row: usize) -> Option<&Pose> {
-        let known = &self.rows.get(row).filter(|_| self.remembers)?.pose;
-        Some(known.get_or_init(|| Box::new(pose(&self.machine(row, 0.0)))))
+        Some(self.poses.get(row)?.get_or_init(|| Box::new(pose(&self.machine(row, 0.0)))))
     }
 }
 
@@ -131,7 +134,7 @@ impl Motion for Smoothed {
         let exact = self.machine(row, since);
         let mut machine = exact;
         rig(&mut machine);
-        let temperature = self.rows.get(row).map_or(0.0, |row| row.temperature);
+        let temperature = self.temperature.get(row).copied().unwrap_or(0.0);
         let as_recorded = since == 0.0 && machine.turns_like(&exact);
         match as_recorded.then(|| self.pose(row)).flatten() {
             Some(pose) => {
@@ -143,7 +146,7 @@ impl Motion for Smoothed {
     }
 
     fn encoders(&self, time: f64) -> Option<[f64; 3]> {
-        self.rows.get(nearest(&self.time, time)).map(|row| row.swings.map(|swing| swing.angle))
+        self.swings.get(nearest(&self.time, time)).map(|swings| swings.map(|swing| swing.angle))
     }
 
     fn rig(&self) -> Rig {
@@ -189,7 +192,7 @@ impl Recorded for Replay {
 
     fn swings(&self, row: usize) -> Option<[Swing; 3]> {
         let steady = self.steady.as_ref().unwrap_or(&self.brisk);
-        steady.rows.get(row).map(|row| row.swings)
+        steady.swings.get(row).copied()
     }
 
     fn steady(&self) -> &dyn Motion {
@@ -281,13 +284,12 @@ fn moving(time: &[f64], angles: &[[f64; 3]], noise: &[f64; 3]) -> Vec<bool> {
 
 /// Each row by cubics through so many readings to each side, and at which of them a wider one has a rate that is further
 /// from theirs than `jerk`, rad/s; without it none is looked for.
-fn rows(
+fn swings(
     readings: &Readings,
     moving: &[bool],
-    temperature: &[f64],
     reach: usize,
     jerk: Option<&[f64; 3]>,
-) -> (Vec<Row>, Vec<bool>) {
+) -> (Vec<[Swing; 3]>, Vec<bool>) {
     // What hardly moves does so slowly: more readings give its rate.
     let patient = ((WINDOW / readings.interval()).round() as usize).max(reach);
     readings.each(
@@ -298,7 +300,7 @@ fn rows(
                 let wide = fit.wider(window(moving.len(), row, reach + 1)).swing();
                 (0..3).any(|gimbal| (swings[gimbal].rate - wide[gimbal].rate).abs() > jerk[gimbal])
             });
-            (Row { swings, temperature: temperature[row], pose: OnceLock::new() }, jerked)
+            (swings, jerked)
         },
     )
 }

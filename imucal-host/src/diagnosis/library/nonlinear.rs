@@ -2,7 +2,7 @@
 //!
 //! A menu of shapes for each, the best by evidence, and from there a search by halved steps.
 
-use crate::noise::precision::Precision;
+use crate::noise::precision::ChannelPrecision;
 use rayon::prelude::*;
 
 use super::{
@@ -51,7 +51,7 @@ impl<'a> Backdrop<'a> {
         scene: &'a ForwardModel<'a>,
         design: &'a Design,
         fitted: &[usize],
-        precisions: &'a [Precision],
+        precisions: &'a [ChannelPrecision],
     ) -> Self {
         Self { scene, fitted: fitted.len(), augmented: AugmentedNormal::new(design, precisions, fitted) }
     }

@@ -7,7 +7,7 @@
 //! Against the median of its neighbours, since noise that is taken for drift is not alike at all frequencies. Not looked
 //! for: periods shorter than a few blocks, and those so long that half-waves of the recording follow them.
 
-use crate::noise::precision::Precision;
+use crate::noise::precision::ChannelPrecision;
 use std::{f64::consts::TAU, ops::Range};
 
 use nalgebra::DVector;
@@ -31,7 +31,7 @@ const ABOUT: usize = 12;
 pub fn beat(
     linear: &Linearisation<'_>,
     set: &[&'static Effect],
-    precisions: &[Precision],
+    precisions: &[ChannelPrecision],
     kind: SensorKind,
 ) -> Option<(Covariate, usize)> {
     let weighed = weighed_residual(linear, set, precisions, kind)?;
@@ -85,7 +85,7 @@ fn powers(weighed: &[DVector<f64>], times: &[f64], half_wave: f64, multiples: Ra
 fn weighed_residual(
     linear: &Linearisation<'_>,
     set: &[&'static Effect],
-    precisions: &[Precision],
+    precisions: &[ChannelPrecision],
     kind: SensorKind,
 ) -> Option<Vec<DVector<f64>>> {
     let fitted = linear.fitted(set);

@@ -244,7 +244,7 @@ mod tests {
         x.set_column(3, &twice);
         let effects = toy.effects(DRIFTS.len());
         let products = effects.cross_products(&[slices(&x)]);
-        let precision = Precision::new(effects, SIGMA, &[&DRIFTS]);
+        let precision = Precision::new(&effects.states, SIGMA, &[&DRIFTS]);
         let (dense, _) = toy.products(std::slice::from_ref(&x), &DRIFTS);
         (dense, Normal::of(&products, &precision))
     }

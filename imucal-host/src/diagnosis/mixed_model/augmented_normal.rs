@@ -14,7 +14,7 @@
 //! XᵀΣ⁻¹X and Y_X are the same for all that is tried.
 
 use crate::noise::{
-    precision::Precision,
+    precision::ChannelPrecision,
     random_effects::{Columns, in_parts},
 };
 use std::sync::Arc;
@@ -33,7 +33,7 @@ pub struct AugmentedNormal<'a> {
 /// The fitted columns of one channel.
 struct Fitted<'a> {
     channel: &'a Channel,
-    precision: &'a Precision,
+    precision: &'a ChannelPrecision,
     /// X, in parts.
     columns: Vec<DMatrix<f64>>,
     /// Y_Xᵀ: a row a column.
@@ -44,15 +44,16 @@ struct Fitted<'a> {
 
 impl<'a> AugmentedNormal<'a> {
     /// Some columns of a design, given the precision of each channel.
-    pub fn new(design: &'a Design, precisions: &'a [Precision], wanted: &[usize]) -> Self {
-        let fitted = |(channel, precision): (&'a Channel, &'a Precision)| {
+    pub fn new(design: &'a Design, precisions: &'a [ChannelPrecision], wanted: &[usize]) -> Self {
+        let fitted = |(channel, precision): (&'a Channel, &'a ChannelPrecision)| {
             let (from, ids) = places(&channel.ids, wanted);
             let own: Vec<usize> = from.iter().map(|at| channel.ids[*at]).collect();
             let columns = channel.columns(&own);
-            let products = precision.effects().cross_products(std::slice::from_ref(&columns));
+            let products = precision.effects.cross_products(std::slice::from_ref(&columns));
             let columns = in_parts(&columns, channel.y.len());
-            let eliminated = precision.eliminated(&products);
-            let normal = Normal::within(&precision.less(&products, &eliminated), precision.log_determinant);
+            let own = &precision.precision;
+            let eliminated = own.eliminated(&products);
+            let normal = Normal::within(&own.less(&products, &eliminated), own.log_determinant);
             Fitted { channel, precision, columns, eliminated, normal, ids }
         };
         let channels = design.channels.par_iter().zip(precisions).map(fitted).collect();
@@ -84,13 +85,14 @@ impl Fitted<'_> {
         }
         let (n, m) = (self.ids.len(), more.len());
         let further: Columns<'_> = more.iter().map(|(_, f)| &f[..]).collect();
-        let (products, mut across) = self.precision.effects().cross_products_with(&further, &self.columns);
-        let eliminated = self.precision.eliminated(&products);
+        let ChannelPrecision { effects, precision } = self.precision;
+        let (products, mut across) = effects.cross_products_with(&further, &self.columns);
+        let eliminated = precision.eliminated(&products);
         across.gemm(-1.0, &eliminated, &self.eliminated.transpose(), 1.0);
         let mut normal = Normal { energy: self.normal.energy, ..Normal::zeros(n + m) };
         normal.log_determinant = self.normal.log_determinant;
         normal.information.view_mut((0, 0), (n, n)).copy_from(&self.normal.information);
-        normal.information.view_mut((n, n), (m, m)).copy_from(&self.precision.less(&products, &eliminated));
+        normal.information.view_mut((n, n), (m, m)).copy_from(&precision.less(&products, &eliminated));
         normal.information.view_mut((0, n), (n, m)).copy_from(&across.columns(0, n).transpose());
         normal.information.view_mut((n, 0), (m, n)).copy_from(&across.columns(0, n));
         normal.score.rows_mut(0, n).copy_from(&self.normal.score);
@@ -102,7 +104,7 @@ impl Fitted<'_> {
 
 #[cfg(test)]
 mod tests {
-    use crate::noise::precision::tests::{DRIFTS, SIGMA, Toy};
+    use crate::noise::precision::tests::{DRIFTS, Toy};
     use nalgebra::{DVector, Vector3};
 
     use super::*;
@@ -124,8 +126,7 @@ mod tests {
     #[test]
     fn trial_columns_have_the_normal_equations_of_all_columns_together() {
         let toy = Toy::new(BLOCKS, 1);
-        let precision = |_| Precision::new(toy.effects(2), SIGMA, &[&DRIFTS]);
-        let precisions: Vec<Precision> = (0..3).map(precision).collect();
+        let precisions: Vec<ChannelPrecision> = (0..3).map(|_| toy.precision(&DRIFTS)).collect();
         // The third axis is reached by nothing further, and the second of the two columns reaches the first alone.
         let design = Design {
             columns: Vec::new(),

@@ -3,7 +3,7 @@
 //! A channel is one axis of one sensor. Columns are in usual sizes of their parameters, so that one means usual.
 
 use crate::noise::{
-    precision::Precision,
+    precision::{ChannelPrecision, Precision},
     random_effects::{Columns, CrossProducts, RandomEffects},
 };
 use std::sync::Arc;
@@ -267,15 +267,16 @@ impl Design {
     }
 
     /// Normal equations of some columns, given the precision of each channel.
-    pub fn normal(&self, precisions: &[Precision], wanted: &[usize]) -> Normal {
-        let alone = |(at, precision): (usize, &Precision)| ChannelGroup {
+    pub fn normal(&self, precisions: &[ChannelPrecision], wanted: &[usize]) -> Normal {
+        let alone = |(at, precision): (usize, &ChannelPrecision)| ChannelGroup {
             channels: vec![at],
-            effects: Arc::clone(precision.effects()),
+            effects: Arc::clone(&precision.effects),
         };
         let groups: Vec<ChannelGroup> = precisions.iter().enumerate().map(alone).collect();
         let products = self.products(&groups, wanted);
         let pairs = products.groups.par_iter().zip(precisions);
-        let parts: Vec<Normal> = pairs.map(|(group, own)| Normal::of(&group.columns, own)).collect();
+        let parts: Vec<Normal> =
+            pairs.map(|(group, own)| Normal::of(&group.columns, &own.precision)).collect();
         products.sum(wanted.len(), &parts)
     }
 

@@ -24,7 +24,7 @@ impl Weighing<'_> {
             let (count, offsets) = self.pointing_errors(kind, axis).offsets();
             let errors: Vec<f64> = (0..count).map(|_| sensor.scatter * random.normal()).collect();
             for (at, block) in self.scene.blocks.iter().enumerate() {
-                let turned: f64 = offsets.row(at).iter().map(|(error, share)| errors[*error] * share).sum();
+                let turned: f64 = offsets.row(at).map(|(error, share)| errors[error] * share).sum();
                 let white = if block.rest.is_some() { sensor.white } else { sensor.moving }[axis];
                 let worth = self.scene.worth(kind, at).max(1.0);
                 means[at][axis] += turned + white / libm::sqrt(worth) * random.normal();

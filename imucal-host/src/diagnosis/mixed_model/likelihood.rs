@@ -12,7 +12,7 @@
 //! | Λ | a vague prior of the columns' amounts |
 
 use crate::noise::{precision::Precision, process::Process};
-use std::{cell::RefCell, sync::Arc};
+use std::cell::RefCell;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -48,7 +48,7 @@ impl Likelihood {
             return value;
         }
         let part = |group: &GroupProducts| {
-            let precision = Precision::new(Arc::clone(&group.columns.effects), scatter, &[&drifts]);
+            let precision = Precision::new(&group.columns.effects, scatter, &[&drifts]);
             Normal::of(&group.columns, &precision)
         };
         let parts: Vec<Normal> = self.design.groups.par_iter().map(part).collect();
@@ -70,6 +70,8 @@ pub fn reml_criterion(normal: &Normal) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use crate::noise::precision::tests::{SIGMA, Toy, columns};
     use nalgebra::DVector;
 

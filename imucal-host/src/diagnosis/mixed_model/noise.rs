@@ -8,9 +8,9 @@
 
 use crate::noise::{
     knots::Knots,
-    precision::Precision,
+    precision::{ChannelPrecision, Precision},
     process::Process,
-    random_effects::{ChannelBlocks, RandomEffects},
+    random_effects::{ChannelBlocks, RandomEffects, States},
     sparse_rows::SparseRows,
 };
 use std::sync::Arc;
@@ -86,11 +86,11 @@ impl Noise {
     }
 
     /// Σ⁻¹ of channels of these sensors, with a scatter of their offsets, rad.
-    pub fn precision(&self, kinds: &[SensorKind], effects: &Arc<RandomEffects>, scatter: f64) -> Precision {
+    pub fn precision(&self, kinds: &[SensorKind], effects: &States, scatter: f64) -> Precision {
         let drifts: Vec<[Process; 2]> =
             kinds.iter().map(|kind| self.sensors[*kind as usize].drifts()).collect();
         let drifts: Vec<&[Process]> = drifts.iter().map(|drifts| &drifts[..]).collect();
-        Precision::new(Arc::clone(effects), scatter, &drifts)
+        Precision::new(effects, scatter, &drifts)
     }
 
     /// White noise of a sensor in a sample, the mean of its axes.
@@ -160,7 +160,7 @@ impl<'s> Weighing<'s> {
     }
 
     /// Σ⁻¹ of each channel of a design.
-    pub fn precisions(&self, design: &Design, noise: &Noise) -> Vec<Precision> {
+    pub fn precisions(&self, design: &Design, noise: &Noise) -> Vec<ChannelPrecision> {
         self.precisions_within(design, noise, &|_| true)
     }
 
@@ -170,11 +170,12 @@ impl<'s> Weighing<'s> {
         design: &Design,
         noise: &Noise,
         inside: &(dyn Fn(usize) -> bool + Sync),
-    ) -> Vec<Precision> {
+    ) -> Vec<ChannelPrecision> {
         let precision = |channel: &Channel| {
             let effects = Arc::new(self.effects_alone(channel, noise, inside));
             let scatter = noise.sensors[channel.kind as usize].scatter;
-            noise.precision(&[channel.kind], &effects, scatter)
+            let precision = noise.precision(&[channel.kind], &effects.states, scatter);
+            ChannelPrecision { effects, precision }
         };
         design.channels.par_iter().map(precision).collect()
     }

@@ -19,7 +19,7 @@ use crate::diagnosis::{
     },
     residual::block::Means,
 };
-use crate::noise::precision::Precision;
+use crate::noise::precision::ChannelPrecision;
 
 /// Formulas that are multiplied out at once.
 const BATCH: usize = 10;
@@ -51,7 +51,7 @@ pub fn screen(
     let residuals: Vec<Signature> = further.iter().map(|residual| signature(problem, residual)).collect();
     let design = problem.design.extended(&kept, Vec::new(), &residuals);
     let every: Vec<usize> = (0..design.size).collect();
-    let precisions: Vec<Vec<Precision>> =
+    let precisions: Vec<Vec<ChannelPrecision>> =
         noises.iter().map(|noise| problem.linear.weighing.precisions(&design, noise)).collect();
     let augmented: Vec<AugmentedNormal<'_>> =
         precisions.iter().map(|precisions| AugmentedNormal::new(&design, precisions, &every)).collect();

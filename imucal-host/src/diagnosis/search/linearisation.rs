@@ -1,6 +1,6 @@
 //! The linear problem about a fit: signatures as columns, sets of effects judged by least squares and evidence.
 
-use crate::noise::precision::Precision;
+use crate::noise::precision::ChannelPrecision;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -264,7 +264,7 @@ impl<'s> Linearisation<'s> {
     }
 
     /// Σ⁻¹ of each channel.
-    pub fn precisions(&self, noise: &Noise) -> Vec<Precision> {
+    pub fn precisions(&self, noise: &Noise) -> Vec<ChannelPrecision> {
         self.weighing.precisions(&self.design, noise)
     }
 

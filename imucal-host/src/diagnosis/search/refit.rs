@@ -2,7 +2,7 @@
 //!
 //! Gauss–Newton: the residual at full rate, its derivative from the nodes. Steps that make it worse are halved.
 
-use crate::noise::precision::Precision;
+use crate::noise::precision::ChannelPrecision;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -139,7 +139,7 @@ fn step(
     fit: &Fit,
     columns: &[Column],
     design: &Design,
-    precisions: &[Precision],
+    precisions: &[ChannelPrecision],
 ) -> Result<(DVector<f64>, f64), DiagnosisError> {
     let all: Vec<usize> = (0..columns.len()).collect();
     let normal = design.normal(precisions, &all);
@@ -152,7 +152,7 @@ fn step(
     Ok((step, moved))
 }
 
-/// Precision of each column's prior, and where the column stands, in usual sizes. A term of the baseline may be of any
+/// ChannelPrecision of each column's prior, and where the column stands, in usual sizes. A term of the baseline may be of any
 /// size; an effect is not many times its usual one, so that what the data do not show stays small.
 fn prior(doses: &[Dose], columns: &[Column]) -> (DVector<f64>, DVector<f64>) {
     let role = |column: &Column| column.effect.parameters[column.parameter].role;
