@@ -212,6 +212,9 @@ fn print_costs([m4, m0]: &[Costs; 2]) {
         ("session: a sample of the field in a turn", "session_field_turn"),
         ("session: the longest slice of a fit", "session_slice"),
         ("session: what to do next", "session_guide"),
+        ("session: longest slice of its magnetometer's rotation", "session_alignment_slice"),
+        ("session: all slices of its magnetometer's rotation", "session_alignment"),
+        ("session: its magnetometer turned, and errors", "session_align"),
         ("session: longest slice of its temperature terms", "session_warmth_slice"),
         ("session: all temperature terms of 38 rests", "session_warmth"),
     ] {

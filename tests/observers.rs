@@ -160,3 +160,31 @@ fn a_hundred_simulated_sessions_agree_with_the_host_and_their_intervals_cover() 
         assert!(near >= 0.95 && (0.93..0.97).contains(&covered), "{kind:?}: {near}, {covered}");
     }
 }
+
+#[test]
+fn a_session_s_magnetometer_lies_as_the_host_s_does_and_its_intervals_cover() {
+    let acc = truth(SensorKind::Acc);
+    let turned = without_rotation(&acc).gain * acc.gain.try_inverse().expect("regular");
+    let mag = truth(SensorKind::Mag);
+    // A session does not know the field's length: its gain has determinant 1.
+    let in_gauge = |triad: Triad<f64>| Triad { gain: triad.gain / triad.gain.determinant().cbrt(), ..triad };
+    let own = in_gauge(Triad { gain: turned * mag.gain, bias: mag.bias });
+    let sessions: Vec<[Vec<f64>; 2]> = (0..50u64)
+        .into_par_iter()
+        .map(|seed| {
+            let recording = simulated::tumbled(24, 4000 + 7 * seed);
+            let calibration = calibrate(&recording, &Options::default(), &|_| {});
+            let device = session(&recording);
+            let host = fit(&calibration, SensorKind::Mag).expect("accepted");
+            let estimate = device.estimate(Sensor::Magnetometer).expect("an estimate");
+            assert!(host.alignment.is_some() && estimate.alignment_error.is_some(), "seed {seed}");
+            [apart(estimate, &in_gauge(host.triad)), apart(estimate, &own)]
+        })
+        .collect();
+    for (k, of, most, least) in [(0, "the host's", 1.96, 0.95), (1, "the truth", 1.96, 0.93)] {
+        let all: Vec<f64> = sessions.iter().flat_map(|session| session[k].iter().copied()).collect();
+        let within = all.iter().filter(|off| off.abs() <= most).count() as f64 / all.len() as f64;
+        println!("{:.1} % of {} within {most} standard errors of {of}", 100.0 * within, all.len());
+        assert!(within >= least, "{of}: {within}");
+    }
+}

@@ -142,6 +142,8 @@ fn play(session: &mut Standalone, tape: &mut impl Tape, header: &Header) {
     }
     session.finish();
     while session.work() {}
+    // Without rests that show how it lies, the magnetometer stays in its own axes.
+    let _own_axes = session.align_axes();
 }
 
 /// Whether a sensor is accepted, and the bits of what was found.

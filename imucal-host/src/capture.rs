@@ -6,7 +6,7 @@
 use imucal_core::{
     link::{CaptureSensor, CaptureTask, RawSample},
     record::{Date, HigherOrder, Sensor, TriadRecord},
-    session::{Session, SessionSettings, guide::Guide, store::NotStored},
+    session::{Session, SessionSettings, alignment::NotAligned, guide::Guide, store::NotStored},
 };
 
 use crate::{
@@ -92,6 +92,8 @@ pub fn replay(
     }
     session.finish();
     while session.work() {}
+    // Without rests that show how it lies, the magnetometer stays in its own axes.
+    let _own_axes = session.align_axes();
     Some(session)
 }
 
@@ -101,6 +103,19 @@ pub fn targets(recording: &Recording) -> [f32; 3] {
     let of = |kind: SensorKind, target| if recording.sensor(kind).is_some() { target } else { 0.0 };
     let [acc, gyr, mag] = SessionSettings::default().target;
     [of(SensorKind::Acc, acc), of(SensorKind::Gyr, gyr), of(SensorKind::Mag, mag)]
+}
+
+/// The standard error of a session's magnetometer's rotation into the accelerometer's axes, rad.
+///
+/// # Errors
+///
+/// Why it is in axes of its own.
+pub fn axes_of_magnetometer(session: &Capture) -> Result<f32, NotAligned> {
+    let estimate = session.estimate(Sensor::Magnetometer);
+    match estimate.and_then(|estimate| estimate.alignment_error) {
+        Some(error) => Ok(error),
+        None => Err(session.clone().align_axes().err().unwrap_or(NotAligned::Already)),
+    }
 }
 
 /// The sensors that a session calibrated, of a recording's raw values, with terms of temperature where its rests bear them out; of the

@@ -11,6 +11,7 @@ use imucal_core::{
     },
     record::{RawUnit, Sensor, TriadRecord},
     session::{
+        alignment::AlignmentFit,
         bias::MeanRate,
         store::{NotStored, bias_of_the_day},
         temperature::WarmthFit,
@@ -47,6 +48,8 @@ pub(super) struct Capture {
     taken: u32,
     /// Terms of temperature under way, once it has ended.
     warmth: Vec<WarmthFit<POSES>, 1>,
+    /// The magnetometer's rotation under way, likewise.
+    alignment: Vec<AlignmentFit, 1>,
     /// What it came to: sensor after sensor, once it has ended.
     outcomes: Vec<CaptureOutcome, 3>,
 }
@@ -87,6 +90,7 @@ impl<const N: usize> Alone<N> {
             task,
             taken: 0,
             warmth: Vec::new(),
+            alignment: Vec::new(),
             outcomes: Vec::new(),
         });
         Ok(())
@@ -217,18 +221,34 @@ impl Capture {
         self.taken = self.taken.wrapping_add(1);
     }
 
-    /// One slice of what is left once no more samples come: a sensor's terms of temperature. The sensor that is next to be stored,
-    /// where nothing else is left.
+    /// One slice of what is left once no more samples come: a sensor's terms of temperature, and the magnetometer's rotation into the
+    /// accelerometer's axes. The sensor that is next to be stored, where nothing else is left.
     #[inline(never)]
     pub(super) fn close(&mut self) -> Option<Sensor> {
         let sensor = *Sensor::ALL.get(self.outcomes.len())?;
+        if sensor == Sensor::Magnetometer && self.turns() {
+            return None;
+        }
         match self.warmth.first_mut() {
             Some(fit) => (!fit.work()).then_some(sensor),
             None => (!self.begin_warmth(sensor)).then_some(sensor),
         }
     }
 
+    /// One slice of the magnetometer's rotation; whether there was one.
+    fn turns(&mut self) -> bool {
+        let Some(fit) = self.alignment.first_mut() else { return self.begin_alignment() };
+        // Where it cannot be turned, it stays in its own axes.
+        fit.work(&self.session) || self.session.align(fit).is_ok()
+    }
+
     /// Out of line: such a fit is larger than a stack's frame should be.
+    #[inline(never)]
+    fn begin_alignment(&mut self) -> bool {
+        self.session.alignment().is_ok_and(|fit| self.alignment.push(fit).is_ok())
+    }
+
+    /// Out of line, likewise.
     #[inline(never)]
     fn begin_warmth(&mut self, sensor: Sensor) -> bool {
         self.session.warmth(sensor).is_ok_and(|fit| self.warmth.push(fit).is_ok())

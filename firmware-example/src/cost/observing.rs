@@ -103,20 +103,40 @@ pub(super) fn write(out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Resul
     }
     writeln!(out, "session_slice ticks {slice} for 1 stack 0")?;
     measured(out, watch, ("session_guide", 1), || session.guide()).map(drop)?;
+    alignment(session, out, watch)?;
     warmth(session, out, watch)
+}
+
+/// The magnetometer's rotation: its longest slice, and all of them.
+#[inline(never)]
+fn alignment(session: &mut Standalone, out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
+    let Ok(mut fit) = session.alignment() else { return Err(core::fmt::Error) };
+    let (longest, all) = slices(watch, || fit.work(session));
+    writeln!(out, "session_alignment_slice ticks {longest} for 1 stack 0")?;
+    writeln!(out, "session_alignment ticks {all} for 1 stack 0")?;
+    let before = watch.ticks();
+    let _own_axes = black_box(session.align(&fit));
+    let took = watch.ticks().wrapping_sub(before);
+    writeln!(out, "session_align ticks {took} for 1 stack 0")
+}
+
+/// Ticks of the longest of some slices, and of all of them.
+fn slices(watch: &Stopwatch, mut work: impl FnMut() -> bool) -> (u32, u32) {
+    let (mut longest, mut all, mut goes_on) = (0, 0u32, true);
+    while goes_on {
+        let before = watch.ticks();
+        goes_on = work();
+        let took = watch.ticks().wrapping_sub(before);
+        (longest, all) = (took.max(longest), all.wrapping_add(took));
+    }
+    (longest, all)
 }
 
 /// The terms of temperature of the accelerometer: their longest slice, and all of them.
 #[inline(never)]
 fn warmth(session: &Standalone, out: &mut impl Write, watch: &Stopwatch) -> core::fmt::Result {
     let Ok(mut fit) = session.warmth(Sensor::Accelerometer) else { return Err(core::fmt::Error) };
-    let (mut longest, mut all, mut goes_on) = (0, 0u32, true);
-    while goes_on {
-        let before = watch.ticks();
-        goes_on = fit.work();
-        let took = watch.ticks().wrapping_sub(before);
-        (longest, all) = (took.max(longest), all.wrapping_add(took));
-    }
+    let (longest, all) = slices(watch, || fit.work());
     writeln!(out, "session_warmth_slice ticks {longest} for 1 stack 0")?;
     writeln!(out, "session_warmth ticks {all} for 1 stack 0")
 }

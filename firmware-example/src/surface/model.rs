@@ -3,8 +3,9 @@
 use imucal_core::{
     model::{
         self, Cost, Model, RowSink, SquaredSum,
+        alignment::Alignment,
         attitude::AttitudeModel,
-        dip::{DipModel, DirectionPair},
+        dip::{DipModel, DirectionPair, RELABELLINGS},
         norm::NormModel,
         parameterisation::{FULL, FULL_WITH_SENSITIVITY, UPPER_TRIANGULAR},
         rig::{Axis, GimbalPose, Pose, ReferencePose, RigAxes},
@@ -15,7 +16,7 @@ use imucal_core::{
     observation::{Block, BlockBuilder, Compared, Durations, Motion, ShellPoint, Turn},
     triad::Triad,
 };
-use nalgebra::{Quaternion, SVector, Vector3};
+use nalgebra::{Quaternion, SMatrix, SVector, Vector3};
 
 use crate::scene;
 
@@ -130,6 +131,28 @@ fn dip() {
     let dip = DipModel { pairs: &pairs };
     reach!(model::dip::DipModel::rows(&dip, &SVector::from([0.1f32, 0.2, 0.3, 0.9]), &mut none()));
     reach!(model::dip::DipModel::independent_rows(&dip));
+    alignment(&pairs);
+}
+
+#[inline(never)]
+fn alignment(pairs: &[DirectionPair<f32>]) {
+    let phi: Vector3<f32> = reach!(model::dip::relabelling(RELABELLINGS[9]));
+    reach!(model::dip::is_lower(1.0f32, 2.0));
+    let theta = SVector::from([phi.x, phi.y, phi.z, 0.2]);
+    let inverse = SMatrix::identity();
+    let turn = reach!(model::alignment::Alignment::new(
+        pairs.iter().copied(),
+        50.0,
+        &theta,
+        &(inverse * 1e-6),
+        &inverse
+    ));
+    let turn: Alignment<f32> = turn;
+    let triad = Triad::identity();
+    reach!(model::alignment::Alignment::error(&turn));
+    reach!(model::alignment::Alignment::turned(&turn, &triad));
+    reach!(model::alignment::Alignment::followed(&turn, &triad, &triad.gain, &triad));
+    reach!(model::alignment::Alignment::errors(&turn, &triad, &[triad; 2], &SMatrix::identity()));
 }
 
 const AXES: RigAxes = RigAxes([Axis::Z, Axis::Y, Axis::X]);

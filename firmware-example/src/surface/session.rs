@@ -39,10 +39,20 @@ pub(super) fn reach_all() {
     for pose in reach!(session::poses::Poses::list(poses)) {
         reach!(session::poses::Pose::has_turn(pose));
     }
+    aligned(&mut session);
     kept(&session);
     warm(&session);
     rates();
     reach!(accept::outlier::gross(&[1.0f32, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0]));
+}
+
+#[inline(never)]
+fn aligned(session: &mut Session<8, 2, 16>) {
+    if let Ok(mut fit) = reach!(session::Session::alignment(session)) {
+        while reach!(session::alignment::AlignmentFit::work(&mut fit, session)) {}
+        let _own_axes = reach!(session::Session::align(session, &fit));
+    }
+    let _own_axes = reach!(session::Session::align_axes(session));
 }
 
 #[inline(never)]

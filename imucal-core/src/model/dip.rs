@@ -16,10 +16,39 @@
 //! rotation about the field, from poses that all keep gravity at one place; not modelled: a field that varies over
 //! the poses.
 
-use nalgebra::{SVector, Vector3};
+use nalgebra::{Matrix3, SVector, Vector3};
 
 use super::{Model, RowSink};
 use crate::{rotation::exp_with_jacobian, scalar::Scalar};
+
+/// Poses at least: four parameters, and some to check them.
+pub const LEAST_POSES: usize = 8;
+/// Largest standard error of the rotation, rad (2°).
+pub const LARGEST_ERROR: f64 = 0.035;
+/// The 24 ways in which axes can be relabelled without a mirror, as a magnetometer may lie on its board: directions of the
+/// turns, and angles in twelfths of a turn. A fit starts from each of them ([`relabelling`]), the nearest to none first.
+#[rustfmt::skip]
+pub const RELABELLINGS: [([i8; 3], i8); 24] = [
+    ([0, 0, 0], 0),
+    ([1, 0, 0], 3), ([1, 0, 0], -3), ([0, 1, 0], 3), ([0, 1, 0], -3), ([0, 0, 1], 3), ([0, 0, 1], -3),
+    ([1, 1, 1], 4), ([1, 1, 1], -4), ([1, 1, -1], 4), ([1, 1, -1], -4),
+    ([1, -1, 1], 4), ([1, -1, 1], -4), ([-1, 1, 1], 4), ([-1, 1, 1], -4),
+    ([1, 0, 0], 6), ([0, 1, 0], 6), ([0, 0, 1], 6),
+    ([1, 1, 0], 6), ([1, -1, 0], 6), ([1, 0, 1], 6), ([1, 0, -1], 6), ([0, 1, 1], 6), ([0, 1, -1], 6),
+];
+
+/// Rotation vector of one of [`RELABELLINGS`], rad.
+pub fn relabelling<T: Scalar>(([x, y, z], twelfths): ([i8; 3], i8)) -> Vector3<T> {
+    let direction = Vector3::new(x, y, z).map(|component| T::of(component.into()));
+    let length = direction.norm_squared().root();
+    let angle = T::of(f64::from(twelfths) * core::f64::consts::FRAC_PI_6);
+    if length > T::zero() { direction * (angle / length) } else { direction }
+}
+
+/// Whether a fit ends lower than the lowest so far, by their costs: of two that rounding alone distinguishes the first one counts.
+pub fn is_lower<T: Scalar>(cost: T, lowest: T) -> bool {
+    cost < T::of(0.99) * lowest
+}
 
 /// Directions of one pose, unit vectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +57,14 @@ pub struct DirectionPair<T: Scalar> {
     pub u_f: Vector3<T>,
     /// Field, calibrated magnetometer axes.
     pub u_b: Vector3<T>,
+}
+
+impl<T: Scalar> DirectionPair<T> {
+    /// Row of the Jacobian, given R u_b and the derivative of the rotation by φ.
+    pub(super) fn derivative(&self, turned: &Vector3<T>, jacobian: &Matrix3<T>) -> SVector<T, 4> {
+        let by_phi = jacobian.tr_mul(&turned.cross(&self.u_f));
+        SVector::<T, 4>::new(by_phi.x, by_phi.y, by_phi.z, -T::one())
+    }
 }
 
 /// Poses with both directions; parameters φ (3) and s.
@@ -42,9 +79,7 @@ impl<T: Scalar> Model<T, 4> for DipModel<'_, T> {
         let (rotation, jacobian) = exp_with_jacobian(&theta.xyz());
         for pair in self.pairs {
             let turned = rotation * pair.u_b;
-            let by_phi = jacobian.tr_mul(&turned.cross(&pair.u_f));
-            let row = SVector::<T, 4>::new(by_phi.x, by_phi.y, by_phi.z, -T::one());
-            sink.row(pair.u_f.dot(&turned) - theta.w, &row);
+            sink.row(pair.u_f.dot(&turned) - theta.w, &pair.derivative(&turned, &jacobian));
         }
     }
 
@@ -74,6 +109,16 @@ mod tests {
             let pairs: Vec<_> = (0..5).map(|k| DirectionPair { u_f: direction(k), u_b: direction(k + 9) }).collect();
             let model = DipModel { pairs: &pairs };
             prop_assert!(largest_jacobian_error(&model, &SVector::from(v)) < 1e-8);
+        }
+    }
+
+    #[test]
+    fn relabellings_are_all_turns_that_map_axes_to_axes_and_no_two_are_the_same() {
+        let turns: Vec<_> = RELABELLINGS.iter().map(|way| exp(&relabelling::<f64>(*way))).collect();
+        for (at, turn) in turns.iter().enumerate() {
+            let rounded = turn.map(f64::round);
+            assert!((turn - rounded).amax() < 1e-12 && rounded.determinant() == 1.0, "{at}: {turn}");
+            assert!(turns[..at].iter().all(|other| (other - turn).amax() > 0.5), "{at}");
         }
     }
 

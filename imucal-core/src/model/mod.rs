@@ -9,6 +9,8 @@
 //! | [`turn`] | gravity's direction carried through a turn by the gyroscope, against the accelerometer's | rad |
 //! | [`unified`] | output of a triad on a rig, against what it put out | raw (nominal SI) |
 //!
+//! [`alignment`] turns a triad as a dip's rotation says, with its errors.
+//!
 //! Values are run-time data, shapes are types: the number of parameters `P` is const, the number of observations
 //! is whatever the caller's slice holds.
 
@@ -19,6 +21,9 @@ use crate::scalar::Scalar;
 pub mod attitude;
 mod block;
 pub mod dip;
+
+pub mod alignment;
+
 pub mod norm;
 pub mod parameterisation;
 pub mod rig;

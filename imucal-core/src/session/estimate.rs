@@ -24,6 +24,8 @@ pub struct Estimate {
     pub verdict: Result<(), Refusal>,
     /// Length of the field where only the sensor shows it, µT, calibrated.
     pub field_norm: Option<f32>,
+    /// Largest standard error of the rotation into the accelerometer's axes, rad; `None` in axes of its own.
+    pub alignment_error: Option<f32>,
     /// Observations that were left out as outliers.
     pub left_out: u8,
 }
@@ -38,10 +40,40 @@ impl Estimate {
     }
 }
 
-/// Gauge of a magnetometer in a field of unknown length: gain of determinant 1. `covariance` is that of the upper triangular gain
-/// and the bias; gives the triad, its standard errors and the field's length.
-///
-/// `A' = A / d`, d = det(A)^⅓, `dA' = (dA − A · ⅓ tr(A⁻¹ dA)) / d`, and the trace is `Σ dA_ii / A_ii`.
+/// Gauge of a magnetometer: what its parameters do to its gain. `A' = A / d`, `dA' = (dA − A · ⅓ tr(A⁻¹ dA)) / d`, and the trace is
+/// `Σ dA_ii / A_ii`.
+pub(super) struct Gauge {
+    /// Slopes of the trace by the upper triangular gain and the bias.
+    trace: SVector<f32, 9>,
+    /// d.
+    pub(super) divisor: f32,
+}
+
+impl Gauge {
+    /// In a field of known length: d = 1.
+    pub(super) fn of_known_field() -> Self {
+        Self { trace: SVector::zeros(), divisor: 1.0 }
+    }
+
+    /// In a field of unknown length: a gain of determinant 1, d = det(A)^⅓.
+    pub(super) fn of_unknown_field(gain: &Matrix3<f32>) -> Self {
+        let (x, y, z) = (1.0 / gain.m11, 1.0 / gain.m22, 1.0 / gain.m33);
+        let trace = SVector::<f32, 9>::from([x, 0.0, 0.0, y, 0.0, z, 0.0, 0.0, 0.0]);
+        Self { trace, divisor: libm::cbrtf(gain.m11 * gain.m22 * gain.m33) }
+    }
+
+    /// Slopes of d times an entry of A', of that value in A, by the parameters, among which it has this place.
+    pub(super) fn slopes(&self, entry: usize, value: f32) -> SVector<f32, 9> {
+        let mut by = self.trace * (-value / 3.0);
+        if let Some(own) = by.get_mut(entry) {
+            *own += 1.0;
+        }
+        by
+    }
+}
+
+/// A magnetometer in a field of unknown length, in its gauge. `covariance` is that of the upper triangular gain and the bias; gives
+/// the triad, its standard errors and the field's length.
 #[inline]
 pub(super) fn to_unit_determinant(
     triad: &Triad<f32>,
@@ -49,14 +81,10 @@ pub(super) fn to_unit_determinant(
     norm: f32,
 ) -> (Triad<f32>, Triad<f32>, f32) {
     let gain = &triad.gain;
-    let d = libm::cbrtf(gain.m11 * gain.m22 * gain.m33);
-    let (x, y, z) = (1.0 / gain.m11, 1.0 / gain.m22, 1.0 / gain.m33);
-    let trace = SVector::<f32, 9>::from([x, 0.0, 0.0, y, 0.0, z, 0.0, 0.0, 0.0]);
+    let gauge = Gauge::of_unknown_field(gain);
+    let d = gauge.divisor;
     let std = |entry: usize, value: f32| {
-        let mut by = trace * (-value / 3.0);
-        if let Some(own) = by.get_mut(entry) {
-            *own += 1.0;
-        }
+        let by = gauge.slopes(entry, value);
         libm::sqrtf((covariance * by).dot(&by)) / d
     };
     let mut errors = Matrix3::zeros();

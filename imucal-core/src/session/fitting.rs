@@ -94,7 +94,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     }
 
     /// From a sphere through the cloud, in whose gauge it stays where the field is not known.
-    fn begin_magnetometer(&self) -> Option<Fit> {
+    pub(super) fn begin_magnetometer(&self) -> Option<Fit> {
         let (centre, radius) = sphere(self.cloud.slots())?;
         let norm = self.settings.field.unwrap_or(radius);
         let gain = Matrix3::from_diagonal_element(norm / radius);
@@ -108,22 +108,24 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         Fit { sensor, solver, used: Used::ALL, rounds: 0, norm, bias: None, radius: norm }
     }
 
-    /// One iteration; where the solver has stopped, outliers are left out, or the fit is judged.
-    #[inline(never)]
     fn go_on(&mut self, mut fit: Fit) {
-        let stopped = match fit.sensor {
-            Sensor::Accelerometer => fit.solver.step(&self.rests(&fit)).is_some(),
-            Sensor::Gyroscope => match self.turns(&fit) {
-                Some(turns) => fit.solver.step(&turns).is_some(),
-                None => return,
-            },
-            Sensor::Magnetometer => fit.solver.step(&self.points_of(&fit)).is_some(),
-        };
-        if stopped && !self.refine(&mut fit) {
-            self.judge(&fit);
-        } else {
-            self.fit = Some(fit);
+        match self.advance(&mut fit) {
+            Some(true) => self.judge(&fit),
+            Some(false) => self.fit = Some(fit),
+            None => {}
         }
+    }
+
+    /// One iteration; where the solver has stopped, outliers are left out, or the fit is at its end: whether it is. `None` where
+    /// there is nothing to fit.
+    #[inline(never)]
+    pub(super) fn advance(&self, fit: &mut Fit) -> Option<bool> {
+        let stopped = match fit.sensor {
+            Sensor::Accelerometer => fit.solver.step(&self.rests(fit)).is_some(),
+            Sensor::Gyroscope => fit.solver.step(&self.turns(fit)?).is_some(),
+            Sensor::Magnetometer => fit.solver.step(&self.points_of(fit)).is_some(),
+        };
+        Some(stopped && !self.refine(fit))
     }
 
     pub(super) fn rests(&self, fit: &Fit) -> Rests<'_, N, B> {

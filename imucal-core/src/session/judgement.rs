@@ -167,6 +167,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             error: accept::relative_error(&triad.gain, &std, criteria.radius),
             verdict: summary.check(&triad, &std, criteria),
             field_norm: None,
+            alignment_error: None,
             left_out: count.saturating_sub(fit.used.count(count)) as u8,
         }
     }
@@ -184,7 +185,7 @@ fn list<V, const R: usize>(values: impl Iterator<Item = V>) -> Vec<V, R> {
 /// The covariance that is stated: of the residuals' variance, with that of white noise counted as [`PRIOR`] more of them where it
 /// is known, and wider by what few residuals leave open.
 #[inline]
-fn stated(fit: &Fit, white: Option<f32>) -> Option<SMatrix<f32, 9, 9>> {
+pub(super) fn stated(fit: &Fit, white: Option<f32>) -> Option<SMatrix<f32, 9, 9>> {
     let variance = fit.solver.variance()?;
     let own = fit.solver.report().independent_rows.saturating_sub(9) as f32;
     let (known, weight) = white.map_or((0.0, 0.0), |white| (white, PRIOR));

@@ -11,6 +11,7 @@
 //! | `evidence` | rows of the fits, from what is kept |
 //! | [`estimate`] | a sensor's triad, its errors and its verdict |
 //! | `fitting`, `judgement` | fits by slices, outliers; errors and verdicts |
+//! | [`alignment`] | the magnetometer in the accelerometer's axes |
 //! | [`design`] | which pose says most |
 //! | [`guide`] | what to do next, how sure each sensor is, what was thrown away |
 //! | [`store`] | whether a new record takes the place of the stored one |
@@ -19,10 +20,10 @@
 //! A session is plain data of fixed size. [`Session::push`] takes a sample and costs a few hundred instructions;
 //! [`Session::work`] does one slice of a fit, and is called whenever there is time. All is in `f32`, and to the same bits on a host.
 //!
-//! Not done here: the record's write to flash, the units of raw samples (nominal SI comes in), the rotation of the
-//! magnetometer's axes into the accelerometer's, g-sensitivity, and the host's examination of residuals: what the host accepts with
-//! a suspicion, a session accepts without one.
+//! Not done here: the record's write to flash, the units of raw samples (nominal SI comes in), g-sensitivity, and the host's
+//! examination of residuals: what the host accepts with a suspicion, a session accepts without one.
 
+pub mod alignment;
 pub mod bias;
 pub mod design;
 pub mod estimate;

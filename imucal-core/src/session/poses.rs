@@ -135,6 +135,12 @@ impl<const N: usize, const B: usize> Poses<N, B> {
         before.saturating_sub(self.list.len())
     }
 
+    /// As if a rest had been without a magnetometer.
+    #[cfg(test)]
+    pub(super) fn forget_field(&mut self, at: usize) {
+        self.list[at].field = Vector3::repeat(f32::NAN);
+    }
+
     /// What is kept, in the order of its coming.
     pub fn list(&self) -> &[Pose<B>] {
         &self.list
@@ -163,6 +169,11 @@ impl<const B: usize> Pose<B> {
         let apart = self.temperature - other.temperature;
         let warmth = if apart.is_finite() { BY_WARMTH * apart * apart } else { 0.0 };
         self.direction().dot(&other.direction()) - warmth
+    }
+
+    /// The field was measured.
+    pub(super) fn has_field(&self) -> bool {
+        self.field.x.is_finite()
     }
 
     /// A turn led to it.

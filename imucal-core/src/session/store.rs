@@ -80,7 +80,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     }
 
     /// Length of a calibrated vector that errors are compared at.
-    fn length(&self, sensor: Sensor) -> f32 {
+    pub(super) fn length(&self, sensor: Sensor) -> f32 {
         match sensor {
             Sensor::Accelerometer => self.settings.gravity,
             Sensor::Gyroscope => 1.0,

@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::{session::guide::Advice, temperature::TemperatureTerms, triad::Triad};
 
+mod alignment;
 mod fewest;
 mod warmth;
 

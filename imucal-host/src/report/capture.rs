@@ -1,8 +1,12 @@
 //! The guide of a session, in sentences.
 
-use imucal_core::session::{
-    SessionSettings,
-    guide::{Advice, Guide},
+use imucal_core::{
+    record::Sensor,
+    session::{
+        SessionSettings,
+        alignment::NotAligned,
+        guide::{Advice, Guide},
+    },
 };
 
 use super::{
@@ -93,6 +97,33 @@ pub fn state(guide: &Guide, settings: &SessionSettings, recorded: &[SensorKind])
     text
 }
 
+/// Whose axes a magnetometer's calibration is in: the standard error of its rotation into the accelerometer's, rad, or why it was
+/// not turned.
+pub fn axes(turned: Result<f32, NotAligned>) -> String {
+    let why = match turned {
+        Ok(error) => {
+            let degrees = rounded(f64::from(error).to_degrees(), 2);
+            return format!("magnetometer in the accelerometer's axes, to {degrees}°");
+        }
+        Err(NotAligned::Already) => return "magnetometer in the accelerometer's axes".into(),
+        Err(NotAligned::NotAccepted(Sensor::Magnetometer)) => "it is not accepted".into(),
+        Err(NotAligned::NotAccepted(_)) => "no accelerometer is accepted".into(),
+        Err(NotAligned::TooFewRests { have, need }) => {
+            format!("the field was measured at {have} rests of the {need} that are needed")
+        }
+        Err(NotAligned::Unsure { error, .. }) if error.is_nan() => {
+            "the rests do not show how it lies; tilt the sensor in more directions".into()
+        }
+        Err(NotAligned::Unsure { error, most }) => {
+            let [error, most] = [error, most].map(|angle| rounded(f64::from(angle).to_degrees(), 1));
+            format!(
+                "the rests show how it lies to {error}° alone, {most}° are needed; tilt the sensor in more directions"
+            )
+        }
+    };
+    format!("magnetometer in axes of its own: {why}")
+}
+
 fn percent(share: f32) -> String {
     plain(100.0 * f64::from(share))
 }
@@ -100,6 +131,21 @@ fn percent(share: f32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn whose_axes_a_magnetometer_is_in_is_said_with_the_reason() {
+        assert_eq!(axes(Ok(0.0035)), "magnetometer in the accelerometer's axes, to 0.20°");
+        let few = axes(Err(NotAligned::TooFewRests { have: 5, need: 8 }));
+        let expected =
+            "magnetometer in axes of its own: the field was measured at 5 rests of the 8 that are needed";
+        assert_eq!(few, expected);
+        let unsure = axes(Err(NotAligned::Unsure { error: 0.1, most: 0.035 }));
+        assert!(unsure.contains("to 5.7° alone, 2.0° are needed"), "{unsure}");
+        assert!(
+            axes(Err(NotAligned::Unsure { error: f32::NAN, most: 0.035 }))
+                .contains("do not show how it lies")
+        );
+    }
 
     #[test]
     fn a_direction_is_said_by_the_axes_that_point_there() {

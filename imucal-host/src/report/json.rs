@@ -118,7 +118,7 @@ fn fit_value(kind: SensorKind, fit: &FitSummary) -> Value {
 fn alignment(found: &Alignment) -> Value {
     json!({
         "rotation_vector": vector(&found.phi),
-        "rotation_std": vector(&found.covariance.diagonal().map(f64::sqrt)),
+        "rotation_std": vector(&found.axes.covariance.diagonal().map(f64::sqrt)),
         "dip": found.dip.0,
         "dip_std": found.dip.1,
         "dip_rms": found.rms,

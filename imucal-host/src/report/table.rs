@@ -216,7 +216,7 @@ fn write_notes(text: &mut String, fit: &FitSummary) -> fmt::Result {
         )?;
     }
     if let Some(alignment) = &fit.alignment {
-        let std = alignment.covariance.diagonal().map(f64::sqrt);
+        let std = alignment.axes.covariance.diagonal().map(f64::sqrt);
         let by = |k: usize| measured_degrees(alignment.phi[k], std[k]);
         let held = alignment.held_out_rms.map_or_else(
             || "no rest can be held out".into(),

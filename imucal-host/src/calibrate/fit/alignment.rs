@@ -1,8 +1,11 @@
 //! A magnetometer brought into the accelerometer's axes: the rotation that makes the dip the same in every rest.
 
 use imucal_core::{
-    model::dip::{DipModel, DirectionPair},
-    rotation::{cross_matrix, exp_with_jacobian},
+    model::{
+        alignment,
+        dip::{DipModel, DirectionPair, LARGEST_ERROR, LEAST_POSES, RELABELLINGS, is_lower, relabelling},
+    },
+    rotation::cross_matrix,
     solver::{LevenbergMarquardt, lm::Settings},
     triad::Triad,
 };
@@ -15,28 +18,16 @@ use super::{
 };
 use crate::noise::interval::{Parts, Scale};
 
-/// Rests at least: four parameters, and some to check them.
-const LEAST_RESTS: usize = 8;
-/// Largest standard error of the rotation, rad (2°).
-const LIMIT: f64 = 0.035;
 /// Noise of the field at rest against that of the directions, in multiples of what rests show of both.
 const RATIOS: [(f64, f64); 4] = [(1.0, 0.5), (4.0, 0.2), (16.0, 0.2), (64.0, 0.1)];
 
 /// Where the magnetometer's axes lie against the accelerometer's.
 #[derive(Clone, Copy, Debug)]
 pub struct Alignment {
-    /// Rotation from the magnetometer's axes to the accelerometer's.
-    pub rotation: Matrix3<f64>,
+    /// Rotation from the magnetometer's axes to the accelerometer's, with the covariance of the directions' own errors.
+    pub axes: alignment::Alignment<f64>,
     /// Rotation vector of it, rad.
     pub phi: Vector3<f64>,
-    /// Covariance of the rotation's error, accelerometer axes, rad²: of the directions' own errors, for triads as
-    /// they are.
-    pub covariance: Matrix3<f64>,
-    /// How the rotation moves with an error of the magnetometer's triad, b → b + E b + c: by E by rows, then c, in
-    /// lengths of the field. See [`Self::turn`].
-    by_mag: SMatrix<f64, 3, 12>,
-    /// Mean length of the field in the pairs.
-    field: f64,
     /// Dip of the field, rad, positive down, and its standard error.
     pub dip: (f64, f64),
     /// Rms of the dip over the rests, rad.
@@ -67,7 +58,7 @@ pub fn align_at_rests(
 ) -> Option<Alignment> {
     let pairs: Vec<_> =
         at_rest.iter().map(|seen| (directions.calibrated(seen.rest), triad.correct(&seen.mean))).collect();
-    if pairs.len() < LEAST_RESTS || pairs.iter().any(|(f, b)| !(f + b).iter().all(|x| x.is_finite())) {
+    if pairs.len() < LEAST_POSES || pairs.iter().any(|(f, b)| !(f + b).iter().all(|x| x.is_finite())) {
         return None;
     }
     let errors = |model: &DipModel<'_, f64>, theta: &SVector<f64, 4>| {
@@ -110,57 +101,29 @@ fn align_with(pairs: &[(Vector3<f64>, Vector3<f64>)], errors: Covariance<'_>) ->
         .map(|(f, b)| DirectionPair { u_f: f.normalize(), u_b: b.normalize() })
         .filter(|pair| pair.u_f.iter().chain(pair.u_b.iter()).all(|x| x.is_finite()))
         .collect();
-    if pairs.len() < LEAST_RESTS {
+    if pairs.len() < LEAST_POSES {
         return None;
     }
     let model = DipModel { pairs: &pairs };
     let solver = best(&model);
     let covariance = errors(&model, solver.theta()).or_else(|| solver.covariance())?;
-    let (rotation, jacobian) = exp_with_jacobian(&solver.theta().xyz());
-    let own = jacobian * covariance.fixed_view::<3, 3>(0, 0) * jacobian.transpose();
-    let error = own.diagonal().max().sqrt();
-    if !solver.report().termination.was_successful() || error.is_nan() || error > LIMIT {
+    let inverse = solver.factor().covariance(1.0)?;
+    let axes = alignment::Alignment::new(pairs.iter().copied(), field, solver.theta(), &covariance, &inverse);
+    let error = axes.error();
+    if !solver.report().termination.was_successful() || error.is_nan() || error > LARGEST_ERROR {
         return None;
     }
-    let by_mag = moved_by_mag(&model, solver.theta(), &jacobian)?;
     let cos = solver.theta().w.clamp(-1.0, 1.0);
     // An error of the cosine is one of the angle, by the sine between gravity and field.
     let per_angle = (1.0 - cos * cos).sqrt().max(1e-3);
     Some(Alignment {
-        rotation,
+        axes,
         phi: solver.theta().xyz(),
-        covariance: own,
-        by_mag,
-        field,
         dip: ((-cos).asin(), covariance[(3, 3)].sqrt() / per_angle),
         rms: solver.variance()?.sqrt() / per_angle,
         held_out_rms: held_out(&model, solver.theta()).map(|rms| rms / per_angle),
         rests: pairs.len(),
     })
-}
-
-/// Derivative of the rotation's error δ by an error of the magnetometer's triad, b → b + E b + c with |b| = 1:
-/// `dr = u_fᵀ R (1 − u_b u_bᵀ)(E u_b + c)` moves the optimum by `−(JᵀJ)⁻¹ Jᵀ dr`.
-fn moved_by_mag(
-    model: &DipModel<'_, f64>,
-    theta: &SVector<f64, 4>,
-    jacobian: &Matrix3<f64>,
-) -> Option<SMatrix<f64, 3, 12>> {
-    let rows = Rows::of(model, theta);
-    let rotation = imucal_core::rotation::exp(&theta.xyz());
-    let (mut normal, mut right) = (SMatrix::<f64, 4, 4>::zeros(), SMatrix::<f64, 4, 12>::zeros());
-    for (pair, row) in model.pairs.iter().zip(&rows.jacobian) {
-        let seen = rotation.tr_mul(&pair.u_f);
-        let across = seen - pair.u_b * pair.u_b.dot(&seen);
-        let by = SVector::<f64, 12>::from_fn(|k, _| match k {
-            0..9 => across[k / 3] * pair.u_b[k % 3],
-            _ => across[k - 9],
-        });
-        normal += row * row.transpose();
-        right += row * by.transpose();
-    }
-    let moved = -(normal.try_inverse()? * right);
-    Some(jacobian * moved.fixed_rows::<3>(0))
 }
 
 /// The best of fits from the 24 ways in which axes can be relabelled without a mirror: a magnetometer may lie any way
@@ -171,24 +134,19 @@ fn best(model: &DipModel<'_, f64>) -> LevenbergMarquardt<f64, 4> {
         solver.run(model);
         solver
     };
-    let mut chosen = fit(SVector::zeros());
-    for rotation in relabellings() {
-        let phi = nalgebra::Rotation3::from_matrix_unchecked(rotation).scaled_axis();
-        let other = fit(SVector::<f64, 4>::new(phi.x, phi.y, phi.z, 0.0));
-        // The nearest to no rotation wins a tie: only rounding distinguishes them.
-        if other.report().cost < 0.99 * chosen.report().cost {
+    let [own, others @ ..] = &RELABELLINGS;
+    let start = |way: &([i8; 3], i8)| {
+        let phi = relabelling::<f64>(*way);
+        SVector::<f64, 4>::new(phi.x, phi.y, phi.z, 0.0)
+    };
+    let mut chosen = fit(start(own));
+    for way in others {
+        let other = fit(start(way));
+        if is_lower(other.report().cost, chosen.report().cost) {
             chosen = other;
         }
     }
     chosen
-}
-
-fn relabellings() -> impl Iterator<Item = Matrix3<f64>> {
-    let axes = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z(), -Vector3::z()];
-    axes.into_iter()
-        .flat_map(move |a| axes.into_iter().map(move |b| (a, b)))
-        .filter(|(a, b)| a.dot(b) == 0.0)
-        .map(|(a, b)| Matrix3::from_columns(&[a, b, a.cross(&b)]))
 }
 
 fn held_out(model: &DipModel<'_, f64>, theta: &SVector<f64, 4>) -> Option<f64> {
@@ -203,47 +161,36 @@ fn held_out(model: &DipModel<'_, f64>, theta: &SVector<f64, 4>) -> Option<f64> {
 impl Alignment {
     /// The triad in the accelerometer's axes, and the covariance of its twelve entries (gain by rows, bias).
     /// `covariance` is that of the entries `of` before.
-    ///
-    /// With `dG' = R dG + [δ]× R G`. An error of the triad moves the rotation with it, most of all one that turns its
-    /// axes: δ is that of the directions plus what follows dG and db, by `E = dG G⁻¹`, `c = −G db`.
     pub fn turn(
         &self,
         triad: &Triad<f64>,
         covariance: &DMatrix<f64>,
         of: &[u8],
     ) -> (Triad<f64>, SMatrix<f64, 12, 12>) {
-        let gain = self.rotation * triad.gain;
+        let turned = self.axes.turned(triad);
+        let entries = |triad: &Triad<f64>| {
+            let by_rows = triad.gain.transpose();
+            SVector::<f64, 12>::from_iterator(by_rows.iter().chain(triad.bias.iter()).copied())
+        };
         let mut by_rotation = SMatrix::<f64, 12, 3>::zeros();
         for axis in 0..3 {
-            let moved = cross_matrix(&Vector3::ith(axis, 1.0)) * gain;
-            for k in 0..9 {
-                by_rotation[(k, axis)] = moved[(k / 3, k % 3)];
-            }
+            let gain = cross_matrix(&Vector3::ith(axis, 1.0)) * turned.gain;
+            by_rotation.set_column(axis, &entries(&Triad { gain, bias: Vector3::zeros() }));
         }
         let inverse = triad.gain.try_inverse().unwrap_or_else(Matrix3::zeros);
         let mut by_entries = DMatrix::zeros(12, of.len());
         for (column, entry) in of.iter().enumerate() {
-            let mut moved = SVector::<f64, 12>::zeros();
-            let mut carried = SVector::<f64, 12>::zeros();
+            let mut change = Triad { gain: Matrix3::zeros(), bias: Vector3::zeros() };
             match usize::from(*entry) {
-                k @ 0..9 => {
-                    for at in 0..3 {
-                        moved[3 * at + k % 3] = self.rotation[(at, k / 3)];
-                        carried[3 * (k / 3) + at] = inverse[(k % 3, at)];
-                    }
-                }
-                k => {
-                    moved[k] = 1.0;
-                    let shift = -triad.gain.column(k - 9) / self.field;
-                    carried.fixed_rows_mut::<3>(9).copy_from(&shift);
-                }
+                k @ 0..9 => change.gain[(k / 3, k % 3)] = 1.0,
+                k => change.bias[k - 9] = 1.0,
             }
-            by_entries.set_column(column, &(moved + by_rotation * (self.by_mag * carried)));
+            by_entries.set_column(column, &entries(&self.axes.followed(triad, &inverse, &change)));
         }
         let own = &by_entries * covariance * by_entries.transpose();
-        let turned = by_rotation * self.covariance * by_rotation.transpose();
-        let total = SMatrix::<f64, 12, 12>::from_fn(|i, j| own[(i, j)] + turned[(i, j)]);
-        (Triad { gain, bias: triad.bias }, total)
+        let by_axes = by_rotation * self.axes.covariance * by_rotation.transpose();
+        let total = SMatrix::<f64, 12, 12>::from_fn(|i, j| own[(i, j)] + by_axes[(i, j)]);
+        (turned, total)
     }
 }
 
@@ -270,7 +217,7 @@ mod tests {
             })
             .collect();
         let alignment = align(&pairs).unwrap();
-        assert!((alignment.rotation - mounted).norm() < 1e-3, "{}", alignment.rotation);
+        assert!((alignment.axes.rotation - mounted).norm() < 1e-3, "{}", alignment.axes.rotation);
         assert!((alignment.dip.0 - (40.0f64 / 25.0f64.hypot(2.0)).atan()).abs() < 1e-3);
     }
 }

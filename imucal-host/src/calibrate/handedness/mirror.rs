@@ -171,7 +171,7 @@ fn by_hand(recording: &Recording, calibration: &mut Calibration, turned: Option<
 fn aligned(recording: &Recording, calibration: &Calibration) -> Option<Aligned> {
     let fit = calibration.sensor(SensorKind::Mag)?.passed()?;
     let alignment = fit.alignment.as_ref()?;
-    let (code, angle) = nearest(&alignment.rotation);
+    let (code, angle) = nearest(&alignment.axes.rotation);
     let dip = alignment.dip.0;
     let down = recording.manifest.site.field_points_down().filter(|_| dip.abs() > LEAST_DIP);
     Some(Aligned {

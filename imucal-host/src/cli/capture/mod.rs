@@ -121,6 +121,9 @@ fn here(arguments: &Arguments, path: &Path, mut files: OutputSet) -> anyhow::Res
             say!("{} follows the temperature: gain and bias hold at {:.1} °C", words(kind), terms.reference);
         }
     }
+    if stored.mag.is_some() {
+        say!("{}", report::capture::axes(capture::axes_of_magnetometer(&session)));
+    }
     if SensorKind::ALL.into_iter().all(|kind| stored.triad(kind).is_none()) {
         warn_of_nothing(arguments);
     } else {

@@ -129,6 +129,9 @@ fn end(
         .iter()
         .filter(|kind| adopted(kind))
         .all(|kind| here.is_none_or(|here| is_equal(here, task, &record, *kind)));
+    if let Some(here) = here.filter(|_| adopted(&SensorKind::Mag)) {
+        say!("{}", report::capture::axes(capture::axes_of_magnetometer(here)));
+    }
     if here.is_some() {
         say!("the same session here: {}", if equal { "equal bit for bit" } else { "DIFFERENT" });
     }
