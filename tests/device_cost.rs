@@ -7,7 +7,7 @@ use firmware_example::{
     fitting::{self, Fitting},
     standalone::{POSES, Standalone},
 };
-use imucal_core::session::temperature::WarmthFit;
+use imucal_core::session::{alignment::AlignmentFit, temperature::WarmthFit};
 use imucal_tests::call_stack::CallGraph;
 use imucal_tests::coprocessor::painted_stack;
 use imucal_tests::firmware::{MEASURED, SHIFT, announce, counted, ready};
@@ -87,6 +87,8 @@ fn every_part_stays_within_its_instructions_flash_ram_and_stack() {
     announce(&format!("{:<46} {session:>12}", "RAM: of them a session"));
     let warmth = size_of::<WarmthFit<POSES>>();
     announce(&format!("{:<46} {warmth:>12}", "RAM: of them its terms of temperature"));
+    let alignment = size_of::<AlignmentFit>();
+    announce(&format!("{:<46} {alignment:>12}", "RAM: of them its magnetometer's alignment"));
     announce(&format!("{:<46} {:>12}", "RAM: of them a swarm of 40 in 12 parameters", ram[1]));
     let depths = stack.map(|graph| graph.depth("main"));
     both("stack: the co-processor, by analysis", [0, 1].map(|k| depths[k].bytes.into()));
@@ -101,7 +103,7 @@ fn every_part_stays_within_its_instructions_flash_ram_and_stack() {
     assert!(flash.fits <= FLASH_WITH_FITS, "{}", flash.fits);
     // By the host's pointers, which are wider.
     assert!(session <= 12 * 1024, "{session}");
-    assert!(warmth <= 2560, "{warmth}");
+    assert!(warmth <= 2560 && alignment <= 1024, "{warmth} {alignment}");
     assert!(ram.iter().zip(RAM).all(|(used, budget)| *used <= budget), "{ram:?}");
     for ((depth, painted), room) in depths.iter().zip(painted).zip(room) {
         let most = STACK.min(room);
@@ -212,9 +214,9 @@ fn print_costs([m4, m0]: &[Costs; 2]) {
         ("session: a sample of the field in a turn", "session_field_turn"),
         ("session: the longest slice of a fit", "session_slice"),
         ("session: what to do next", "session_guide"),
-        ("session: longest slice of its magnetometer's rotation", "session_alignment_slice"),
-        ("session: all slices of its magnetometer's rotation", "session_alignment"),
-        ("session: its magnetometer turned, and errors", "session_align"),
+        ("session: longest slice of its alignment", "session_alignment_slice"),
+        ("session: all of its alignment", "session_alignment"),
+        ("session: alignment applied, with errors", "session_align"),
         ("session: longest slice of its temperature terms", "session_warmth_slice"),
         ("session: all temperature terms of 38 rests", "session_warmth"),
     ] {

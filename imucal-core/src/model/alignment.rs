@@ -19,7 +19,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::dip::DirectionPair;
 use crate::{
-    rotation::{cross_matrix, exp_with_jacobian},
+    rotation::{cross_matrix, exp_with_jacobian, image, product},
     scalar::Scalar,
     triad::Triad,
 };
@@ -60,15 +60,20 @@ impl<T: Scalar> Alignment<T> {
                 slope.bias += across * *by;
             }
         }
-        let step = -(jacobian * inverse.fixed_rows::<3>(0));
-        let mut by_triad = [none; 3];
-        for (factors, row) in by_triad.iter_mut().zip(step.row_iter()) {
-            for (slope, by) in slopes.iter().zip(row.iter()) {
-                factors.gain += slope.gain * *by;
-                factors.bias += slope.bias * *by;
+        let sum = |factors: &[T], of: &[Triad<T>]| {
+            let mut sum = none;
+            for (factor, triad) in factors.iter().zip(of) {
+                sum.gain += triad.gain * *factor;
+                sum.bias += triad.bias * *factor;
             }
-        }
-        let covariance = jacobian * covariance.fixed_view::<3, 3>(0, 0) * jacobian.transpose();
+            sum
+        };
+        // Symmetric: its columns are its rows.
+        let [x, y, z, _] = <[[T; 4]; 4]>::from(*inverse).map(|row| sum(&row.map(|factor| -factor), &slopes));
+        let by_triad = <[[T; 3]; 3]>::from(jacobian.transpose()).map(|row| sum(&row, &[x, y, z]));
+        let [a, b, c, _] = <[[T; 4]; 4]>::from(*covariance);
+        let of_phi = Matrix3::from([a, b, c].map(|[x, y, z, _]| [x, y, z]));
+        let covariance = product(&product(&jacobian, &of_phi), &jacobian.transpose());
         Self { rotation, covariance, by_triad, length }
     }
 
@@ -81,16 +86,18 @@ impl<T: Scalar> Alignment<T> {
 
     /// The triad in the other axes.
     pub fn turned(&self, triad: &Triad<T>) -> Triad<T> {
-        Triad { gain: self.rotation * triad.gain, bias: triad.bias }
+        Triad { gain: product(&self.rotation, &triad.gain), bias: triad.bias }
     }
 
     /// How the turned triad follows a small change of `triad`, whose gain has this inverse.
     pub fn followed(&self, triad: &Triad<T>, inverse: &Matrix3<T>, change: &Triad<T>) -> Triad<T> {
-        let (e, c) = (change.gain * inverse, triad.gain * change.bias / -self.length);
+        let e = product(&change.gain, inverse);
+        let c = image(&triad.gain, &change.bias) / -self.length;
         let by = |factors: &Triad<T>| factors.gain.dot(&e) + factors.bias.dot(&c);
         let [x, y, z] = &self.by_triad;
-        let turned = cross_matrix(&Vector3::new(by(x), by(y), by(z))) * (self.rotation * triad.gain);
-        Triad { gain: self.rotation * change.gain + turned, bias: change.bias }
+        let turn = cross_matrix(&Vector3::new(by(x), by(y), by(z)));
+        let turned = product(&turn, &product(&self.rotation, &triad.gain));
+        Triad { gain: product(&self.rotation, &change.gain) + turned, bias: change.bias }
     }
 
     /// Standard errors of the turned triad: how `triad` follows each of its parameters, and their covariance. `None` where its gain
@@ -118,11 +125,12 @@ impl<T: Scalar> Alignment<T> {
         for (at, square) in bias.iter_mut().enumerate() {
             *square = squared(&|change| change.bias.as_slice().get(at).copied());
         }
-        let turned = self.rotation * triad.gain;
-        for (mut sum, column) in gain.column_iter_mut().zip(turned.column_iter()) {
-            let by = cross_matrix(&column.into_owned());
-            sum += (by * self.covariance * by.transpose()).diagonal();
-        }
+        let turned = <[[T; 3]; 3]>::from(product(&self.rotation, &triad.gain));
+        let by_rotation = turned.map(|column| {
+            let by = cross_matrix(&Vector3::from(column));
+            product(&product(&by, &self.covariance), &by.transpose()).diagonal().into()
+        });
+        gain += Matrix3::from(by_rotation);
         Some(Triad { gain: gain.map(T::root), bias: bias.map(T::root) })
     }
 }

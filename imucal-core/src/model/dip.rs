@@ -61,6 +61,7 @@ pub struct DirectionPair<T: Scalar> {
 
 impl<T: Scalar> DirectionPair<T> {
     /// Row of the Jacobian, given R u_b and the derivative of the rotation by φ.
+    #[inline]
     pub(super) fn derivative(&self, turned: &Vector3<T>, jacobian: &Matrix3<T>) -> SVector<T, 4> {
         let by_phi = jacobian.tr_mul(&turned.cross(&self.u_f));
         SVector::<T, 4>::new(by_phi.x, by_phi.y, by_phi.z, -T::one())

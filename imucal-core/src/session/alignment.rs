@@ -62,8 +62,8 @@ pub struct AlignmentFit {
     /// The start that is tried.
     start: usize,
     solver: LevenbergMarquardt<f32, 4>,
-    /// The end that is lowest so far, and its cost.
-    lowest: Option<(f32, LevenbergMarquardt<f32, 4>)>,
+    /// The end that is lowest so far.
+    lowest: Option<LevenbergMarquardt<f32, 4>>,
 }
 
 /// Directions of specific force and field at rest, each calibrated by itself.
@@ -114,7 +114,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             return Err(NotAligned::TooFewRests { have, need: LEAST_POSES });
         }
         let cloud = self.begin_magnetometer().ok_or(NotAligned::NotAccepted(Sensor::Magnetometer))?;
-        Ok(AlignmentFit { cloud, has_cloud: false, start: 0, solver: starting(0), lowest: None })
+        Ok(AlignmentFit { cloud, has_cloud: false, start: 0, solver: Self::starting(0), lowest: None })
     }
 
     /// Turns the magnetometer's estimate as a fit has found at its end. A later fit of the cloud is in the magnetometer's own axes
@@ -147,7 +147,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         let dips = self.dips()?;
         let most = LARGEST_ERROR as f32;
         let unsure = |error: f32| NotAligned::Unsure { error, most };
-        let (_, solver) = fit.lowest.as_ref().ok_or(unsure(f32::NAN))?;
+        let solver = fit.lowest.as_ref().ok_or(unsure(f32::NAN))?;
         let freedom = dips.independent_rows().saturating_sub(4) as f32;
         let (inverse, variance) =
             solver.factor().covariance(1.0).zip(solver.variance()).ok_or(unsure(f32::NAN))?;
@@ -155,11 +155,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         let covariance = inverse * (variance * wider * wider);
         let found = Alignment::new(dips.pairs(), dips.length(), solver.theta(), &covariance, &inverse);
         let error = found.error();
-        let sure = solver.report().termination.was_successful() && error <= most;
-        if !sure {
-            return Err(unsure(error));
-        }
-        let estimate = self.estimate(Sensor::Magnetometer).ok_or(unsure(error))?;
+        let estimate = self.estimate(Sensor::Magnetometer).filter(|_| error <= most).ok_or(unsure(error))?;
         let triad = found.turned(&estimate.triad);
         let covariance = stated(&fit.cloud, None).ok_or(unsure(error))?;
         let std = found.errors(&estimate.triad, &self.changes(&fit.cloud), &covariance);
@@ -194,6 +190,11 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         changes
     }
 
+    fn starting(at: usize) -> LevenbergMarquardt<f32, 4> {
+        let phi = RELABELLINGS.get(at).map_or_else(Default::default, |way| relabelling::<f32>(*way));
+        LevenbergMarquardt::new(SVector::from([phi.x, phi.y, phi.z, 0.0]), Default::default())
+    }
+
     /// Of sensors that are accepted, as long as the magnetometer is in its own axes.
     fn dips(&self) -> Result<Dips<'_, N, B, M>, NotAligned> {
         let accepted = |sensor: Sensor| {
@@ -223,19 +224,16 @@ impl AlignmentFit {
             return true;
         }
         let Ok(dips) = session.dips() else { return false };
-        if self.solver.step(&dips).is_some() {
-            let cost = self.solver.report().cost;
-            if self.lowest.as_ref().is_none_or(|(lowest, _)| is_lower(cost, *lowest)) {
-                self.lowest = Some((cost, self.solver.clone()));
+        if let Some(end) = self.solver.step(&dips) {
+            let cost = self.solver.factor().squared_sum();
+            let is_lowest =
+                self.lowest.as_ref().is_none_or(|lowest| is_lower(cost, lowest.factor().squared_sum()));
+            if end.was_successful() && is_lowest {
+                self.lowest = Some(self.solver.clone());
             }
             self.start += 1;
-            self.solver = starting(self.start);
+            self.solver = Session::<N, B, M>::starting(self.start);
         }
         true
     }
-}
-
-fn starting(at: usize) -> LevenbergMarquardt<f32, 4> {
-    let phi = RELABELLINGS.get(at).map_or_else(Default::default, |way| relabelling::<f32>(*way));
-    LevenbergMarquardt::new(SVector::from([phi.x, phi.y, phi.z, 0.0]), Default::default())
 }

@@ -51,11 +51,13 @@ pub(super) struct Gauge {
 
 impl Gauge {
     /// In a field of known length: d = 1.
+    #[inline]
     pub(super) fn of_known_field() -> Self {
         Self { trace: SVector::zeros(), divisor: 1.0 }
     }
 
     /// In a field of unknown length: a gain of determinant 1, d = det(A)^⅓.
+    #[inline]
     pub(super) fn of_unknown_field(gain: &Matrix3<f32>) -> Self {
         let (x, y, z) = (1.0 / gain.m11, 1.0 / gain.m22, 1.0 / gain.m33);
         let trace = SVector::<f32, 9>::from([x, 0.0, 0.0, y, 0.0, z, 0.0, 0.0, 0.0]);
@@ -63,6 +65,7 @@ impl Gauge {
     }
 
     /// Slopes of d times an entry of A', of that value in A, by the parameters, among which it has this place.
+    #[inline]
     pub(super) fn slopes(&self, entry: usize, value: f32) -> SVector<f32, 9> {
         let mut by = self.trace * (-value / 3.0);
         if let Some(own) = by.get_mut(entry) {
