@@ -44,7 +44,7 @@ fn without(pairs: &[Pair], left_out: usize) -> Alignment {
 
 /// Angle of the field below the horizon at a pair, by an alignment.
 fn dip(pair: &Pair, alignment: &Alignment) -> f64 {
-    (alignment.rotation * pair.1).angle(&pair.0) - std::f64::consts::FRAC_PI_2
+    (alignment.axes.rotation * pair.1).angle(&pair.0) - std::f64::consts::FRAC_PI_2
 }
 
 /// The rotation vector from one rotation to another, in the axes both lead to.
@@ -85,12 +85,12 @@ fn standard_errors_are_those_of_a_jackknife_within_a_factor_of_two() {
         let moves: Vec<[f64; 4]> = (0..pairs.len())
             .map(|k| {
                 let one = without(&pairs, k);
-                let turned = between(&all.rotation, &one.rotation);
+                let turned = between(&all.axes.rotation, &one.axes.rotation);
                 [turned.x, turned.y, turned.z, one.dip.0 - all.dip.0]
             })
             .collect();
         let std =
-            [all.covariance.m11.sqrt(), all.covariance.m22.sqrt(), all.covariance.m33.sqrt(), all.dip.1];
+            [all.axes.covariance.m11.sqrt(), all.axes.covariance.m22.sqrt(), all.axes.covariance.m33.sqrt(), all.dip.1];
         for (k, std) in std.into_iter().enumerate() {
             let mean = moves.iter().map(|moved| moved[k]).sum::<f64>() / count;
             let square: f64 = moves.iter().map(|moved| (moved[k] - mean).powi(2)).sum();
@@ -118,9 +118,9 @@ fn a_known_mounting_is_recovered_from_noisy_directions() {
             })
             .collect();
         let found = align(&pairs).expect("24 attitudes tell it");
-        let error = between(&mounted, &found.rotation);
+        let error = between(&mounted, &found.axes.rotation);
         for axis in 0..3 {
-            let score = error[axis] / found.covariance[(axis, axis)].sqrt();
+            let score = error[axis] / found.axes.covariance[(axis, axis)].sqrt();
             assert!(score.abs() < 3.0, "seed {seed}, axis {axis}: {score}");
             scores.push(score);
         }
@@ -161,7 +161,7 @@ fn mounted_upside_down(seed: u64) -> Vec<f64> {
     let outcome = calibration.sensor(SensorKind::Mag).expect("recorded");
     let fit = outcome.accepted().unwrap_or_else(|| panic!("seed {seed}: {:?}", outcome.verdict));
     let found = fit.alignment.as_ref().expect("24 rests tell it");
-    let off = between(&mounted, &found.rotation).norm();
+    let off = between(&mounted, &found.axes.rotation).norm();
     assert!(off < 2e-3, "seed {seed}: {off} rad: some ten times its error, but not upright");
     let (gain_std, _) = fit.raw_std();
     let error = fit.raw_triad().gain - unit.mag.truth.gain;
