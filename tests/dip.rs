@@ -89,8 +89,12 @@ fn standard_errors_are_those_of_a_jackknife_within_a_factor_of_two() {
                 [turned.x, turned.y, turned.z, one.dip.0 - all.dip.0]
             })
             .collect();
-        let std =
-            [all.axes.covariance.m11.sqrt(), all.axes.covariance.m22.sqrt(), all.axes.covariance.m33.sqrt(), all.dip.1];
+        let std = [
+            all.axes.covariance.m11.sqrt(),
+            all.axes.covariance.m22.sqrt(),
+            all.axes.covariance.m33.sqrt(),
+            all.dip.1,
+        ];
         for (k, std) in std.into_iter().enumerate() {
             let mean = moves.iter().map(|moved| moved[k]).sum::<f64>() / count;
             let square: f64 = moves.iter().map(|moved| (moved[k] - mean).powi(2)).sum();

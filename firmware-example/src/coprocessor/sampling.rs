@@ -195,6 +195,7 @@ impl<
             Err(NotStored::Refused(refusal)) => CaptureOutcome::Refused(refusal),
             Err(NotStored::Surer { stored, new }) => CaptureOutcome::Surer { stored, new },
             Err(NotStored::HigherOrder) => CaptureOutcome::HigherOrder,
+            Err(NotStored::OwnAxes) => CaptureOutcome::OwnAxes,
             Ok(triad) => match self.calibration.adopt(sensor, &triad, date) {
                 Ok(()) => CaptureOutcome::Adopted,
                 Err(Fault::Implausible(defect)) => CaptureOutcome::Implausible(defect),

@@ -147,6 +147,8 @@ pub enum CaptureOutcome {
     Implausible(Defect),
     /// The one in use has terms that a session does not fit: nonlinear ones, or of temperature to second order.
     HigherOrder,
+    /// The magnetometer in use is in the accelerometer's axes, the new one in its own.
+    OwnAxes,
 }
 
 /// Samples of a message.

@@ -17,7 +17,6 @@ use super::{
     poses::unit,
 };
 use crate::{
-    accept,
     model::{
         Model, RowSink,
         alignment::Alignment,
@@ -160,9 +159,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         let covariance = stated(&fit.cloud, None).ok_or(unsure(error))?;
         let std = found.errors(&estimate.triad, &self.changes(&fit.cloud), &covariance);
         let std = std.ok_or(unsure(error))?;
-        let radius = self.length(Sensor::Magnetometer) * libm::sqrtf(3.0 / triad.gain.norm_squared());
-        let relative = accept::relative_error(&triad.gain, &std, radius);
-        Ok(Estimate { triad, std, error: relative, alignment_error: Some(error), ..*estimate })
+        Ok(Estimate { triad, std, alignment_error: Some(error), ..*estimate })
     }
 
     /// How the estimate follows the parameters of the cloud's fit.

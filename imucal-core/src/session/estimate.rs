@@ -18,7 +18,8 @@ pub struct Estimate {
     pub std: Triad<f32>,
     /// Figures of the fit.
     pub summary: FitSummary<f32>,
-    /// Error of a calibrated vector to be expected, as a share of its length: [`crate::accept::relative_error`].
+    /// Error of a calibrated vector to be expected, in axes of the sensor's own, as a share of its length:
+    /// [`crate::accept::relative_error`].
     pub error: f32,
     /// Why it is not accepted, if it is not.
     pub verdict: Result<(), Refusal>,

@@ -33,6 +33,8 @@ pub enum NotStored {
     },
     /// The stored one has terms that a session does not fit: nonlinear ones, or of temperature to second order.
     HigherOrder,
+    /// The stored magnetometer is in the accelerometer's axes, the new one in its own.
+    OwnAxes,
 }
 
 impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
@@ -57,7 +59,8 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         self.surer(sensor, new, stored)
     }
 
-    /// A new calibration, if it is surer than the one `stored`.
+    /// A new calibration, if it is surer than the one `stored`. A magnetometer in the accelerometer's axes takes the place of one in axes
+    /// of its own, whose errors do not say how it lies, and not the other way round.
     #[inline(never)]
     pub(super) fn surer<O: Order>(
         &self,
@@ -68,6 +71,11 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         if let Some(stored) = stored {
             if !stored.order.is_first_order() {
                 return Err(NotStored::HigherOrder);
+            }
+            match (is_turned(sensor, &stored.gain), is_turned(sensor, &new.gain)) {
+                (true, false) => return Err(NotStored::OwnAxes),
+                (false, true) => return Ok(new),
+                _ => {}
             }
             let length = self.length(sensor);
             let (old, now) = (stated_error(stored, length), stated_error(&new, length));
@@ -80,7 +88,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     }
 
     /// Length of a calibrated vector that errors are compared at.
-    pub(super) fn length(&self, sensor: Sensor) -> f32 {
+    fn length(&self, sensor: Sensor) -> f32 {
         match sensor {
             Sensor::Accelerometer => self.settings.gravity,
             Sensor::Gyroscope => 1.0,
@@ -90,6 +98,12 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             }
         }
     }
+}
+
+/// A magnetometer's gain is in the accelerometer's axes: in those of its own it is upper triangular.
+fn is_turned(sensor: Sensor, [_, second, third]: &[[f32; 3]; 3]) -> bool {
+    let ([y, ..], [z, w, _]) = (second, third);
+    sensor == Sensor::Magnetometer && (*y != 0.0 || *z != 0.0 || *w != 0.0)
 }
 
 /// Terms of temperature of the `stored` calibration, from a reference temperature, °C, on; `None` without any, or in another raw unit.

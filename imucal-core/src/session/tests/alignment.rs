@@ -1,5 +1,12 @@
 use super::*;
-use crate::session::alignment::NotAligned;
+use crate::{
+    fit::Units,
+    record::{RawUnit, TriadRecord},
+    session::{
+        alignment::NotAligned,
+        store::{NotStored, stated_error},
+    },
+};
 
 /// A session that ends, of a unit whose magnetometer lies like `phi` on its board.
 fn session(seed: u64, phi: &Vector3<f64>) -> (Held, Triad<f64>) {
@@ -53,4 +60,21 @@ fn a_magnetometer_without_rests_to_compare_it_at_stays_in_its_own_axes_and_says_
         blind.poses.forget_field(pose);
     }
     assert_eq!(blind.align_axes(), Err(NotAligned::TooFewRests { have: 0, need: 8 }));
+}
+
+#[test]
+fn a_magnetometer_in_the_accelerometer_s_axes_takes_the_place_of_one_in_its_own_and_not_the_other_way_round()
+{
+    let units = Units { raw: RawUnit::Counts, calibrated: RawUnit::Arbitrary, offset: 0.0, per_unit: 100.0 };
+    let (mut again, _) = session(3, &Vector3::new(0.3, 0.0, 0.0));
+    let better =
+        |session: &Held, stored: Option<&TriadRecord>| session.better(Sensor::Magnetometer, &units, stored);
+    let own = better(&again, None).expect("accepted");
+    assert_eq!(again.align_axes(), Ok(()));
+    let turned = better(&again, None).expect("accepted");
+    // Its errors are larger, since they say how it lies.
+    assert!(stated_error(&turned, 48.0) > stated_error(&own, 48.0));
+    assert_eq!(better(&again, Some(&own)), Ok(turned.clone()));
+    let (plain, _) = session(3, &Vector3::new(0.3, 0.0, 0.0));
+    assert_eq!(better(&plain, Some(&turned)), Err(NotStored::OwnAxes));
 }

@@ -225,10 +225,12 @@ fn reason(why: &NotStored) -> String {
         NotStored::Refused(refusal) => refusal.to_string(),
         NotStored::Surer { stored, new } => surer(*stored, *new),
         NotStored::HigherOrder => HIGHER_ORDER.into(),
+        NotStored::OwnAxes => OWN_AXES.into(),
     }
 }
 
 const HIGHER_ORDER: &str = "the one in use has nonlinear terms, or terms of temperature to second order, which a session does not fit";
+const OWN_AXES: &str = "the one in use is in the accelerometer's axes, this one in its own";
 const TOO_LITTLE: &str = "too few rests, turns or places of the field for a fit";
 
 fn surer(stored: f32, new: f32) -> String {

@@ -13,7 +13,7 @@ use imucal_core::{
 };
 
 use super::{
-    Arguments, HIGHER_ORDER, Lines, TOO_LITTLE, recorded, settings_of, shares, surer, task_of,
+    Arguments, HIGHER_ORDER, Lines, OWN_AXES, TOO_LITTLE, recorded, settings_of, shares, surer, task_of,
     warn_of_nothing, write,
 };
 use crate::{
@@ -162,6 +162,7 @@ fn reason(outcome: &CaptureOutcome) -> String {
         CaptureOutcome::Surer { stored, new } => surer(*stored, *new),
         CaptureOutcome::Implausible(defect) => defect.to_string(),
         CaptureOutcome::HigherOrder => HIGHER_ORDER.into(),
+        CaptureOutcome::OwnAxes => OWN_AXES.into(),
         _ => TOO_LITTLE.into(),
     }
 }
