@@ -1,6 +1,7 @@
 //! How long `imucal diagnose` takes over nine channels at 100 Hz, reading included, and how much memory it holds: 650 s with no
-//! effect and with one to three, also at 1 kHz, an hour, and four hours, these with a lever arm, too; and a robot's recording of 650 s with its simulator's stream, of
-//! each machine. Times are medians of three runs. Fails above its limits, so that it needs a machine with nothing else to do. `IMUCAL_BEFORE=PROGRAM` runs an older program on the same recordings and prints the ratio.
+//! effect and with one to three, also at 1 kHz, an hour, and four hours, these with a lever arm, too; and a robot's recording of 650 s
+//! with its simulator's stream, of each machine. Times are medians of three runs. Fails above its limits, so that it needs a machine
+//! with nothing else to do. `IMUCAL_BEFORE=PROGRAM` runs an older program on the same recordings and prints the ratio.
 
 use std::{
     env,

@@ -207,8 +207,8 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
 }
 
 impl AlignmentFit {
-    /// One slice: an iteration of the cloud's fit, or of the dip's from one of the starts; false once nothing is left to be done. The session must be as it was when
-    /// the fit began.
+    /// One slice: an iteration of the cloud's fit, or of the dip's from one of the starts; false once nothing is left to be done. The
+    /// session must be as it was when the fit began.
     pub fn work<const N: usize, const B: usize, const M: usize>(
         &mut self,
         session: &Session<N, B, M>,

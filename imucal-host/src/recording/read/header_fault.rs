@@ -86,8 +86,23 @@ fn listed(items: impl ExactSizeIterator<Item = String>) -> String {
     if more == 0 { shown.join(", ") } else { format!("{} and {more} more", shown.join(", ")) }
 }
 
+/// On one line: line ends, tabs and other control characters are shown as escapes.
 fn quoted(name: &str) -> String {
     const LONGEST: usize = 60;
-    let shown: String = name.chars().take(LONGEST).collect();
-    if shown.len() < name.len() { format!("`{shown}…`") } else { format!("`{name}`") }
+    let shown = |c: char| if c.is_control() { c.escape_default().to_string() } else { c.to_string() };
+    let text: String = name.chars().take(LONGEST).map(shown).collect();
+    let rest = if name.chars().nth(LONGEST).is_some() { "…" } else { "" };
+    format!("`{text}{rest}`")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_shown_on_one_line_and_cut_where_it_is_long() {
+        assert_eq!(quoted("a line\nand\tanother"), "`a line\\nand\\tanother`");
+        assert_eq!(quoted(&"µ".repeat(60)), format!("`{}`", "µ".repeat(60)));
+        assert_eq!(quoted(&"µ".repeat(61)), format!("`{}…`", "µ".repeat(60)));
+    }
 }
