@@ -22,6 +22,7 @@ use imucal_host::{
 use imucal_tests::{
     data,
     firmware::{BOARDS, build, ready},
+    simulated,
 };
 
 /// PSRAM of the emulated board, and where the tape lies in it.
@@ -166,6 +167,24 @@ fn raw_samples_alone_end_in_a_stored_record_with_the_bits_of_the_host() {
         // Stored once, it is not replaced by a session that is no surer.
         assert!(on_device(folder.path(), &tape).contains("nothing stored"));
     }
+}
+
+#[test]
+fn a_magnetometer_ends_in_the_accelerometer_s_axes_with_the_bits_of_the_host() {
+    if !ready() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let tape = tape(&simulated::tumbled(24, 4000));
+    let device = on_device(folder.path(), &tape);
+    let mut flash = vec![0; FLASH];
+    assert_eq!(device, on_host(&tape, &mut flash));
+    let [there, here] = [stored(folder.path()), record_in(flash)]
+        .map(|record| record.expect("a record").mag.expect("accepted"));
+    assert_eq!((there.gain, there.quality), (here.gain, here.quality));
+    // In its own axes it would be upper triangular.
+    let [_, [y, ..], [z, w, _]] = there.gain;
+    assert!([y, z, w].iter().all(|entry| *entry != 0.0), "{:?}", there.gain);
 }
 
 #[test]

@@ -226,7 +226,7 @@ impl Capture {
     #[inline(never)]
     pub(super) fn close(&mut self) -> Option<Sensor> {
         let sensor = *Sensor::ALL.get(self.outcomes.len())?;
-        if sensor == Sensor::Magnetometer && self.turns() {
+        if sensor == Sensor::Magnetometer && self.aligns() {
             return None;
         }
         match self.warmth.first_mut() {
@@ -236,7 +236,7 @@ impl Capture {
     }
 
     /// One slice of the magnetometer's rotation; whether there was one.
-    fn turns(&mut self) -> bool {
+    fn aligns(&mut self) -> bool {
         let Some(fit) = self.alignment.first_mut() else { return self.begin_alignment() };
         // Where it cannot be turned, it stays in its own axes.
         fit.work(&self.session) || self.session.align(fit).is_ok()

@@ -21,9 +21,8 @@ use crate::scalar::Scalar;
 pub mod attitude;
 mod block;
 pub mod dip;
-
+// Of a dip's rotation.
 pub mod alignment;
-
 pub mod norm;
 pub mod parameterisation;
 pub mod rig;

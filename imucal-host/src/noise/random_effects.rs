@@ -79,7 +79,7 @@ struct Rows {
 /// Cross-products of columns with themselves and with the random effects.
 #[derive(Clone, Debug)]
 pub struct CrossProducts {
-    /// The random effects.
+    /// The random numbers.
     pub effects: Arc<States>,
     /// Xᵀ D⁻¹ X.
     pub plain: DMatrix<f64>,

@@ -41,8 +41,8 @@ const CREEP: f64 = 3e-3;
 const NOISES: f64 = 8.0;
 /// Two rates further apart than this, rad/s, and than their noise are those of a jerk.
 const JERK: f64 = 1e-3;
-/// Poses are remembered of at most so many rows, a quarter of a kilobyte each: of eleven minutes at 1 kHz, two hours at
-/// 100 Hz.
+/// Poses are remembered in recordings of at most so many rows, a quarter of a kilobyte each: eleven minutes at 1 kHz, two hours
+/// at 100 Hz.
 const REMEMBERED: usize = 700_000;
 /// At least this many readings to each side.
 const FEWEST: usize = 2;

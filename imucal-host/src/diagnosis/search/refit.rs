@@ -152,7 +152,7 @@ fn step(
     Ok((step, moved))
 }
 
-/// ChannelPrecision of each column's prior, and where the column stands, in usual sizes. A term of the baseline may be of any
+/// Precision of each column's prior, and where the column stands, in usual sizes. A term of the baseline may be of any
 /// size; an effect is not many times its usual one, so that what the data do not show stays small.
 fn prior(doses: &[Dose], columns: &[Column]) -> (DVector<f64>, DVector<f64>) {
     let role = |column: &Column| column.effect.parameters[column.parameter].role;
