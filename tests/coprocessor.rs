@@ -9,7 +9,7 @@ use firmware_example::RECORD_2;
 use imucal_core::{
     corrector::FullCorrector,
     link::FitModel,
-    record::{self, Date, HigherOrder},
+    record::{self, Date, HigherOrder, TriadRecord},
 };
 use imucal_host::recording::{Recording, SensorKind};
 use imucal_tests::{
@@ -18,7 +18,7 @@ use imucal_tests::{
     firmware::{BOARDS, ready},
     program, simulated,
 };
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Rotation3, Vector3};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_imucal-under-test");
 #[test]
@@ -178,6 +178,48 @@ fn a_session_on_board_stores_what_this_machine_finds_and_gives_up_what_is_less_s
     again.with(1).printing(&["accelerometer is not calibrated: the one in use is surer"]);
     run(&["device", "restore"]).with(1).telling(&["no record is stored before the last one"]);
     run(&["device", "watch"]).with(1).telling(&["nothing was watched yet"]);
+}
+
+#[test]
+fn a_session_on_board_is_turned_into_the_axes_of_its_record_as_on_this_machine() {
+    if !ready() {
+        return;
+    }
+    let scratch = tempfile::tempdir().expect("a scratch folder");
+    let recording = simulated::write_small(scratch.path()).display().to_string();
+    let at = |name: &str| scratch.path().join(name).display().to_string();
+    let (device, flash, rig, out) = (address(BOARDS[0]), at("unit.flash"), at("rig.bin"), at("unit.bin"));
+    let run = |command: &[&str]| {
+        let arguments = [command, &["--device", &device, "--flash", &flash]].concat();
+        program::run(PROGRAM, &[], &arguments.into_iter().map(str::to_owned).collect::<Vec<_>>())
+    };
+    run(&["capture", &recording, "--target", "1,1,1", "--record", &rig]).with(0);
+    let mut held = record::decode(&std::fs::read(&rig).expect("a record")).expect("whole");
+    // The same accelerometer in a table's axes, less sure than it is.
+    let acc = held.acc.as_mut().expect("an accelerometer");
+    let lies = Rotation3::new(Vector3::new(0.3f32, -0.7, 0.2)).into_inner();
+    let turn = |triad: &mut TriadRecord| {
+        triad.gain = (lies * Matrix3::from(triad.gain).transpose()).transpose().into();
+        let largest = triad.quality.gain_std.iter().flatten().fold(0.0, |a: f32, b| a.max(*b));
+        triad.quality.gain_std = [[10.0 * largest; 3]; 3];
+    };
+    turn(acc);
+    held.mag.iter_mut().for_each(turn);
+    let mut buffer = [0; record::MAX_LEN];
+    std::fs::write(&rig, record::encode(&held, &mut buffer).expect("plausible")).expect("it is written");
+
+    run(&["device", "put", &rig, "--replace"]).with(0);
+    run(&["capture", &recording, "--target", "1,1,1", "--record", &out]).with(0).printing(&[
+        "accelerometer is calibrated",
+        "magnetometer is calibrated",
+        "equal bit for bit",
+    ]);
+    let stored = record::decode(&std::fs::read(&out).expect("a record")).expect("whole");
+    for (stored, rig) in [(stored.acc, held.acc), (stored.mag, held.mag)] {
+        let (stored, rig) = (stored.expect("a triad"), rig.expect("a triad"));
+        let (stored, rig) = (Matrix3::from(stored.gain), Matrix3::from(rig.gain));
+        assert!((stored - rig).amax() < 1e-4 * rig.amax(), "{stored} {rig}");
+    }
 }
 
 #[test]

@@ -175,9 +175,12 @@ fn store<F: NorFlash>(
     let mut record = stored
         .filter(|stored| stored.made_for(&unit.serial).is_ok())
         .unwrap_or_else(|| CalibrationRecord::empty(unit.clone(), header.date));
+    let [acc, ..] = &header.task.sensors;
+    let axes = session.axes(&acc.units(Sensor::Accelerometer), record.acc.as_ref());
     let mut surer = false;
     for (sensor, of) in Sensor::ALL.into_iter().zip(&header.task.sensors) {
-        if let Ok(triad) = session.better_at_temperatures(sensor, &of.units(sensor), record.triad(sensor))
+        if let Ok(triad) =
+            session.better_at_temperatures(sensor, &of.units(sensor), record.triad(sensor), &axes)
             && triad.check(sensor).is_ok()
         {
             record.adopt(sensor, &triad, unit, header.date);

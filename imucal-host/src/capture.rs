@@ -6,7 +6,7 @@
 use imucal_core::{
     link::{CaptureSensor, CaptureTask, RawSample},
     record::{Date, HigherOrder, Sensor, TriadRecord},
-    session::{Session, SessionSettings, alignment::NotAligned, guide::Guide, store::NotStored},
+    session::{Session, SessionSettings, alignment::NotAligned, axes::Axes, guide::Guide, store::NotStored},
 };
 
 use crate::{
@@ -130,7 +130,7 @@ pub fn calibration(
     let mut triad = |kind: SensorKind, sensor: Sensor| {
         recording.sensor(kind)?;
         let units = task.sensors[kind as usize].units(sensor);
-        match session.better_at_temperatures(sensor, &units, None::<&TriadRecord>) {
+        match session.better_at_temperatures(sensor, &units, None::<&TriadRecord>, &Axes::Own) {
             Ok(record) => Some(StoredTriad::from_record(&record.with_order(HigherOrder::default()))),
             Err(why) => {
                 refused.push((kind, why));

@@ -3,7 +3,6 @@
 
 use heapless::Vec;
 use imucal_core::{
-    fit::Units,
     link::{CaptureOutcome, CaptureState, CaptureTask, Fault, RawSample},
     observer::{
         self,
@@ -12,6 +11,7 @@ use imucal_core::{
     record::{RawUnit, Sensor, TriadRecord},
     session::{
         alignment::AlignmentFit,
+        axes::Axes,
         bias::MeanRate,
         store::{NotStored, bias_of_the_day},
         temperature::WarmthFit,
@@ -50,6 +50,8 @@ pub(super) struct Capture {
     warmth: Vec<WarmthFit<POSES>, 1>,
     /// The magnetometer's rotation under way, likewise.
     alignment: Vec<AlignmentFit, 1>,
+    /// Axes of the record in use, once it has ended.
+    axes: Vec<Axes, 1>,
     /// What it came to: sensor after sensor, once it has ended.
     outcomes: Vec<CaptureOutcome, 3>,
 }
@@ -91,6 +93,7 @@ impl<const N: usize> Alone<N> {
             taken: 0,
             warmth: Vec::new(),
             alignment: Vec::new(),
+            axes: Vec::new(),
             outcomes: Vec::new(),
         });
         Ok(())
@@ -254,16 +257,19 @@ impl Capture {
         self.session.warmth(sensor).is_ok_and(|fit| self.warmth.push(fit).is_ok())
     }
 
-    /// What it has found of a sensor, if that is surer than what is `stored`.
-    pub(super) fn better(
-        &self,
-        sensor: Sensor,
-        units: &Units,
-        stored: Option<&HeldTriad>,
-    ) -> Result<TriadRecord, NotStored> {
+    /// What it has found of a sensor, if that is surer than what `record` holds, and in the axes that it had before the first sensor.
+    pub(super) fn better(&mut self, sensor: Sensor, record: &HeldRecord) -> Result<TriadRecord, NotStored> {
+        let units = |sensor: Sensor| self.task.sensors.get(sensor as usize).map(|of| of.units(sensor));
+        if self.axes.is_empty()
+            && let Some(units) = units(Sensor::Accelerometer)
+        {
+            let _room = self.axes.push(self.session.axes(&units, record.acc.as_ref()));
+        }
+        let axes = self.axes.first().unwrap_or(&Axes::Own);
+        let units = units(sensor).ok_or(NotStored::NoEstimate)?;
         match self.warmth.first() {
-            Some(fit) => self.session.better_warm(sensor, fit, units, stored),
-            None => self.session.better(sensor, units, stored),
+            Some(fit) => self.session.better_warm(sensor, fit, &units, record.triad(sensor), axes),
+            None => self.session.better(sensor, &units, record.triad(sensor), axes),
         }
     }
 

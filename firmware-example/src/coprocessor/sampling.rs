@@ -186,16 +186,16 @@ impl<
         let Some(capture) = self.alone.as_mut().and_then(|alone| alone.capture()) else {
             return CaptureOutcome::TooLittle;
         };
-        let Some(of) = capture.task.sensors.get(sensor as usize).filter(|of| of.target > 0.0) else {
+        if capture.task.sensors.get(sensor as usize).is_none_or(|of| of.target <= 0.0) {
             return CaptureOutcome::TooLittle;
-        };
-        let in_use = self.calibration.record().triad(sensor);
-        match capture.better(sensor, &of.units(sensor), in_use) {
+        }
+        match capture.better(sensor, self.calibration.record()) {
             Err(NotStored::NoEstimate) => CaptureOutcome::TooLittle,
             Err(NotStored::Refused(refusal)) => CaptureOutcome::Refused(refusal),
             Err(NotStored::Surer { stored, new }) => CaptureOutcome::Surer { stored, new },
             Err(NotStored::HigherOrder) => CaptureOutcome::HigherOrder,
             Err(NotStored::OwnAxes) => CaptureOutcome::OwnAxes,
+            Err(NotStored::OtherAxes { strain, most }) => CaptureOutcome::OtherAxes { strain, most },
             Ok(triad) => match self.calibration.adopt(sensor, &triad, date) {
                 Ok(()) => CaptureOutcome::Adopted,
                 Err(Fault::Implausible(defect)) => CaptureOutcome::Implausible(defect),

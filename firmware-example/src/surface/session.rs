@@ -7,6 +7,7 @@ use imucal_core::{
     record::{RawUnit, Sensor, TriadRecord},
     session::{
         self, Session, SessionSettings,
+        axes::Axes,
         bias::{MeanRate, RestBias},
     },
     temperature,
@@ -59,14 +60,21 @@ fn aligned(session: &mut Session<8, 2, 16>) {
 fn kept(session: &Session<8, 2, 16>) {
     let units =
         Units { raw: RawUnit::Counts, calibrated: RawUnit::RadianPerSecond, offset: 0.0, per_unit: 100.0 };
-    let record =
-        reach!(session::Session::better(session, Sensor::Accelerometer, &units, None::<&TriadRecord>));
+    let record = reach!(session::Session::better(
+        session,
+        Sensor::Accelerometer,
+        &units,
+        None::<&TriadRecord>,
+        &Axes::Own
+    ));
     if let Some(estimate) = reach!(session::Session::estimate(session, Sensor::Accelerometer)) {
         let record = reach!(session::estimate::Estimate::record(estimate, "T9", &units));
         reach!(session::store::stated_error(&record, 9.8));
         let still = MeanRate { mean: Vector3::repeat(1e-3), variance: Vector3::repeat(1e-10), count: 1 };
         reach!(session::store::bias_of_the_day(&still, &record, 0.1));
-        let again = reach!(session::Session::better(session, Sensor::Accelerometer, &units, Some(&record)));
+        let axes = reach!(session::Session::axes(session, &units, Some(&record)));
+        let again =
+            reach!(session::Session::better(session, Sensor::Accelerometer, &units, Some(&record), &axes));
         core::hint::black_box(&again);
     }
     reach!(session::store::model_of(Sensor::Gyroscope));
@@ -85,7 +93,8 @@ fn warm(session: &Session<8, 2, 16>) {
             Sensor::Gyroscope,
             &fit,
             &units,
-            None::<&TriadRecord>
+            None::<&TriadRecord>,
+            &Axes::Own
         ));
         core::hint::black_box(&record);
     }
@@ -93,7 +102,8 @@ fn warm(session: &Session<8, 2, 16>) {
         session,
         Sensor::Accelerometer,
         &units,
-        None::<&TriadRecord>
+        None::<&TriadRecord>,
+        &Axes::Own
     ));
     core::hint::black_box(&record);
     let temperatures = [20.0f32, 35.0, 22.0];

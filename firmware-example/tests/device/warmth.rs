@@ -3,6 +3,7 @@
 use imucal_core::{
     link::{CaptureOutcome, Reply, Request},
     record,
+    session::axes::Axes,
 };
 
 use crate::{
@@ -34,8 +35,8 @@ fn a_session_that_warms_and_cools_ends_in_the_terms_that_it_gives_elsewhere() {
     });
     let session = session_of(&samples);
     let units = task().sensors[0].units(record::Sensor::Accelerometer);
-    let here =
-        session.better_at_temperatures(record::Sensor::Accelerometer, &units, None::<&record::TriadRecord>);
+    let none = None::<&record::TriadRecord>;
+    let here = session.better_at_temperatures(record::Sensor::Accelerometer, &units, none, &Axes::Own);
     assert_eq!(there.acc, Some(here.expect("accepted")));
     let [x, y, z] = there.acc.and_then(|acc| acc.temperature).expect("terms").bias_slope;
     assert!((x - 4e-3).abs() < 1e-3 && (y + 3e-3).abs() < 1e-3 && z.abs() < 1e-3, "{x} {y} {z}");

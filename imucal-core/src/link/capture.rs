@@ -149,6 +149,13 @@ pub enum CaptureOutcome {
     HigherOrder,
     /// The magnetometer in use is in the accelerometer's axes, the new one in its own.
     OwnAxes,
+    /// The record in use is in axes that are not known: its accelerometer and the new one differ by more than a rotation.
+    OtherAxes {
+        /// The largest share by which they do; infinite in other units, and where one is a mirror image.
+        strain: f32,
+        /// Allowed at most.
+        most: f32,
+    },
 }
 
 /// Samples of a message.

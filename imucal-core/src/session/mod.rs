@@ -12,6 +12,7 @@
 //! | [`estimate`] | a sensor's triad, its errors and its verdict |
 //! | `fitting`, `judgement` | fits by slices, outliers; errors and verdicts |
 //! | [`alignment`] | the magnetometer in the accelerometer's axes |
+//! | [`axes`] | the axes of a record that a rig has made |
 //! | [`design`] | which pose says most |
 //! | [`guide`] | what to do next, how sure each sensor is, what was thrown away |
 //! | [`store`] | whether a new record takes the place of the stored one |
@@ -24,6 +25,7 @@
 //! examination of residuals: what the host accepts with a suspicion, a session accepts without one.
 
 pub mod alignment;
+pub mod axes;
 pub mod bias;
 pub mod design;
 pub mod estimate;

@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     Session,
+    axes::{Axes, LARGEST_STRAIN},
     bias::{MeanRate, RestBias},
 };
 use crate::{
@@ -35,10 +36,17 @@ pub enum NotStored {
     HigherOrder,
     /// The stored magnetometer is in the accelerometer's axes, the new one in its own.
     OwnAxes,
+    /// The record is in axes that are not known from its accelerometer and the session's, which differ by more than a rotation.
+    OtherAxes {
+        /// The largest share by which they do; infinite in other units, and where one is a mirror image.
+        strain: f32,
+        /// Allowed at most.
+        most: f32,
+    },
 }
 
 impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
-    /// A sensor's calibration for the record, if it is accepted and surer than the one `stored`. Terms of temperature are those of the
+    /// A sensor's calibration for the record, in the `axes` of that, if it is accepted and surer than the one `stored`. Terms of temperature are those of the
     /// stored one, from the mean temperature of the session's rests on. One with terms beyond the first order stays, since gain and
     /// bias were fitted with them, and a session fits none.
     ///
@@ -50,13 +58,14 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         sensor: Sensor,
         units: &Units,
         stored: Option<&TriadRecord<O>>,
+        axes: &Axes,
     ) -> Result<TriadRecord, NotStored> {
         let estimate = self.estimate(sensor).ok_or(NotStored::NoEstimate)?;
         estimate.verdict.map_err(NotStored::Refused)?;
         let mut new = estimate.record(model_of(sensor), units);
         // What warmth does is not seen here, and stays as it is known.
         new.temperature = known_terms(&new, stored, self.poses.temperature());
-        self.surer(sensor, new, stored)
+        self.surer(sensor, new, stored, axes)
     }
 
     /// A new calibration, if it is surer than the one `stored`. A magnetometer in the accelerometer's axes takes the place of one in axes
@@ -65,9 +74,13 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     pub(super) fn surer<O: Order>(
         &self,
         sensor: Sensor,
-        new: TriadRecord,
+        mut new: TriadRecord,
         stored: Option<&TriadRecord<O>>,
+        axes: &Axes,
     ) -> Result<TriadRecord, NotStored> {
+        if sensor != Sensor::Magnetometer || self.is_aligned() {
+            brought(sensor, &mut new, axes)?;
+        }
         if let Some(stored) = stored {
             if !stored.order.is_first_order() {
                 return Err(NotStored::HigherOrder);
@@ -87,6 +100,11 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         Ok(new)
     }
 
+    /// The magnetometer is in the accelerometer's axes.
+    fn is_aligned(&self) -> bool {
+        self.estimate(Sensor::Magnetometer).is_some_and(|mag| mag.alignment_error.is_some())
+    }
+
     /// Length of a calibrated vector that errors are compared at.
     fn length(&self, sensor: Sensor) -> f32 {
         match sensor {
@@ -100,10 +118,27 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     }
 }
 
+/// Brings a triad from the session's axes into those of the record.
+#[inline]
+fn brought(sensor: Sensor, new: &mut TriadRecord, axes: &Axes) -> Result<(), NotStored> {
+    let other = |strain: f32| NotStored::OtherAxes { strain, most: LARGEST_STRAIN };
+    match axes {
+        Axes::Own => Ok(()),
+        Axes::Of(rotated) => rotated.turn(sensor, new).then_some(()).ok_or(other(f32::INFINITY)),
+        Axes::Unknown { strain } => Err(other(*strain)),
+    }
+}
+
 /// A magnetometer's gain is in the accelerometer's axes: in those of its own it is upper triangular.
-fn is_turned(sensor: Sensor, [_, second, third]: &[[f32; 3]; 3]) -> bool {
+fn is_turned(sensor: Sensor, gain: &[[f32; 3]; 3]) -> bool {
+    sensor == Sensor::Magnetometer && !is_upper_triangular(gain)
+}
+
+/// A gain, by rows, is in axes of the sensor's own.
+#[inline]
+pub(super) fn is_upper_triangular([_, second, third]: &[[f32; 3]; 3]) -> bool {
     let ([y, ..], [z, w, _]) = (second, third);
-    sensor == Sensor::Magnetometer && (*y != 0.0 || *z != 0.0 || *w != 0.0)
+    *y == 0.0 && *z == 0.0 && *w == 0.0
 }
 
 /// Terms of temperature of the `stored` calibration, from a reference temperature, °C, on; `None` without any, or in another raw unit.

@@ -6,6 +6,7 @@ use super::*;
 use crate::{session::guide::Advice, temperature::TemperatureTerms, triad::Triad};
 
 mod alignment;
+mod axes;
 mod fewest;
 mod warmth;
 

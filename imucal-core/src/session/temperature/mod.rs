@@ -25,6 +25,7 @@ use nalgebra::{Matrix3, SVector, Vector3};
 
 use super::{
     Session,
+    axes::Axes,
     evidence::Used,
     fitting::acc_limits,
     store::{NotStored, known_terms, model_of},
@@ -152,10 +153,11 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         sensor: Sensor,
         units: &Units,
         stored: Option<&TriadRecord<O>>,
+        axes: &Axes,
     ) -> Result<TriadRecord, NotStored> {
-        let Ok(mut fit) = self.warmth(sensor) else { return self.better(sensor, units, stored) };
+        let Ok(mut fit) = self.warmth(sensor) else { return self.better(sensor, units, stored, axes) };
         while fit.work() {}
-        self.better_warm(sensor, &fit, units, stored)
+        self.better_warm(sensor, &fit, units, stored, axes)
     }
 
     /// A sensor's calibration with the terms of temperature that a fit has kept, for the record, if it is accepted and surer than the
@@ -171,8 +173,9 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         fit: &WarmthFit<N>,
         units: &Units,
         stored: Option<&TriadRecord<O>>,
+        axes: &Axes,
     ) -> Result<TriadRecord, NotStored> {
-        let Some(warm) = fit.found() else { return self.better(sensor, units, stored) };
+        let Some(warm) = fit.found() else { return self.better(sensor, units, stored, axes) };
         let mut new = match sensor {
             Sensor::Accelerometer => {
                 fit.accelerometer(&warm)?.record(&warm.triad, &warm.std, model_of(sensor), units)
@@ -186,10 +189,11 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
                 estimate.summary.record(&triad, &std, model_of(sensor), units)
             }
         };
+        let groups = fit.ladder.kept().unwrap_or(Groups::NONE);
         let mut terms = warm.terms.in_unit(units.per_unit);
+        terms.scale_slope = axes.scale_slope(&terms.scale_slope);
         // Those that the rests do not show stay as they are known.
         if let Some(known) = known_terms(&new, stored, terms.reference) {
-            let groups = fit.ladder.kept().unwrap_or(Groups::NONE);
             if !groups.has(Groups::BIAS) {
                 terms.bias_slope = known.bias_slope;
             }
@@ -198,7 +202,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             }
         }
         new.temperature = Some(terms);
-        self.surer(sensor, new, stored)
+        self.surer(sensor, new, stored, axes)
     }
 }
 

@@ -4,6 +4,7 @@ use crate::{
     record::{RawUnit, TriadRecord},
     session::{
         alignment::NotAligned,
+        axes::Axes,
         store::{NotStored, stated_error},
     },
 };
@@ -72,8 +73,9 @@ fn a_magnetometer_in_the_accelerometer_s_axes_takes_the_place_of_one_in_its_own_
 {
     let units = Units { raw: RawUnit::Counts, calibrated: RawUnit::Arbitrary, offset: 0.0, per_unit: 100.0 };
     let (mut again, _) = session(3, &Vector3::new(0.3, 0.0, 0.0));
-    let better =
-        |session: &Held, stored: Option<&TriadRecord>| session.better(Sensor::Magnetometer, &units, stored);
+    let better = |session: &Held, stored: Option<&TriadRecord>| {
+        session.better(Sensor::Magnetometer, &units, stored, &Axes::Own)
+    };
     let own = better(&again, None).expect("accepted");
     assert_eq!(again.align_axes(), Ok(()));
     let turned = better(&again, None).expect("accepted");

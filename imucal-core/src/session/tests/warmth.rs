@@ -10,6 +10,7 @@ use crate::{
     observer::thermometer::ThermometerFault,
     record::{FitQuality, RawUnit, TriadRecord},
     session::{
+        axes::Axes,
         store::NotStored,
         temperature::{NoWarmth, WarmTriad},
     },
@@ -118,14 +119,15 @@ fn temperatures_that_show_nothing_are_refused() {
 fn record(session: &Held, stored: Option<&TriadRecord>) -> Result<TriadRecord, NotStored> {
     let mut fit = session.warmth(Sensor::Accelerometer).expect("temperatures");
     while fit.work() {}
-    session.better_warm(Sensor::Accelerometer, &fit, &UNITS, stored)
+    session.better_warm(Sensor::Accelerometer, &fit, &UNITS, stored, &Axes::Own)
 }
 
 #[test]
 fn a_record_of_a_warm_session_corrects_at_every_temperature_and_one_without_does_not() {
     let (hand, session) = session(5, hill, true);
     let warm = record(&session, None).expect("accepted");
-    let cold = session.better(Sensor::Accelerometer, &UNITS, None::<&TriadRecord>).expect("accepted");
+    let cold =
+        session.better(Sensor::Accelerometer, &UNITS, None::<&TriadRecord>, &Axes::Own).expect("accepted");
     let off = |record: &TriadRecord, temperature: f64| {
         let truth = Vector3::new(3.0, -4.0, 8.0);
         let raw = hand.warmth[0].predict(&hand.truth[0], &truth, temperature).expect("regular") * 1000.0;
@@ -148,11 +150,14 @@ fn a_later_session_of_one_temperature_keeps_the_terms_of_the_record() {
     let warm = record(&session(5, hill, true).1, None).expect("accepted");
     let vague = TriadRecord { quality: FitQuality { bias_std: [1e3; 3], ..warm.quality }, ..warm.clone() };
     let (_, later) = session(6, |_| 30.0, false);
-    let new = later.better(Sensor::Accelerometer, &UNITS, Some(&vague)).expect("surer");
+    let new = later.better(Sensor::Accelerometer, &UNITS, Some(&vague), &Axes::Own).expect("surer");
     let (terms, before) = (new.temperature.expect("terms"), warm.temperature.expect("terms"));
     assert_eq!((terms.reference, terms.bias_slope), (30.0, before.bias_slope));
     let other = Units { raw: RawUnit::MetrePerSecondSquared, ..UNITS };
-    assert_eq!(later.better(Sensor::Accelerometer, &other, Some(&vague)).expect("surer").temperature, None);
+    assert_eq!(
+        later.better(Sensor::Accelerometer, &other, Some(&vague), &Axes::Own).expect("surer").temperature,
+        None
+    );
 }
 
 #[test]
@@ -161,7 +166,9 @@ fn a_warm_session_keeps_the_terms_of_the_record_that_rests_do_not_show() {
     let mut fit = session.warmth(Sensor::Gyroscope).expect("temperatures");
     while fit.work() {}
     let units = Units { calibrated: RawUnit::RadianPerSecond, ..UNITS };
-    let alone = session.better_warm(Sensor::Gyroscope, &fit, &units, None::<&TriadRecord>).expect("accepted");
+    let alone = session
+        .better_warm(Sensor::Gyroscope, &fit, &units, None::<&TriadRecord>, &Axes::Own)
+        .expect("accepted");
     assert_eq!(alone.temperature.expect("terms").scale_slope, [0.0; 3]);
     let known = TemperatureTerms { reference: 27.0, bias_slope: [9.0; 3], scale_slope: [1e-4; 3] };
     let vague = TriadRecord {
@@ -169,7 +176,7 @@ fn a_warm_session_keeps_the_terms_of_the_record_that_rests_do_not_show() {
         quality: FitQuality { bias_std: [1e3; 3], ..alone.quality },
         ..alone.clone()
     };
-    let new = session.better_warm(Sensor::Gyroscope, &fit, &units, Some(&vague)).expect("surer");
+    let new = session.better_warm(Sensor::Gyroscope, &fit, &units, Some(&vague), &Axes::Own).expect("surer");
     let (terms, own) = (new.temperature.expect("terms"), alone.temperature.expect("terms"));
     assert_eq!((terms.reference, terms.bias_slope), (own.reference, own.bias_slope));
     assert_eq!(terms.scale_slope, known.from_reference(own.reference).scale_slope);

@@ -12,6 +12,7 @@ use imucal_core::{
     link::CaptureTask,
     session::{
         SessionSettings,
+        axes::LARGEST_STRAIN,
         guide::{Advice, Guide},
         store::NotStored,
     },
@@ -226,12 +227,24 @@ fn reason(why: &NotStored) -> String {
         NotStored::Surer { stored, new } => surer(*stored, *new),
         NotStored::HigherOrder => HIGHER_ORDER.into(),
         NotStored::OwnAxes => OWN_AXES.into(),
+        NotStored::OtherAxes { strain, .. } => other_axes(*strain),
     }
 }
 
 const HIGHER_ORDER: &str = "the one in use has nonlinear terms, or terms of temperature to second order, which a session does not fit";
 const OWN_AXES: &str = "the one in use is in the accelerometer's axes, this one in its own";
 const TOO_LITTLE: &str = "too few rests, turns or places of the field for a fit";
+
+/// Why a session's triad cannot be turned into the axes of a record.
+fn other_axes(strain: f32) -> String {
+    let most = 100.0 * LARGEST_STRAIN;
+    let by = if strain.is_finite() {
+        format!("differs from this one by {:.1} % beyond a rotation, of {most} % allowed", 100.0 * strain)
+    } else {
+        "is in other units than this one, or a mirror image of it".into()
+    };
+    format!("the axes of the record in use are not known, since its accelerometer {by}")
+}
 
 fn surer(stored: f32, new: f32) -> String {
     format!("the one in use is surer, {:.3} % against {:.3} %", 100.0 * stored, 100.0 * new)

@@ -7,14 +7,14 @@ use std::{
 };
 
 use imucal_core::{
-    link::{CaptureOutcome, CaptureTask, SAMPLES},
+    link::{CaptureOutcome, CaptureTask, RecordState, SAMPLES},
     record::{self, CalibrationRecord, TriadRecord},
     session::guide::{Advice, Guide},
 };
 
 use super::{
-    Arguments, HIGHER_ORDER, Lines, OWN_AXES, TOO_LITTLE, recorded, settings_of, shares, surer, task_of,
-    warn_of_nothing, write,
+    Arguments, HIGHER_ORDER, Lines, OWN_AXES, TOO_LITTLE, other_axes, recorded, settings_of, shares, surer,
+    task_of, warn_of_nothing, write,
 };
 use crate::{
     capture::{self, Capture},
@@ -109,6 +109,7 @@ fn end(
     here: Option<&Capture>,
     mut files: OutputSet,
 ) -> anyhow::Result<Ending> {
+    let before = held(&mut session)?;
     let outcomes = session.finish_capture(today())?;
     output::text(&report::capture::state(guide, &settings_of(task), asked))?;
     for kind in asked {
@@ -128,7 +129,7 @@ fn end(
     let equal = asked
         .iter()
         .filter(|kind| adopted(kind))
-        .all(|kind| here.is_none_or(|here| is_equal(here, task, &record, *kind)));
+        .all(|kind| here.is_none_or(|here| is_equal(here, task, before.as_ref(), &record, *kind)));
     if let Some(here) = here.filter(|_| adopted(&SensorKind::Mag)) {
         say!("{}", report::capture::axes(capture::axes_of_magnetometer(here)));
     }
@@ -142,12 +143,26 @@ fn end(
     Ok(if done { Ending::Done } else { Ending::Refused })
 }
 
-/// Gain, bias and terms of temperature that the device has stored are those of the session here, to the bit. Without terms here
-/// the device may have kept those of an earlier record.
-fn is_equal(here: &Capture, task: &CaptureTask, record: &CalibrationRecord, kind: SensorKind) -> bool {
+/// The record that the device uses.
+fn held(session: &mut Session) -> anyhow::Result<Option<CalibrationRecord>> {
+    let in_use = matches!(session.status()?.record, RecordState::InUse | RecordState::Unconfirmed);
+    let bytes = if in_use { session.record()? } else { None };
+    Ok(bytes.as_deref().map(record::decode).transpose()?)
+}
+
+/// Gain, bias and terms of temperature that the device has stored are those of the session here, to the bit, in the axes of the record
+/// that it used before. Without terms here the device may have kept those of that record.
+fn is_equal(
+    here: &Capture,
+    task: &CaptureTask,
+    before: Option<&CalibrationRecord>,
+    record: &CalibrationRecord,
+    kind: SensorKind,
+) -> bool {
     let sensor = kind.into();
-    let own =
-        here.better_at_temperatures(sensor, &task.sensors[kind as usize].units(sensor), None::<&TriadRecord>);
+    let units = |kind: SensorKind| task.sensors[kind as usize].units(kind.into());
+    let axes = here.axes(&units(SensorKind::Acc), before.and_then(|before| before.acc.as_ref()));
+    let own = here.better_at_temperatures(sensor, &units(kind), None::<&TriadRecord>, &axes);
     let (Ok(own), Some(there)) = (own, record.triad(sensor)) else { return false };
     let bits = |gain: &[[f32; 3]; 3], bias: &[f32; 3]| -> Vec<u32> {
         gain.as_flattened().iter().chain(bias).map(|value| value.to_bits()).collect()
@@ -163,6 +178,7 @@ fn reason(outcome: &CaptureOutcome) -> String {
         CaptureOutcome::Implausible(defect) => defect.to_string(),
         CaptureOutcome::HigherOrder => HIGHER_ORDER.into(),
         CaptureOutcome::OwnAxes => OWN_AXES.into(),
+        CaptureOutcome::OtherAxes { strain, .. } => other_axes(*strain),
         _ => TOO_LITTLE.into(),
     }
 }
