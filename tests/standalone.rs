@@ -46,6 +46,8 @@ fn tape(recording: &Recording) -> Vec<u8> {
         bytes.extend([offset as f32, per_unit as f32].map(f32::to_le_bytes).concat());
     }
     bytes.extend([f32::INFINITY; 3].map(f32::to_le_bytes).concat());
+    let down = recording.manifest.site.field_points_down();
+    bytes.extend(down.map_or(0.0f32, |down| if down { 1.0 } else { -1.0 }).to_le_bytes());
     assert_eq!(bytes.len(), HEADER);
     for (row, time) in recording.time.iter().enumerate() {
         bytes.extend((((time - recording.time[0]) * 1e6).round() as u64).to_le_bytes());

@@ -10,7 +10,8 @@
 //! | 12 | 4, 4 | gravity, m/s², and length of the field, µT (NaN: not known) |
 //! | 20 | 3 × 8 | of each sensor: raw value at zero, and raw units a nominal one |
 //! | 44 | 3 × 4 | of each sensor: raw value beyond which it clips |
-//! | 56 | 48 each | a sample: time, µs (8); three raw values of each sensor, NaN where it has none (36); temperature, °C (4) |
+//! | 56 | 4 | where the field points: above zero down, below zero up, zero where that is not known |
+//! | 60 | 48 each | a sample: time, µs (8); three raw values of each sensor, NaN where it has none (36); temperature, °C (4) |
 //!
 //! All numbers are little-endian. A sample is corrected to nominal SI, pushed, and one slice of work is done, as a main loop would.
 
@@ -27,7 +28,7 @@ use imucal_core::{
 /// What a tape begins with.
 pub const MAGIC: [u8; 4] = *b"TAPE";
 /// Bytes before the first sample.
-pub const HEADER: usize = 56;
+pub const HEADER: usize = 60;
 /// Bytes of a sample.
 pub const SAMPLE: usize = 48;
 
@@ -93,7 +94,9 @@ impl Header {
             }
         });
         let field = Some(number(&bytes, 16)).filter(|field| field.is_finite());
-        let task = CaptureTask { gravity: number(&bytes, 12), field, hold: usual.hold, sensors };
+        let down = number(&bytes, 56);
+        let field_down = (down != 0.0 && down.is_finite()).then_some(down > 0.0);
+        let task = CaptureTask { gravity: number(&bytes, 12), field, field_down, hold: usual.hold, sensors };
         let date = Date::from_days(u16::try_from(whole(&bytes, 8)).unwrap_or(0).into());
         Some(Self { samples: whole(&bytes, 4), date, task, settings: task.settings()? })
     }

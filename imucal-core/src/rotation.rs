@@ -24,6 +24,8 @@
 //! | [`quaternion_log`], below 16° relative to the angle, above absolute, rad | 2e-15 | 6e-7 |
 //! | [`log`] of [`exp`], absolute, rad | 3e-15 | 2e-6 |
 
+pub mod axis_order;
+
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
 use crate::scalar::Scalar;

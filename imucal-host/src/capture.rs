@@ -47,6 +47,7 @@ pub fn task(manifest: &Manifest, target: [f32; 3]) -> Result<CaptureTask, Manife
     Ok(CaptureTask {
         gravity: manifest.site.gravity().unwrap_or(STANDARD_GRAVITY) as f32,
         field: None,
+        field_down: manifest.site.field_points_down(),
         hold: SessionSettings::default().hold,
         sensors: [sensor(SensorKind::Acc)?, sensor(SensorKind::Gyr)?, sensor(SensorKind::Mag)?],
     })

@@ -1,7 +1,9 @@
 //! Axes that are negated or swapped: every norm fits, and nothing but handedness shows it.
 
+use imucal_core::record::{Date, Sensor};
 use imucal_host::{
     calibrate::{Calibration, Options, Status, calibrate},
+    capture,
     effect::axis_swap::{columns, signed_permutation},
     recording::{Recording, SensorKind},
 };
@@ -237,4 +239,51 @@ fn the_program_names_swapped_axes_in_table_and_json() {
     let gyr = &bad.json()["sensors"]["gyr"];
     assert_eq!(gyr["reason"], "implausible");
     assert!(gyr["detail"].as_str().is_some_and(|text| text.contains("gyr_x and gyr_y are swapped")), "{gyr}");
+}
+
+/// What a session accepts of a recording, in the letters of [`statuses`]; its magnetometer in the accelerometer's axes, or `o` in its own.
+fn of_a_session(recording: &Recording) -> String {
+    let task = capture::task(&recording.manifest, capture::targets(recording)).expect("units");
+    let session = capture::replay(recording, &task, &mut |_, _| {}).expect("a possible task");
+    let (stored, _) = capture::calibration(&session, &task, recording, Date::from_days(20_000));
+    let is_aligned = session.estimate(Sensor::Magnetometer).is_some_and(|mag| mag.alignment_error.is_some());
+    let letter = |kind: SensorKind| match stored.triad(kind) {
+        Some(_) if kind == SensorKind::Mag && !is_aligned => 'o',
+        Some(_) => 'a',
+        None => 'r',
+    };
+    SensorKind::ALL.into_iter().filter(|kind| recording.sensor(*kind).is_some()).map(letter).collect()
+}
+
+#[test]
+fn a_session_refuses_a_mirrored_sensor_as_the_host_does() {
+    assert_eq!(of_a_session(&tumbled(20, 5)), "aaa");
+    for code in MIRRORS {
+        // Next to an accelerometer that is refused, a magnetometer stays in its own axes, which depend on no other sensor.
+        for (kind, expected) in [(SensorKind::Acc, "rro"), (SensorKind::Gyr, "ara"), (SensorKind::Mag, "aar")]
+        {
+            let swapped = swapped(tumbled(20, 5), kind, code);
+            assert_eq!(of_a_session(&swapped), expected, "{kind}, code {code}");
+        }
+        let blind = swapped(without_site(tumbled(20, 5)), SensorKind::Mag, code);
+        assert_eq!(of_a_session(&blind), "aar", "code {code}");
+        let alone = swapped(without_gyroscope(tumbled(20, 5)), SensorKind::Mag, code);
+        assert_eq!(of_a_session(&alone), "rr", "code {code}");
+    }
+    assert_eq!(of_a_session(&without_site(tumbled(20, 5))), "aaa");
+    assert_eq!(of_a_session(&in_the_south(tumbled(20, 5))), "aaa");
+    assert_eq!(of_a_session(&swapped(tumbled(20, 5), SensorKind::Acc, 7)), "rar");
+}
+
+#[test]
+fn a_session_of_a_real_recording_refuses_a_mirrored_sensor() {
+    for file in ["xsens-mti.csv.gz", "mpu9150-0.csv.gz"] {
+        let Some(path) = data::real(file) else { return };
+        let recording = Recording::read(&path).expect("a good recording");
+        assert_eq!(of_a_session(&recording), "aa", "{file}");
+        for code in [2, 16] {
+            let by = |kind: SensorKind| of_a_session(&swapped(recording.clone(), kind, code));
+            assert_eq!([SensorKind::Acc, SensorKind::Gyr].map(by), ["rr", "ar"], "{file}, code {code}");
+        }
+    }
 }

@@ -20,6 +20,20 @@ fn a_session_is_guided_to_its_targets_and_its_record_corrects_the_recording() {
 }
 
 #[test]
+fn a_gyroscope_with_two_axes_swapped_is_refused_with_the_columns_to_mend() {
+    let folder = Folder::with_recording();
+    let text = folder.text("small.csv");
+    let (head, rows) = text.split_once('\n').expect("a header");
+    let head = head.replace("gyr_x,gyr_y", "gyr_y,gyr_x");
+    folder.write("swapped.csv", format!("{head}\n{rows}"));
+    folder.write("swapped.toml", folder.text("small.toml"));
+    folder.run("capture swapped.csv --target 1,1,1 --record own.bin").with(1).printing(&[
+        "gyroscope is not calibrated: gyr.axis_swap (gyr_x and gyr_y are swapped)",
+        "turns go against",
+    ]);
+}
+
+#[test]
 fn a_target_that_is_not_reached_is_a_refusal_that_says_how_far_it_is() {
     let folder = Folder::with_recording();
     folder.run("capture small.csv --target 1e-3,1e-3,1e-3").with(1).printing(&["target 0.001000 %"]);

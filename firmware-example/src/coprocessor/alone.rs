@@ -229,7 +229,8 @@ impl Capture {
     #[inline(never)]
     pub(super) fn close(&mut self) -> Option<Sensor> {
         let sensor = *Sensor::ALL.get(self.outcomes.len())?;
-        if sensor == Sensor::Magnetometer && self.aligns() {
+        // Before any sensor is stored, since it may show that one is mirrored.
+        if self.outcomes.is_empty() && self.warmth.is_empty() && self.aligns() {
             return None;
         }
         match self.warmth.first_mut() {

@@ -54,6 +54,8 @@ fn rotations() {
     reach!(rotation::matrix(&q));
     reach!(rotation::log(&c));
     reach!(rotation::inverse_left_jacobian(&phi));
+    reach!(rotation::axis_order::nearest(&c));
+    let _swap: Option<Matrix3<f32>> = reach!(rotation::axis_order::signed_permutation(17));
 }
 
 #[inline(never)]

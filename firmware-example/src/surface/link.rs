@@ -44,7 +44,7 @@ fn captures() {
         offset: 0.0,
         per_unit: 100.0,
     };
-    let task = CaptureTask { gravity: 9.8, field: None, hold: 2.0, sensors: [sensor; 3] };
+    let task = CaptureTask { gravity: 9.8, field: None, field_down: None, hold: 2.0, sensors: [sensor; 3] };
     let Some(settings) = reach!(link::CaptureTask::settings(&task)) else { return };
     reach!(link::CaptureSensor::nominal(&sensor, [1.0; 3]));
     reach!(link::CaptureSensor::units(&sensor, Sensor::Gyroscope));

@@ -37,6 +37,7 @@ pub(super) fn task() -> CaptureTask {
     CaptureTask {
         gravity: 9.80665,
         field: None,
+        field_down: None,
         hold: 2.0,
         sensors: [CaptureSensor { target: 0.01, ..acc }, gyr, mag],
     }

@@ -23,6 +23,8 @@ pub struct CaptureTask {
     pub gravity: f32,
     /// Length of the field, µT, where it is known.
     pub field: Option<f32>,
+    /// Whether the field points down at this place, where it is known.
+    pub field_down: Option<bool>,
     /// How long a pose is to be held, s.
     pub hold: f32,
     /// Accelerometer, gyroscope, magnetometer.
@@ -77,6 +79,7 @@ impl CaptureTask {
         possible.then(|| SessionSettings {
             gravity: self.gravity,
             field: self.field,
+            field_down: self.field_down,
             target: self.sensors.map(|sensor| sensor.target),
             full_scale: self.sensors.map(|sensor| sensor.full_scale),
             hold: self.hold,

@@ -25,6 +25,14 @@ use crate::{rotation::exp_with_jacobian, scalar::Scalar};
 pub const LEAST_POSES: usize = 8;
 /// Largest standard error of the rotation, rad (2°).
 pub const LARGEST_ERROR: f64 = 0.035;
+/// A field less steep than this, rad (10°), may point either way indoors.
+pub const LEAST_DIP: f64 = 0.175;
+/// Its sine.
+pub const LEAST_SINE: f64 = 0.174_108_138;
+/// A mount turned by more than this from every order of the axes has none, rad (30°).
+pub const OBLIQUE: f64 = 0.52;
+/// Sum of a rotation's entries along an order of the axes that is as far from it: `1 + 2 cos OBLIQUE`.
+pub const LEAST_ALONG: f64 = 2.735_638_359;
 /// The 24 ways in which axes can be relabelled without a mirror, as a magnetometer may lie on its board: directions of the
 /// turns, and angles in twelfths of a turn. A fit starts from each of them ([`relabelling`]), the nearest to none first.
 #[rustfmt::skip]
@@ -111,6 +119,13 @@ mod tests {
             let model = DipModel { pairs: &pairs };
             prop_assert!(largest_jacobian_error(&model, &SVector::from(v)) < 1e-8);
         }
+    }
+
+    #[test]
+    fn sine_and_sum_are_those_of_the_angles() {
+        assert!((LEAST_SINE - LEAST_DIP.sin()).abs() < 1e-9, "{}", LEAST_DIP.sin());
+        let along = 1.0 + 2.0 * OBLIQUE.cos();
+        assert!((LEAST_ALONG - along).abs() < 1e-9, "{along}");
     }
 
     #[test]

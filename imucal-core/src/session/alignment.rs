@@ -4,6 +4,10 @@
 //! magnetometer may lie on its board, and the lowest end counts. The turned triad's errors ([`crate::model::alignment`]) are those of
 //! the cloud's fit and of the rotation, by what the dips leave.
 //!
+//! A dip is as constant where all axes of the magnetometer are reversed, so that a mirrored one looks like one that is turned, in a field
+//! reversed. What decides is the sense of the dip ([`super::SessionSettings::field_down`]): where it contradicts, the magnetometer is
+//! refused, and where it is not known, one that is mounted in another order than the accelerometer.
+//!
 //! Not modelled: what errors of the cloud's fit leave in the dips, which counts in both parts, so that the errors are stated about a
 //! fifth too large (`session::tests::alignment`).
 
@@ -17,13 +21,18 @@ use super::{
     poses::unit,
 };
 use crate::{
+    accept::{Quantity, Refusal},
     model::{
         Model, RowSink,
         alignment::Alignment,
-        dip::{DipModel, DirectionPair, LARGEST_ERROR, LEAST_POSES, RELABELLINGS, is_lower, relabelling},
+        dip::{
+            DipModel, DirectionPair, LARGEST_ERROR, LEAST_ALONG, LEAST_POSES, LEAST_SINE, RELABELLINGS,
+            is_lower, relabelling,
+        },
         parameterisation::UPPER_TRIANGULAR,
     },
     record::Sensor,
+    rotation::axis_order::nearest,
     solver::LevenbergMarquardt,
     triad::Triad,
 };
@@ -42,6 +51,10 @@ pub enum NotAligned {
         /// Needed at least.
         need: usize,
     },
+    /// The dip is the other way than the field at this place, so that the magnetometer or the accelerometer is mirrored.
+    Mirrored,
+    /// It lies in another order of the axes, or is mirrored; where the field points would decide.
+    MountOrMirror,
     /// The rests do not show the rotation: its largest standard error, rad; NaN where it is not determined at all.
     Unsure {
         /// The error.
@@ -121,10 +134,15 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     ///
     /// # Errors
     ///
-    /// [`NotAligned`]; the estimate is as it was.
+    /// [`NotAligned`]; the estimate is as it was. What has mirrored axes, or may have, is refused from then on.
     #[inline(never)]
     pub fn align(&mut self, fit: &AlignmentFit) -> Result<(), NotAligned> {
-        let aligned = self.aligned(fit)?;
+        let (found, sine) = self.rotation(fit)?;
+        if let Err(why) = self.check_axes(&found.rotation, sine) {
+            self.refuse_axes(&found.rotation, why);
+            return Err(why);
+        }
+        let aligned = self.aligned(fit, &found)?;
         let [.., mag] = &mut self.estimates;
         *mag = Some(aligned);
         Ok(())
@@ -142,10 +160,10 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         self.align(&fit)
     }
 
-    fn aligned(&self, fit: &AlignmentFit) -> Result<Estimate, NotAligned> {
+    /// The rotation that a fit has found, and the sine of the field's dip: above zero where it points down.
+    #[inline]
+    fn rotation(&self, fit: &AlignmentFit) -> Result<(Alignment<f32>, f32), NotAligned> {
         let dips = self.dips()?;
-        let most = LARGEST_ERROR as f32;
-        let unsure = |error: f32| NotAligned::Unsure { error, most };
         let solver = fit.lowest.as_ref().ok_or(unsure(f32::NAN))?;
         let freedom = dips.independent_rows().saturating_sub(4) as f32;
         let (inverse, variance) =
@@ -154,7 +172,42 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         let covariance = inverse * (variance * wider * wider);
         let found = Alignment::new(dips.pairs(), dips.length(), solver.theta(), &covariance, &inverse);
         let error = found.error();
-        let estimate = self.estimate(Sensor::Magnetometer).filter(|_| error <= most).ok_or(unsure(error))?;
+        if error <= LARGEST_ERROR as f32 { Ok((found, -solver.theta().w)) } else { Err(unsure(error)) }
+    }
+
+    /// Whether the sense of the dip is that of the place.
+    #[inline]
+    fn check_axes(&self, rotation: &Matrix3<f32>, sine: f32) -> Result<(), NotAligned> {
+        match self.settings.field_down.filter(|_| libm::fabsf(sine) > LEAST_SINE as f32) {
+            Some(down) if down != (sine > 0.0) => Err(NotAligned::Mirrored),
+            None if is_in_another_order(rotation) => Err(NotAligned::MountOrMirror),
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses the magnetometer, and the accelerometer where nothing says that it is the right one of the two: the gyroscope confirms its
+    /// axes up to all three reversed.
+    #[inline]
+    fn refuse_axes(&mut self, rotation: &Matrix3<f32>, why: NotAligned) {
+        let refusal = |mirror: Matrix3<f32>| {
+            let value = nearest(&-mirror).0 as f64;
+            Refusal::Implausible { what: Quantity::Axes, value, limit: 0.0 }
+        };
+        let confirmed = self.estimate(Sensor::Gyroscope).is_some_and(|gyr| gyr.verdict.is_ok());
+        let by_acc = why == NotAligned::Mirrored && !(confirmed && is_in_another_order(rotation));
+        let [acc, _, mag] = &mut self.estimates;
+        if let Some(mag) = mag {
+            mag.verdict = Err(refusal(rotation.transpose()));
+        }
+        if let Some(acc) = acc.as_mut().filter(|_| by_acc) {
+            acc.verdict = Err(refusal(*rotation));
+        }
+    }
+
+    #[inline]
+    fn aligned(&self, fit: &AlignmentFit, found: &Alignment<f32>) -> Result<Estimate, NotAligned> {
+        let error = found.error();
+        let estimate = self.estimate(Sensor::Magnetometer).ok_or(unsure(error))?;
         let triad = found.turned(&estimate.triad);
         let covariance = stated(&fit.cloud, None).ok_or(unsure(error))?;
         let std = found.errors(&estimate.triad, &self.changes(&fit.cloud), &covariance);
@@ -204,6 +257,18 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             None => Ok(Dips { session: self, acc: &acc.triad, mag: &mag.triad }),
         }
     }
+}
+
+/// The magnetometer's axes are another order of the accelerometer's.
+#[inline]
+fn is_in_another_order(rotation: &Matrix3<f32>) -> bool {
+    let (code, along) = nearest(rotation);
+    code != 0 && along > LEAST_ALONG as f32
+}
+
+#[inline]
+fn unsure(error: f32) -> NotAligned {
+    NotAligned::Unsure { error, most: LARGEST_ERROR as f32 }
 }
 
 impl AlignmentFit {

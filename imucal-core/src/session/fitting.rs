@@ -47,6 +47,10 @@ pub(super) struct Fit {
 impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     /// One slice of what is to be done; false where there is nothing.
     pub fn work(&mut self) -> bool {
+        if core::mem::take(&mut self.sense_due) {
+            self.end_gyroscope();
+            return true;
+        }
         let Some(fit) = self.fit.take() else { return self.begin() };
         self.go_on(fit);
         true

@@ -39,14 +39,10 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             Sensor::Gyroscope => self.judge_gyroscope(fit),
             Sensor::Magnetometer => self.judge_magnetometer(fit),
         };
-        if fit.sensor == Sensor::Gyroscope
-            && let Some(estimate) = estimate.filter(|estimate| estimate.verdict.is_ok())
-        {
-            self.observer.set_gain(&estimate.triad.gain);
-        }
         if let Some(slot) = self.estimates.get_mut(fit.sensor as usize) {
             *slot = estimate;
         }
+        self.sense_due = fit.sensor == Sensor::Gyroscope;
     }
 
     #[inline(never)]

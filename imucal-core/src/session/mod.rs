@@ -11,6 +11,7 @@
 //! | `evidence` | rows of the fits, from what is kept |
 //! | [`estimate`] | a sensor's triad, its errors and its verdict |
 //! | `fitting`, `judgement` | fits by slices, outliers; errors and verdicts |
+//! | `sense` | whether the gyroscope turns as gravity does |
 //! | [`alignment`] | the magnetometer in the accelerometer's axes |
 //! | [`axes`] | the axes of a record that a rig has made |
 //! | [`design`] | which pose says most |
@@ -34,6 +35,7 @@ mod fitting;
 pub mod guide;
 mod judgement;
 pub mod poses;
+mod sense;
 pub mod store;
 pub mod temperature;
 
@@ -64,6 +66,9 @@ pub struct SessionSettings {
     pub gravity: f32,
     /// Length of the field, µT, where it is known.
     pub field: Option<f32>,
+    /// Whether the field points down at this place, where it is known: it tells a magnetometer that is mounted otherwise from a
+    /// mirrored one.
+    pub field_down: Option<bool>,
     /// Error of a calibrated vector at which a sensor is done, as a share of its length: accelerometer, gyroscope, magnetometer.
     /// Zero: the sensor is not asked for.
     pub target: [f32; 3],
@@ -82,6 +87,7 @@ impl Default for SessionSettings {
         Self {
             gravity: 9.80665,
             field: None,
+            field_down: None,
             target: [1e-3, 3e-3, 1e-2],
             full_scale: [f32::INFINITY; 3],
             hold: 2.0,
@@ -106,6 +112,8 @@ pub struct Session<const N: usize, const B: usize, const M: usize> {
     fit: Option<Fit>,
     /// Sensors whose observations have changed since their last fit.
     due: [bool; 3],
+    /// The gyroscope was judged, and not yet whether it turns as gravity does.
+    sense_due: bool,
     /// Points since the cloud's last fit.
     new_points: u8,
     estimates: [Option<Estimate>; 3],
@@ -131,6 +139,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             pending: None,
             fit: None,
             due: [false; 3],
+            sense_due: false,
             new_points: 0,
             estimates: [None; 3],
             scores: [Scores::NONE; 2],

@@ -11,7 +11,7 @@ use super::{
     bias::{MeanRate, RestBias},
 };
 use crate::{
-    accept::{Refusal, relative_error},
+    accept::{Quantity, Refusal, relative_error},
     fit::Units,
     record::{Order, Sensor, TriadRecord},
     temperature::TemperatureTerms,
@@ -98,6 +98,16 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             }
         }
         Ok(new)
+    }
+
+    /// Terms of temperature make no sensor's axes better that are mirrored.
+    pub(super) fn not_mirrored(&self, sensor: Sensor) -> Result<(), NotStored> {
+        match self.estimate(sensor).map(|estimate| estimate.verdict) {
+            Some(Err(refusal @ Refusal::Implausible { what: Quantity::Axes, .. })) => {
+                Err(NotStored::Refused(refusal))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The magnetometer is in the accelerometer's axes.

@@ -8,6 +8,7 @@ use crate::{session::guide::Advice, temperature::TemperatureTerms, triad::Triad}
 mod alignment;
 mod axes;
 mod fewest;
+mod sense;
 mod warmth;
 
 type Held = Session<38, 4, 64>;
@@ -19,6 +20,8 @@ struct Hand {
     /// From the sensor's axes to the local ones.
     c_n_s: Rotation3<f64>,
     time: u64,
+    /// Earth's field, local axes, µT.
+    field: Vector3<f64>,
     /// Field of a magnet that the sensor carries along, µT.
     magnet: Vector3<f64>,
     /// Temperature, °C, of time, s, where there is a thermometer.
@@ -57,7 +60,17 @@ impl Hand {
         let (c_n_s, magnet) = (Rotation3::identity(), Vector3::zeros());
         let none = TemperatureTerms { reference: 25.0, bias_slope: [0.0; 3], scale_slope: [0.0; 3] };
         let truth = [acc, gyr, mag];
-        Self { random, truth, c_n_s, time: 0, magnet, climate: None, warmth: [none; 2], every: [1; 2] }
+        Self {
+            random,
+            truth,
+            c_n_s,
+            time: 0,
+            field: FIELD,
+            magnet,
+            climate: None,
+            warmth: [none; 2],
+            every: [1; 2],
+        }
     }
 
     fn normals(&mut self, size: f64) -> Vector3<f64> {
@@ -70,7 +83,7 @@ impl Hand {
     fn sample(&mut self, session: &mut Held, rate: &Vector3<f64>) {
         let noise = [0.01, 0.002, 0.3].map(|size| self.normals(size));
         let at = self.c_n_s.inverse();
-        let true_values = [at * FORCE, *rate, at * FIELD + self.magnet];
+        let true_values = [at * FORCE, *rate, at * self.field + self.magnet];
         let temperature = self.climate.map(|climate| climate(self.time as f64 * 1e-6));
         let warmth = |k: usize| temperature.zip(self.warmth.get(k));
         let raw = |k: usize| {
@@ -134,7 +147,7 @@ impl Hand {
                     poses += 1;
                 }
                 Advice::TurnAbout(to) => {
-                    let from = (self.c_n_s.inverse() * FIELD).normalize();
+                    let from = (self.c_n_s.inverse() * self.field).normalize();
                     let by =
                         Rotation3::rotation_between(&Vector3::from(to).cast(), &from).expect("not opposite");
                     self.turn(session, &by.scaled_axis());

@@ -1,11 +1,11 @@
 //! Axes taken for one another: `P.axis_swap`.
 
+use imucal_core::rotation::axis_order::{self, ORDERS};
 use nalgebra::Matrix3;
 
-use super::{Act, DataRun, Effect, Parameter, Part, SensorKind, Spoils, Words, member_id};
+pub use imucal_core::rotation::axis_order::CODES;
 
-/// Orders of the axes; the first changes nothing.
-const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+use super::{Act, DataRun, Effect, Parameter, Part, SensorKind, Spoils, Words, member_id};
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
@@ -18,21 +18,15 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
         .like(&member_id(kind, "misalignment"), "its size: a swap is a right angle or more")
 }
 
-/// How many codes there are.
-pub const CODES: usize = 8 * ORDERS.len();
-
 /// The signed permutation of a code: from the axes as they are to the axes as they are recorded. `None` from [`CODES`].
 pub fn signed_permutation(code: usize) -> Option<Matrix3<f64>> {
-    let order = ORDERS.get(code / 8)?;
-    let sign = |axis: usize| if (code % 8) >> axis & 1 == 1 { -1.0 } else { 1.0 };
-    Some(Matrix3::from_fn(|axis, from| if order[axis] == from { sign(axis) } else { 0.0 }))
+    axis_order::signed_permutation(code)
 }
 
 /// The signed permutation nearest to a matrix, by its code, and the angle to it where the matrix is a rotation, rad.
 pub fn nearest(matrix: &Matrix3<f64>) -> (usize, f64) {
-    let along = |code: &usize| signed_permutation(*code).map_or(0.0, |p| p.component_mul(matrix).sum());
-    let code = (0..CODES).max_by(|a, b| along(a).total_cmp(&along(b))).unwrap_or(0);
-    (code, ((along(&code) - 1.0) / 2.0).clamp(-1.0, 1.0).acos())
+    let (code, along) = axis_order::nearest(matrix);
+    (code, ((along - 1.0) / 2.0).clamp(-1.0, 1.0).acos())
 }
 
 /// What the columns of a triad hold under a code, in words: `mag_x is negated`, `acc_x and acc_y are swapped`.

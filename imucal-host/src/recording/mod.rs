@@ -36,7 +36,7 @@ mod write_error;
 pub(crate) use self::format::{Format, is_bag_folder};
 pub use self::{
     epoch::Epoch,
-    manifest::{Manifest, site::LEAST_DIP},
+    manifest::Manifest,
     mapping::Mapping,
     order_statistics::median,
     parts::Source,

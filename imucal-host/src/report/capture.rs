@@ -111,6 +111,10 @@ pub fn axes(turned: Result<f32, NotAligned>) -> String {
         Err(NotAligned::TooFewRests { have, need }) => {
             format!("the field was measured at {have} rests of the {need} that are needed")
         }
+        Err(NotAligned::Mirrored) => {
+            "the dip comes out the other way than at [site], so it or the accelerometer is mirrored".into()
+        }
+        Err(NotAligned::MountOrMirror) => "it is mounted in another order of the axes, or mirrored".into(),
         Err(NotAligned::Unsure { error, .. }) if error.is_nan() => {
             "the rests do not show how it lies; tilt the sensor in more directions".into()
         }

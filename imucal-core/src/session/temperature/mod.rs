@@ -176,6 +176,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         axes: &Axes,
     ) -> Result<TriadRecord, NotStored> {
         let Some(warm) = fit.found() else { return self.better(sensor, units, stored, axes) };
+        self.not_mirrored(sensor)?;
         let mut new = match sensor {
             Sensor::Accelerometer => {
                 fit.accelerometer(&warm)?.record(&warm.triad, &warm.std, model_of(sensor), units)

@@ -1,7 +1,9 @@
 use super::*;
 use crate::{
+    accept::{Quantity, Refusal},
     fit::Units,
     record::{RawUnit, TriadRecord},
+    rotation::axis_order::signed_permutation,
     session::{
         alignment::NotAligned,
         axes::Axes,
@@ -9,17 +11,24 @@ use crate::{
     },
 };
 
-/// A session that ends, of a unit whose magnetometer lies like `phi` on its board.
+/// A session that ends, of a unit whose magnetometer lies like `phi` on its board, at a place where the field points down.
 fn session(seed: u64, phi: &Vector3<f64>) -> (Held, Triad<f64>) {
-    let (mut session, mut hand) = (Held::new(SessionSettings::default()), Hand::new(seed));
-    let lies = Rotation3::new(*phi);
-    hand.truth[2].gain = lies.into_inner() * hand.truth[2].gain;
+    let lies = Rotation3::new(*phi).into_inner();
+    session_of(seed, [Matrix3::identity(), lies], Some(true))
+}
+
+/// The same of one whose accelerometer and magnetometer have their axes by those matrices.
+fn session_of(seed: u64, axes: [Matrix3<f64>; 2], field_down: Option<bool>) -> (Held, Triad<f64>) {
+    let settings = SessionSettings { field_down, ..Default::default() };
+    let (mut session, mut hand) = (Held::new(settings), Hand::new(seed));
+    hand.truth[0].gain = axes[0] * hand.truth[0].gain;
+    hand.truth[2].gain = axes[1] * hand.truth[2].gain;
     let truth = hand.truth[2];
     hand.follow(&mut session, 60);
     session.finish();
     while session.work() {}
     // The gauge of a field of unknown length.
-    let gain = truth.gain / truth.gain.determinant().cbrt();
+    let gain = truth.gain / truth.gain.determinant().abs().cbrt();
     (session, Triad { gain, ..truth })
 }
 
@@ -84,4 +93,63 @@ fn a_magnetometer_in_the_accelerometer_s_axes_takes_the_place_of_one_in_its_own_
     assert_eq!(better(&again, Some(&own)), Ok(turned.clone()));
     let (plain, _) = session(3, &Vector3::new(0.3, 0.0, 0.0));
     assert_eq!(better(&plain, Some(&turned)), Err(NotStored::OwnAxes));
+}
+
+/// What an alignment says, and the verdicts of accelerometer and magnetometer after it.
+fn verdicts(
+    axes: [Matrix3<f64>; 2],
+    field_down: Option<bool>,
+) -> (Result<(), NotAligned>, [Result<(), Refusal>; 2]) {
+    let (mut session, _) = session_of(3, axes, field_down);
+    let aligned = session.align_axes();
+    let verdict = |sensor: Sensor| session.estimate(sensor).expect("an estimate").verdict;
+    (aligned, [Sensor::Accelerometer, Sensor::Magnetometer].map(verdict))
+}
+
+fn axes_are(code: usize) -> Result<(), Refusal> {
+    Err(Refusal::Implausible { what: Quantity::Axes, value: code as f64, limit: 0.0 })
+}
+
+#[test]
+fn a_mirrored_magnetometer_is_refused_where_the_field_s_sense_is_known() {
+    let straight = Matrix3::identity();
+    // What it puts out: y negated.
+    let mirrored = signed_permutation(0b010).expect("a code");
+    for down in [true, false] {
+        let (aligned, verdicts) = verdicts([straight, mirrored], Some(down));
+        if down {
+            assert_eq!((aligned, verdicts), (Err(NotAligned::Mirrored), [Ok(()), axes_are(0b010)]));
+        } else {
+            // As it is, it looks like one that is turned by half a turn about y.
+            assert_eq!((aligned, verdicts), (Ok(()), [Ok(()); 2]));
+        }
+    }
+    // All axes reversed, of one of the two: nothing says of which.
+    for reversed in [[straight, -straight], [-straight, straight]] {
+        let (aligned, verdicts) = verdicts(reversed, Some(true));
+        assert_eq!((aligned, verdicts), (Err(NotAligned::Mirrored), [axes_are(7); 2]));
+    }
+}
+
+#[test]
+fn one_that_is_mounted_in_another_order_or_mirrored_is_refused_where_the_field_s_sense_is_not_known() {
+    let straight = Matrix3::identity();
+    let mirrored = signed_permutation(0b010).expect("a code");
+    let (aligned, verdicts) = verdicts([straight, mirrored], None);
+    assert_eq!((aligned, verdicts), (Err(NotAligned::MountOrMirror), [Ok(()), axes_are(0b010)]));
+    let half_a_turn = signed_permutation(0b101).expect("a code");
+    assert_eq!(self::verdicts([straight, half_a_turn], None).0, Err(NotAligned::MountOrMirror));
+    assert_eq!(self::verdicts([straight, half_a_turn], Some(true)).0, Ok(()));
+    assert_eq!(self::verdicts([straight, straight], None).0, Ok(()));
+}
+
+#[test]
+fn a_field_that_hardly_dips_says_nothing_of_a_mirror() {
+    let settings = SessionSettings { field_down: Some(true), ..Default::default() };
+    let (mut session, mut hand) = (Held::new(settings), Hand::new(3));
+    hand.field = Vector3::new(48.0, 2.0, -1.0);
+    hand.follow(&mut session, 60);
+    session.finish();
+    while session.work() {}
+    assert_eq!(session.align_axes(), Ok(()));
 }

@@ -17,7 +17,10 @@
 
 use imucal_core::{
     accept::{Quantity, Refusal},
-    model::unified::UnifiedParameters,
+    model::{
+        dip::{LEAST_DIP, OBLIQUE},
+        unified::UnifiedParameters,
+    },
     triad::Triad,
 };
 use nalgebra::Matrix3;
@@ -30,11 +33,8 @@ use crate::{
     },
     effect::axis_swap::{columns, nearest, signed_permutation},
     observe::{motion, pose},
-    recording::{LEAST_DIP, Recording, SensorKind, Unit},
+    recording::{Recording, SensorKind, Unit},
 };
-
-/// A mount turned by more than this from every order of the axes has none, rad (30°).
-const OBLIQUE: f64 = 0.52;
 
 /// What is known of a magnetometer next to an accelerometer.
 struct Aligned {

@@ -9,6 +9,7 @@ use std::{
 
 use clap::Args;
 use imucal_core::{
+    accept::{Quantity, Refusal},
     link::CaptureTask,
     session::{
         SessionSettings,
@@ -30,6 +31,7 @@ use super::{
 use crate::{
     capture::{self, Capture},
     device::Address,
+    effect::axis_swap,
     file::OutputSet,
     recording::{Recording, SensorKind},
     report::{self, table::words},
@@ -115,7 +117,7 @@ fn here(arguments: &Arguments, path: &Path, mut files: OutputSet) -> anyhow::Res
     output::text(&report::capture::state(&session.guide(), session.settings(), &recorded))?;
     let (stored, refused) = capture::calibration(&session, &task, &recording, today());
     for (kind, why) in &refused {
-        say!("{} is not calibrated: {}", words(*kind), reason(why));
+        say!("{} is not calibrated: {}", words(*kind), reason(why, *kind, &task));
     }
     for kind in recorded {
         if let Some(terms) = stored.triad(kind).and_then(|triad| triad.temperature.as_ref()) {
@@ -220,10 +222,10 @@ fn replay(
     }
 }
 
-fn reason(why: &NotStored) -> String {
+fn reason(why: &NotStored, kind: SensorKind, task: &CaptureTask) -> String {
     match why {
         NotStored::NoEstimate => TOO_LITTLE.into(),
-        NotStored::Refused(refusal) => refusal.to_string(),
+        NotStored::Refused(refusal) => refused(refusal, kind, task),
         NotStored::Surer { stored, new } => surer(*stored, *new),
         NotStored::HigherOrder => HIGHER_ORDER.into(),
         NotStored::OwnAxes => OWN_AXES.into(),
@@ -234,6 +236,30 @@ fn reason(why: &NotStored) -> String {
 const HIGHER_ORDER: &str = "the one in use has nonlinear terms, or terms of temperature to second order, which a session does not fit";
 const OWN_AXES: &str = "the one in use is in the accelerometer's axes, this one in its own";
 const TOO_LITTLE: &str = "too few rests, turns or places of the field for a fit";
+
+/// A refusal, and what would mend axes on which the sensors disagree.
+fn refused(refusal: &Refusal, kind: SensorKind, task: &CaptureTask) -> String {
+    let Refusal::Implausible { what: Quantity::Axes, value, .. } = refusal else {
+        return refusal.to_string();
+    };
+    let swap = format!("{kind}.axis_swap ({})", axis_swap::columns(kind, *value as usize));
+    match (kind, task.field_down) {
+        (SensorKind::Mag, None) => format!(
+            "it is mounted in another order of the axes than the accelerometer, or it is mirrored, {swap}; \
+             add [site] latitude_deg to the manifest, which decides it"
+        ),
+        (SensorKind::Mag, Some(_)) => format!(
+            "{swap} would explain that the dip comes out the other way than at [site]; correct the columns"
+        ),
+        (SensorKind::Gyr, _) => format!(
+            "{swap} would explain that turns go against gravity's; correct its columns, or the accelerometer's \
+             where that is refused as well"
+        ),
+        (SensorKind::Acc, _) => format!(
+            "{swap} would explain that the other sensors disagree with it on the axes; correct its columns, or theirs"
+        ),
+    }
+}
 
 /// Why a session's triad cannot be turned into the axes of a record.
 fn other_axes(strain: f32) -> String {

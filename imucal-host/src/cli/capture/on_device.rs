@@ -13,8 +13,8 @@ use imucal_core::{
 };
 
 use super::{
-    Arguments, HIGHER_ORDER, Lines, OWN_AXES, TOO_LITTLE, other_axes, recorded, settings_of, shares, surer,
-    task_of, warn_of_nothing, write,
+    Arguments, HIGHER_ORDER, Lines, OWN_AXES, TOO_LITTLE, other_axes, recorded, refused, settings_of, shares,
+    surer, task_of, warn_of_nothing, write,
 };
 use crate::{
     capture::{self, Capture},
@@ -115,7 +115,7 @@ fn end(
     for kind in asked {
         match &outcomes[*kind as usize] {
             CaptureOutcome::Adopted => say!("{} is calibrated", words(*kind)),
-            other => say!("{} is not calibrated: {}", words(*kind), reason(other)),
+            other => say!("{} is not calibrated: {}", words(*kind), reason(other, *kind, task)),
         }
     }
     let adopted = |kind: &SensorKind| matches!(outcomes[*kind as usize], CaptureOutcome::Adopted);
@@ -171,9 +171,9 @@ fn is_equal(
     warmth && bits(&own.gain, &own.bias) == bits(&there.gain, &there.bias)
 }
 
-fn reason(outcome: &CaptureOutcome) -> String {
+fn reason(outcome: &CaptureOutcome, kind: SensorKind, task: &CaptureTask) -> String {
     match outcome {
-        CaptureOutcome::Refused(refusal) => refusal.to_string(),
+        CaptureOutcome::Refused(refusal) => refused(refusal, kind, task),
         CaptureOutcome::Surer { stored, new } => surer(*stored, *new),
         CaptureOutcome::Implausible(defect) => defect.to_string(),
         CaptureOutcome::HigherOrder => HIGHER_ORDER.into(),

@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use imucal_core::model::dip::LEAST_DIP;
+
 use super::gravity::normal_gravity;
 
-/// A field less steep than this, rad (10°), may point either way indoors.
-pub const LEAST_DIP: f64 = 0.175;
 /// The magnetic equator lies within this latitude, degrees, and a field beyond it is steep.
 const HEMISPHERE: f64 = 20.0;
 
