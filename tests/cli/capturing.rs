@@ -28,6 +28,7 @@ fn a_gyroscope_with_two_axes_swapped_is_refused_with_the_columns_to_mend() {
     folder.write("swapped.csv", format!("{head}\n{rows}"));
     folder.write("swapped.toml", folder.text("small.toml"));
     folder.run("capture swapped.csv --target 1,1,1 --record own.bin").with(1).printing(&[
+        "end here: the sensors disagree on the axes",
         "gyroscope is not calibrated: gyr.axis_swap (gyr_x and gyr_y are swapped)",
         "turns go against",
     ]);

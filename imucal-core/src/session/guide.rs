@@ -1,7 +1,7 @@
 //! What to do next, how sure each sensor is, and what was thrown away.
 //!
 //! ```text
-//! no rest yet → hold still;   a rest too short → hold on;   targets reached → enough;   else → the pose that says most,
+//! axes that contradict → correct them;   no rest yet → hold still;   a rest too short → hold on;   targets reached → enough;   else → the pose that says most,
 //! or, where only the magnetometer is missing, a direction of the field that was not seen
 //! ```
 //!
@@ -41,6 +41,8 @@ pub enum Advice {
     TurnAbout([f32; 3]),
     /// Every sensor has reached its target.
     Enough,
+    /// End the session: the sensors disagree on the axes, and no further pose mends that. Their verdicts say which.
+    CorrectAxes,
 }
 
 /// How far a session is. The order of the fields is the messages' format.
@@ -110,6 +112,9 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     fn advice(&self) -> Advice {
         if Sensor::ALL.into_iter().all(|sensor| self.is_reached(sensor)) {
             return Advice::Enough;
+        }
+        if Sensor::ALL.into_iter().any(|sensor| self.not_mirrored(sensor).is_err()) {
+            return Advice::CorrectAxes;
         }
         let rests = self.observer.rests();
         match rests.stage() {

@@ -153,6 +153,7 @@ impl Hand {
                     self.turn(session, &by.scaled_axis());
                 }
                 Advice::HoldStill | Advice::HoldOn => self.rest(session, 1.0),
+                Advice::CorrectAxes => return None,
             }
         }
         None

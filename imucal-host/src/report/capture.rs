@@ -29,6 +29,9 @@ pub fn advice(advice: &Advice, hold: f32) -> String {
         Advice::TurnAbout(to) => {
             format!("turn it about until the magnetometer's {} along the field", pointing(to))
         }
+        Advice::CorrectAxes => {
+            "end here: the sensors disagree on the axes, which no further pose mends".into()
+        }
         Advice::Enough => "enough: every sensor has reached its target".into(),
     }
 }

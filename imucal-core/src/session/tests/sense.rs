@@ -39,6 +39,7 @@ fn a_gyroscope_whose_axes_are_in_another_order_is_refused_by_the_code_that_mends
         let session = session(1, code);
         let (acc, gyr) = (code_of(&session, Sensor::Accelerometer), code_of(&session, Sensor::Gyroscope));
         assert_eq!(gyr, (code != 0).then_some(code));
+        assert_eq!(session.guide().advice == Advice::CorrectAxes, code != 0, "{code}");
         // One that is turned may be right, and the accelerometer mirrored.
         let mirror = signed_permutation::<f64>(code).expect("a code").determinant() < 0.0;
         assert_eq!(acc.is_some(), code != 0 && (!mirror || code == REVERSED), "{code}");

@@ -85,7 +85,8 @@ fn live(arguments: &Arguments, device: &Address, files: OutputSet) -> anyhow::Re
     lines.speed = None;
     let begin = Instant::now();
     let mut state = session.start_capture(task)?;
-    while state.guide.advice != Advice::Enough && begin.elapsed().as_secs() < arguments.within.into() {
+    let ends = |guide: &Guide| matches!(guide.advice, Advice::Enough | Advice::CorrectAxes);
+    while !ends(&state.guide) && begin.elapsed().as_secs() < arguments.within.into() {
         sleep(EVERY);
         state = session.capture()?;
         lines.see(begin.elapsed().as_secs_f64(), &state.guide)?;
