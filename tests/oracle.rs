@@ -17,7 +17,8 @@ use imucal_host::{
     ellipsoid::{adjusted, sphere},
     observe::{
         cloud::cloud,
-        turn::{BiasPath, Rates, TurnData, compress},
+        series::Series,
+        turn::{BiasPath, TurnData, compress},
     },
     recording::{Nominal, Recording},
 };
@@ -284,7 +285,7 @@ fn turns(recording: &Recording, golden: &Value, exact: bool) -> Vec<TurnData> {
     let gyr = recording.gyr.as_ref().expect("a gyroscope");
     let usable = vec![true; recording.rows()];
     let interval = recording.median_interval().expect("rows");
-    let rates = Rates { time: &recording.time, values: &gyr.values, usable: &usable, interval };
+    let rates = Series { time: &recording.time, values: &gyr.values, usable: &usable, interval };
     let rests = intervals(&golden["intervals"]);
     let (means, times) = (vectors(&golden["rest_mean_rate"]), numbers(&golden["rest_mid_time"]));
     intervals(&golden["turns_first_last_row"])

@@ -28,6 +28,7 @@ use crate::{
     observe::{
         quantum::ConverterSteps,
         rest::{RestDetector, Samples},
+        series::Series,
     },
     recording::{Recording, SensorKind, Triple, check::integrity::Integrity, unit::STANDARD_GRAVITY},
     simulator::place::EARTH_RATE,
@@ -171,9 +172,10 @@ impl<'a> Rests<'a> {
     }
 
     fn noise(&self, chosen: &Cut, step: Vector3<f64>) -> RestNoise {
-        let (time, values) = (&self.recording.time, &self.acc.values);
-        AtRest { time, values, usable: &self.usable, interval: self.interval, rows: &chosen.rows, step }
-            .noise()
+        let Self { recording: Recording { time, .. }, acc: Triple { values, .. }, usable, interval, .. } =
+            self;
+        let series = Series { time, values, usable, interval: *interval };
+        AtRest { series, rows: &chosen.rows, step }.noise()
     }
 
     /// The accelerometer's outcome, on a rig or by its rests.
@@ -259,10 +261,13 @@ impl GyrShared<'_> {
         used: &'b [usize],
     ) -> gyr::observed_turns::GyrInput<'b> {
         gyr::observed_turns::GyrInput {
-            time: &self.recording.time,
             sensor: gyr,
-            usable: self.usable,
-            interval: self.interval,
+            rates: Series {
+                time: &self.recording.time,
+                values: &gyr.values,
+                usable: self.usable,
+                interval: self.interval,
+            },
             step: self.step,
             rows: &cut.rows,
             rests: &cut.rests,

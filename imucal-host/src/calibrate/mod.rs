@@ -4,7 +4,7 @@ use imucal_core::observation::Moments;
 use nalgebra::Vector3;
 
 use crate::{
-    observe::{held, quantum::ConverterSteps},
+    observe::{held, quantum::ConverterSteps, series::Series},
     recording::{
         Recording, SensorKind, Triple,
         check::{integrity, integrity::Integrity},
@@ -110,8 +110,8 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
             let rests = calibration.segmentation.as_ref().map_or(&[][..], |found| &found.rests);
             let interval = recording.median_interval().unwrap_or(1.0);
             let usable = counted_once(mag, &usable, rests, &mut calibration.warnings);
-            let input =
-                MagInput { time: &recording.time, sensor: mag, usable: &usable, interval, rests, field };
+            let series = Series { time: &recording.time, values: &mag.values, usable: &usable, interval };
+            let input = MagInput { sensor: mag, series, rests, field };
             let mut outcome = mag::samples::calibrate(&input);
             if outcome.verdict.is_ok()
                 && let Some(fit) = &mut outcome.fit

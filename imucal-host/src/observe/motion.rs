@@ -15,6 +15,7 @@ use nalgebra::{Matrix3, Quaternion, Vector3};
 use super::{
     compression,
     compression::{Sample, jump},
+    series::Series,
     turn::TurnGap,
 };
 use crate::{noise::Span, recording::Recording};
@@ -88,14 +89,8 @@ pub fn later(time: &[f64], attitudes: &[Option<Matrix3<f64>>], lag: f64) -> Atti
 /// The gyroscope's samples and what else is known.
 #[derive(Clone, Copy, Debug)]
 pub struct MotionInput<'a> {
-    /// Time, s.
-    pub time: &'a [f64],
-    /// Rates, nominal SI, rad/s.
-    pub rates: &'a [Vector3<f64>],
-    /// Rows in which they are usable.
-    pub usable: &'a [bool],
-    /// Usual interval, s.
-    pub interval: f64,
+    /// Its rates.
+    pub rates: Series<'a>,
     /// The table's attitude at each row.
     pub attitudes: &'a [Option<Matrix3<f64>>],
     /// Earth's rotation in p, rad/s; zero where the latitude is not known.
@@ -224,24 +219,25 @@ impl MotionInput<'_> {
         ends: [&Matrix3<f64>; 2],
         wander: &dyn Fn(f64) -> Vector3<f64>,
     ) -> Result<MotionData, TurnGap> {
-        if let Some(row) = rows.clone().find(|k| !self.usable[*k]) {
+        let Series { time, values, usable, interval } = self.rates;
+        if let Some(row) = rows.clone().find(|k| !usable[*k]) {
             return Err(TurnGap::Unusable { row });
         }
         let all: Vec<usize> = rows.clone().collect();
-        if let Some(row) = jump(self.time, &all, self.interval) {
+        if let Some(row) = jump(time, &all, interval) {
             return Err(TurnGap::Jump { row });
         }
-        let size = (BLOCK / self.interval).round().clamp(1.0, MOST_SAMPLES) as u16;
-        let rate = |k: usize| self.rates[k] - wander(self.time[k]);
+        let size = (BLOCK / interval).round().clamp(1.0, MOST_SAMPLES) as u16;
+        let rate = |k: usize| values[k] - wander(time[k]);
         let mut samples = Vec::with_capacity(all.len());
-        let compressed = compression::compress(self.time, &all, size, rate, |sample| samples.push(sample));
+        let compressed = compression::compress(time, &all, size, rate, |sample| samples.push(sample));
         let at = |rows: &Range<usize>| {
             self.attitude_near(rows.clone()).ok_or(TurnGap::NoAttitude { row: rows.start })
         };
         let attitudes = compressed.rows.iter().map(at).collect::<Result<Vec<_>, _>>()?;
         let [start, end] = ends.map(quaternion);
         Ok(MotionData {
-            span: self.time[rows.start]..self.time[rows.end - 1],
+            span: time[rows.start]..time[rows.end - 1],
             rows,
             samples,
             after: [u32::try_from(compressed.blocks.len()).unwrap_or(u32::MAX)],
@@ -278,10 +274,7 @@ mod tests {
         let rates: Vec<_> =
             attitudes.iter().flatten().map(|c| Vector3::z() * 0.5 + c.tr_mul(&earth_p)).collect();
         let input = MotionInput {
-            time: &time,
-            rates: &rates,
-            usable: &vec![true; 301],
-            interval: 0.01,
+            rates: Series { time: &time, values: &rates, usable: &vec![true; 301], interval: 0.01 },
             attitudes: &attitudes,
             earth_p,
             force_p: Vector3::zeros(),

@@ -13,25 +13,13 @@ use super::{
     block_change::BlockChange,
     compression,
     compression::{Compressed, is_jump},
+    series::Series,
 };
 
 /// Samples a block. Five at 100 Hz differ from the product over samples by about 1e-5° in 100 s (models.md 3).
 pub const BLOCK: u16 = 5;
 /// How far into a rest a turn reaches, s; a quarter of the rest where that is shorter.
 pub const MARGIN: f64 = 0.25;
-
-/// A gyroscope's samples as turns are made of them.
-#[derive(Clone, Copy, Debug)]
-pub struct Rates<'a> {
-    /// Time, s.
-    pub time: &'a [f64],
-    /// Rates, nominal rad/s.
-    pub values: &'a [Vector3<f64>],
-    /// Rows in which they are usable.
-    pub usable: &'a [bool],
-    /// Usual interval, s.
-    pub interval: f64,
-}
 
 /// A turn's blocks, owned.
 #[derive(Clone, Debug)]
@@ -133,7 +121,7 @@ fn turn_rows(time: &[f64], before: &Range<usize>, after: &Range<usize>) -> Range
 /// # Errors
 /// [`TurnGap`], with the row, where the motion was not wholly recorded.
 pub fn compress(
-    rates: Rates<'_>,
+    rates: Series<'_>,
     (rest_before, before, rest_after, after): (usize, &Range<usize>, usize, &Range<usize>),
     bias: &BiasPath,
 ) -> Result<TurnData, TurnGap> {
@@ -149,8 +137,8 @@ pub fn compress(
 ///
 /// # Errors
 /// [`TurnGap`], with the row, where the motion was not wholly recorded.
-fn measured(rates: Rates<'_>, rows: &Range<usize>) -> Result<Vec<usize>, TurnGap> {
-    let Rates { time, values, usable, interval } = rates;
+fn measured(rates: Series<'_>, rows: &Range<usize>) -> Result<Vec<usize>, TurnGap> {
+    let Series { time, values, usable, interval } = rates;
     let mut measured = Vec::with_capacity(rows.len());
     let mut jumped = None;
     for row in rows.clone().filter(|row| values[*row].iter().all(|w| w.is_finite())) {
@@ -181,7 +169,7 @@ impl TurnSamples {
     ///
     /// # Errors
     /// [`TurnGap`], as of [`compress`].
-    pub fn of(rates: Rates<'_>, turn: &TurnData) -> Result<Self, TurnGap> {
+    pub fn of(rates: Series<'_>, turn: &TurnData) -> Result<Self, TurnGap> {
         let measured = measured(rates, &turn.rows)?;
         let sample = |(index, row): (usize, &usize)| {
             let rate = rates.values[*row] - turn.bias.at(rates.time[*row]);
@@ -224,7 +212,7 @@ mod tests {
         // The rests as a coarse threshold would find them: the turn's ends are cut off.
         let (before, after) = (0..215, 385..600);
         let path = BiasPath { before: (1.0, bias), after: (5.0, bias) };
-        let rates = Rates { time: &time, values: &gyr, usable: &usable, interval: dt };
+        let rates = Series { time: &time, values: &gyr, usable: &usable, interval: dt };
         let data = compress(rates, (0, &before, 1, &after), &path).unwrap();
         let turn = data.between(Vector3::z(), Vector3::y());
         let c = attitude(&Triad::identity(), &turn);
@@ -238,7 +226,7 @@ mod tests {
         let mut usable = vec![true; 300];
         usable[150] = false;
         let path = BiasPath { before: (0.5, Vector3::zeros()), after: (2.5, Vector3::zeros()) };
-        let rates = Rates { time: &time, values: &gyr, usable: &usable, interval: 0.01 };
+        let rates = Series { time: &time, values: &gyr, usable: &usable, interval: 0.01 };
         let result = compress(rates, (0, &(0..100), 1, &(200..300)), &path);
         assert_eq!(result.unwrap_err(), TurnGap::Unusable { row: 150 });
     }

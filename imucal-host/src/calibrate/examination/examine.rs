@@ -43,7 +43,7 @@ use crate::{
         held,
         quantum::ConverterSteps,
         rest_halves::{self, MeanVariance},
-        turn::Rates,
+        series::Series,
     },
     recording::{Recording, SensorKind, check::integrity::Integrity, unit::STANDARD_GRAVITY},
 };
@@ -287,7 +287,7 @@ impl Scene<'_> {
     ) -> Vec<Suspicion> {
         let Some(gyr) = &self.recording.gyr else { return Vec::new() };
         let theta = FULL_GAIN.theta(&Triad { gain: fit.triad.gain, bias: Vector3::zeros() });
-        let rates = Rates {
+        let rates = Series {
             time: &self.recording.time,
             values: &gyr.values,
             usable: self.usable(SensorKind::Gyr),

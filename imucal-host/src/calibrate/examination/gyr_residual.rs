@@ -31,7 +31,7 @@ use crate::{
         outcome::KnownTurn,
         suspicion::Follows,
     },
-    observe::turn::{Rates, TurnSamples},
+    observe::{series::Series, turn::TurnSamples},
 };
 
 /// Columns of one test.
@@ -106,7 +106,7 @@ fn altered(turns: &[KnownTurn], samples: &[TurnSamples], theta: &SVector<f64, 9>
 /// All columns to test, three an axis, of courses over the turns.
 pub fn columns(
     turns: &[KnownTurn],
-    rates: Rates<'_>,
+    rates: Series<'_>,
     theta: &SVector<f64, 9>,
     rows: &Rows<9>,
     courses: &[Course],
@@ -139,14 +139,14 @@ mod tests {
         let usable = vec![true; time.len()];
         let rests = (0, &(0..20), 1, &(100..120));
         let turn = |values: &[Vector3<f64>]| {
-            let rates = Rates { time: &time, values, usable: &usable, interval: 0.01 };
+            let rates = Series { time: &time, values, usable: &usable, interval: 0.01 };
             let data = compress(rates, rests, &path).unwrap().stretched(&stretch);
             KnownTurn { data, before: Vector3::new(0.6, 0.0, 0.8), after: Vector3::z(), stretch }
         };
         let gain = Matrix3::new(1.03, 0.02, -0.01, 0.01, 0.97, 0.03, 0.0, -0.02, 1.01);
         let theta = FULL_GAIN.theta(&Triad { gain, bias: Vector3::zeros() });
         let turns = [turn(&values)];
-        let rates = Rates { time: &time, values: &values, usable: &usable, interval: 0.01 };
+        let rates = Series { time: &time, values: &values, usable: &usable, interval: 0.01 };
         let found = columns(&turns, rates, &theta, &rows(&turns, &theta), &[]);
         for (columns, (name, f)) in found.iter().zip(ALTERATIONS) {
             for axis in 0..3 {

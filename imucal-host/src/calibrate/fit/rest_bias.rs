@@ -80,7 +80,10 @@ pub fn errors(rests: &[Rest<f64>], means: &[Vector3<f64>], at_rest: &AtRest<'_>)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulator::random::{Purpose, Random};
+    use crate::{
+        observe::series::Series,
+        simulator::random::{Purpose, Random},
+    };
 
     /// Root mean square error, standard errors, of 100 units of this noise and step: twelve rests of 4 s at 50 Hz.
     fn score(noise: f64, step: f64) -> f64 {
@@ -104,14 +107,8 @@ mod tests {
                 .collect();
             let means: Vec<_> = rests.iter().map(|rest| rest.gyr.mean()).collect();
             let (usable, steps) = ([true; 3600], quantum::quantum(&values, &[true; 3600]));
-            let at_rest = AtRest {
-                time: &time,
-                values: &values,
-                usable: &usable,
-                interval: 0.02,
-                rows: &rows,
-                step: steps,
-            };
+            let series = Series { time: &time, values: &values, usable: &usable, interval: 0.02 };
+            let at_rest = AtRest { series, rows: &rows, step: steps };
             let found = errors(&rests, &means, &at_rest);
             assert!(found.std.min() > 0.0, "{found:?}");
             (mean(&rests, &means) - bias).component_div(&found.std).norm_squared() / 3.0

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::{
     noise::{Span, flicker, interval::Parts, white, within::Within},
-    observe::quantum::variances_of_means,
+    observe::{quantum::variances_of_means, series::Series},
 };
 
 /// An axis is no quieter than this share of what the axes are on average: rounding may have swallowed its noise.
@@ -16,14 +16,8 @@ const QUIETEST: f64 = 0.01;
 /// A triad's samples, and when it rested.
 #[derive(Clone, Copy, Debug)]
 pub struct AtRest<'a> {
-    /// Sample times, s.
-    pub time: &'a [f64],
-    /// Samples, nominal SI.
-    pub values: &'a [Vector3<f64>],
-    /// Rows in which they are usable.
-    pub usable: &'a [bool],
-    /// Usual interval, s.
-    pub interval: f64,
+    /// The samples.
+    pub series: Series<'a>,
     /// Rows of the rests.
     pub rows: &'a [Range<usize>],
     /// Step of the converter on each axis ([`crate::observe::quantum`]).
@@ -101,7 +95,8 @@ impl AtRest<'_> {
 
     /// Means within the rests.
     pub fn within(&self) -> Within {
-        Within::of(self.time, self.values, self.usable, self.rows)
+        let Series { time, values, usable, .. } = self.series;
+        Within::of(time, values, usable, self.rows)
     }
 
     /// When each rest was.
@@ -110,18 +105,19 @@ impl AtRest<'_> {
     }
 
     fn span(&self, rows: &Range<usize>) -> Span {
-        self.time[rows.start]..self.time[rows.end - 1] + self.interval
+        self.series.time[rows.start]..self.series.time[rows.end - 1] + self.series.interval
     }
 
     /// Usable samples of some rows.
     pub fn samples(&self, rows: &Range<usize>) -> impl Iterator<Item = &Vector3<f64>> {
-        rows.clone().filter(|k| self.usable[*k]).map(|k| &self.values[k])
+        rows.clone().filter(|k| self.series.usable[*k]).map(|k| &self.series.values[k])
     }
 
     /// Density of the white noise: of means half a second apart, or of the samples where rests are too short for that.
     pub fn density(&self) -> Vector3<f64> {
-        let found = white::density(self.time, self.values, self.usable, self.rows);
-        let density = found.unwrap_or_else(|| self.variance() * self.interval);
+        let Series { time, values, usable, interval } = self.series;
+        let found = white::density(time, values, usable, self.rows);
+        let density = found.unwrap_or_else(|| self.variance() * interval);
         let least = QUIETEST * density.mean();
         density.map(|axis| axis.max(least))
     }

@@ -20,6 +20,7 @@ use crate::{
         motion::{self, Attitudes, MotionData, MotionInput},
         pose,
         quantum::quantum,
+        series::Series,
     },
     recording::{Recording, Triple, unit::STANDARD_GRAVITY},
     simulator::place::EARTH_RATE,
@@ -91,7 +92,7 @@ pub fn on_encoders(
     };
     for (k, pair) in stretches.windows(2).enumerate() {
         let [(before, start), (after, end)] = pair else { continue };
-        let rows = leave(input.time, before)..arrive(input.time, after);
+        let rows = leave(&recording.time, before)..arrive(&recording.time, after);
         match input.compress(rows, [start, end], &|time| path.at(time) + grown.at(time)) {
             Ok(data) => found.data.push(data),
             Err(gap) => {
@@ -114,12 +115,12 @@ fn warm_bias(
     if let Err(refusal) = thermometry.check(&temperatures) {
         return (finding.refused(refusal), None);
     }
-    let MotionInput { time, rates, usable, interval, .. } = *input;
+    let series = input.rates;
     let rates = WarmRates {
         means: &stills.iter().map(|still| still.mean).collect::<Vec<_>>(),
         times: &stills.iter().map(Still::time).collect::<Vec<_>>(),
         temperatures: &temperatures,
-        noise: &AtRest { time, values: rates, usable, interval, rows, step: quantum(rates, usable) }.noise(),
+        noise: &AtRest { series, rows, step: quantum(series.values, series.usable) }.noise(),
     };
     let kept = rest_rates::estimate(&rates, &mut finding);
     let growth = kept.map(|kept| temperatures.iter().map(|t| kept.terms.drift(*t)).collect());
@@ -143,10 +144,11 @@ fn arrive(time: &[f64], still: &Range<usize>) -> usize {
 /// The mean rate of a still stretch less Earth's rotation; `None` where hardly a sample is usable.
 fn still(input: &MotionInput<'_>, rows: &Range<usize>, attitude: &Matrix3<f64>) -> Option<Still> {
     let mut moments = Moments::default();
-    rows.clone().filter(|k| input.usable[*k]).for_each(|k| moments.push(&input.rates[k]));
+    let Series { time, values, usable, .. } = input.rates;
+    rows.clone().filter(|k| usable[*k]).for_each(|k| moments.push(&values[k]));
     let count = f64::from(moments.count());
     (moments.count() > 10).then(|| Still {
-        span: input.time[rows.start]..input.time[rows.end - 1],
+        span: time[rows.start]..time[rows.end - 1],
         mean: moments.mean() - attitude.tr_mul(&input.earth_p),
         // Rounding to counts may leave no spread at all.
         variance: (moments.variance() / count).map(|v| v.max(1e-14)),
@@ -159,12 +161,13 @@ fn noise(
     stretches: &[(Range<usize>, Matrix3<f64>)],
     stills: &[Still],
 ) -> Option<Noise> {
+    let Series { time, values, usable, .. } = input.rates;
     let rows: Vec<Range<usize>> = stretches.iter().map(|(rows, _)| rows.clone()).collect();
     let spans: Vec<Span> = stills.iter().map(|still| still.span.clone()).collect();
     let means = stills.iter().flat_map(|still| still.mean.iter().copied());
     Noise::of(&noise::Residuals {
         spans: &spans,
-        density: white::density(input.time, input.rates, input.usable, &rows),
+        density: white::density(time, values, usable, &rows),
         residuals: &DVector::from_iterator(3 * stills.len(), means),
         jacobian: &DMatrix::from_fn(3 * stills.len(), 3, |row, k| f64::from(u8::from(row % 3 == k))),
     })
@@ -196,9 +199,9 @@ pub fn on_reference(
     let mut from = 0;
     let mut broken = 0;
     while let Some((first, start)) = next(from) {
-        let reach = input.time.partition_point(|t| *t < input.time[first] + OPTICAL);
+        let reach = input.rates.time.partition_point(|t| *t < input.rates.time[first] + OPTICAL);
         let Some((last, end)) = next(reach) else { break };
-        if input.time[last] - input.time[first] > 2.0 * OPTICAL {
+        if input.rates.time[last] - input.rates.time[first] > 2.0 * OPTICAL {
             broken += 1;
         } else {
             match input.compress(first..last + 1, [start, end], &|_| Vector3::zeros()) {
@@ -246,10 +249,12 @@ fn input<'a>(
         Vector3::new(cos, 0.0, -sin) * EARTH_RATE
     });
     MotionInput {
-        time: &recording.time,
-        rates: &sensor.values,
-        usable,
-        interval: recording.median_interval().unwrap_or(1.0),
+        rates: Series {
+            time: &recording.time,
+            values: &sensor.values,
+            usable,
+            interval: recording.median_interval().unwrap_or(1.0),
+        },
         attitudes,
         earth_p,
         force_p: Vector3::new(0.0, 0.0, -site.gravity().unwrap_or(STANDARD_GRAVITY)),

@@ -15,21 +15,20 @@ use crate::{
         outcome::{BiasWander, KnownTurn},
         temperature::{Thermometry, WarmTriad, rests},
     },
-    observe::turn::{BiasPath, Rates, TurnData, compress},
+    observe::{
+        series::Series,
+        turn::{BiasPath, TurnData, compress},
+    },
     recording::Triple,
 };
 
 /// What the gyroscope is calibrated from.
 #[derive(Clone, Copy, Debug)]
 pub struct GyrInput<'a> {
-    /// Time, s.
-    pub time: &'a [f64],
     /// The gyroscope.
     pub sensor: &'a Triple,
-    /// Rows in which it is usable.
-    pub usable: &'a [bool],
-    /// Usual interval, s.
-    pub interval: f64,
+    /// Its rates.
+    pub rates: Series<'a>,
     /// Step of the converter on each axis ([`crate::observe::quantum`]), rad/s.
     pub step: Vector3<f64>,
     /// Rows of the rests, with what was observed in each.
@@ -77,7 +76,7 @@ impl GyrInput<'_> {
                 BiasPath { before: (self.rests[i].time, mean(i)), after: (self.rests[j].time, mean(j)) };
             let ends = (i, &self.rows[i], j, &self.rows[j]);
             let left_out = |gap| format!("turn from rest {} to {}: {gap}", i + 1, j + 1);
-            compress(self.rates(), ends, &path).map_err(left_out)
+            compress(self.rates, ends, &path).map_err(left_out)
         };
         let each: Vec<Result<TurnData, String>> = self.used.par_windows(2).map(turn).collect();
         for turn in each {
@@ -89,20 +88,8 @@ impl GyrInput<'_> {
         turns
     }
 
-    fn rates(&self) -> Rates<'_> {
-        let Self { time, usable, interval, .. } = *self;
-        Rates { time, values: &self.sensor.values, usable, interval }
-    }
-
     pub(super) fn at_rest(&self) -> AtRest<'_> {
-        AtRest {
-            time: self.time,
-            values: &self.sensor.values,
-            usable: self.usable,
-            interval: self.interval,
-            rows: self.rows,
-            step: self.step,
-        }
+        AtRest { series: self.rates, rows: self.rows, step: self.step }
     }
 
     /// Mean rate of each rest, less Earth's about the vertical.

@@ -320,7 +320,7 @@ fn between<'a>(data: &[TurnData], known: &[Turn<'a, f64>]) -> Vec<Between<'a>> {
 
 fn rate_noise(input: &GyrInput<'_>, turns: &Turns, bias: &BiasErrors) -> RateNoise {
     // In motion the steps of the converter are noise, whatever they are at rest.
-    let rounding = input.step.map(|step| step * step / 12.0) * input.interval;
+    let rounding = input.step.map(|step| step * step / 12.0) * input.rates.interval;
     let interpolated = turns.wander.interpolated;
     RateNoise {
         density: input.at_rest().density().zip_map(&rounding, f64::max).mean(),

@@ -27,7 +27,8 @@ use crate::{
     effect::axis_swap,
     observe::{
         rest::{RestDetector, Samples},
-        turn::{BiasPath, Rates, TurnData, compress},
+        series::Series,
+        turn::{BiasPath, TurnData, compress},
     },
     recording::{Recording, median},
 };
@@ -144,7 +145,7 @@ fn turns(recording: &Recording, rests: &[Range<usize>], acc: &Triad<f64>) -> Opt
         })
         .collect();
     let step = moved.len().div_ceil(TURNS.1).max(1);
-    let rates = Rates { time: &recording.time, values: &gyr.values, usable: &usable, interval };
+    let rates = Series { time: &recording.time, values: &gyr.values, usable: &usable, interval };
     let turns: Turns = moved
         .into_iter()
         .step_by(step)

@@ -27,6 +27,7 @@ use crate::{
     observe::{
         cloud::{Cloud, cloud},
         quantum::quantum,
+        series::Series,
     },
     recording::{SensorKind, Triple, Unit},
 };
@@ -39,14 +40,10 @@ const FOLDS: usize = 5;
 /// What a magnetometer is calibrated from.
 #[derive(Clone, Copy, Debug)]
 pub struct MagInput<'a> {
-    /// Sample times, s; where there are none, rows are the clock.
-    pub time: &'a [f64],
     /// The magnetometer.
     pub sensor: &'a Triple,
-    /// Rows in which it is usable.
-    pub usable: &'a [bool],
-    /// Usual interval, s.
-    pub interval: f64,
+    /// Its samples.
+    pub series: Series<'a>,
     /// Rows of the rests, where there are any.
     pub rests: &'a [Range<usize>],
     /// Length of Earth's field, µT, where it is known.
@@ -56,13 +53,14 @@ pub struct MagInput<'a> {
 impl<'a> MagInput<'a> {
     /// Samples without times and rests.
     pub fn of_cloud(sensor: &'a Triple, usable: &'a [bool], field: Option<f64>) -> Self {
-        Self { time: &[], sensor, usable, interval: 1.0, rests: &[], field }
+        let series = Series { time: &[], values: &sensor.values, usable, interval: 1.0 };
+        Self { sensor, series, rests: &[], field }
     }
 }
 
 /// Calibrates a cloud.
 pub fn calibrate(input: &MagInput<'_>) -> SensorOutcome {
-    let cloud = cloud(&input.sensor.values, input.usable);
+    let cloud = cloud(input.series.values, input.series.usable);
     match fit(&cloud, input) {
         Ok((summary, Ok(evidence))) => outcome(Ok(()), Some(summary), Some(evidence)),
         Ok((summary, Err(refusal))) => outcome(Err(refusal), Some(summary), None),
@@ -117,14 +115,11 @@ fn fit(cloud: &Cloud, input: &MagInput<'_>) -> Result<Judged, Refusal> {
     let fit = best_fit(&problem).ok_or(flat)?;
     let coverage = problem.coverage(&fit);
     let at: Vec<f64> =
-        cloud.rows.iter().map(|row| input.time.get(*row).copied().unwrap_or(*row as f64)).collect();
+        cloud.rows.iter().map(|row| input.series.time.get(*row).copied().unwrap_or(*row as f64)).collect();
     let at_rest = AtRest {
-        time: input.time,
-        values: &sensor.values,
-        usable: input.usable,
-        interval: input.interval,
+        series: input.series,
         rows: input.rests,
-        step: quantum(&sensor.values, input.usable),
+        step: quantum(&sensor.values, input.series.usable),
     };
     let errors = ShellErrors::of_cloud(&problem, &fit, &at, &at_rest.noise_of_cloud());
     let (bend, verdict) = problem.judge(&fit, &coverage, &errors.stated(&problem.form, &fit), false, &limits);
