@@ -17,10 +17,9 @@ use imucal_host::{
     ellipsoid::{adjusted, sphere},
     observe::{
         cloud::cloud,
-        series::Series,
         turn::{BiasPath, TurnData, compress},
     },
-    recording::{Nominal, Recording},
+    recording::{Nominal, Recording, Series},
 };
 use imucal_tests::{
     data,

@@ -32,6 +32,8 @@ use crate::{
 
 /// A raw gyroscope carries a direction as near as this, rad (23°): a gain wrong by a fifth over a long turn.
 const NEAR: f32 = 0.4;
+/// As they are, rates that carry directions as near as this in the mean, rad (3°), turn as gravity does, whatever else might.
+const CARRIED: f32 = 0.05;
 /// Another order of the axes is as good within this factor.
 const ALIKE: f32 = 2.0;
 /// Cosine of the angle that a turn moves the direction by at least (15°).
@@ -92,7 +94,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         }
         let first = *sums.first()?;
         let least = sums.iter().fold(f32::INFINITY, |least, sum| if *sum < least { *sum } else { least });
-        if first <= ALIKE * least {
+        if first <= ALIKE * least || first < CARRIED * turns {
             return Some(0);
         }
         // Half of the turns at least are carried.

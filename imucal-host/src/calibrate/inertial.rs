@@ -28,9 +28,8 @@ use crate::{
     observe::{
         quantum::ConverterSteps,
         rest::{RestDetector, Samples},
-        series::Series,
     },
-    recording::{Recording, SensorKind, Triple, check::integrity::Integrity, unit::STANDARD_GRAVITY},
+    recording::{Recording, SensorKind, Series, Triple, check::integrity::Integrity, unit::STANDARD_GRAVITY},
     simulator::place::EARTH_RATE,
 };
 
@@ -67,6 +66,8 @@ pub(crate) fn calibrate(
         Rests { thermometry: thermometry.as_ref(), ..Rests::new(recording, acc, integrity, gravity) };
     let detector = at_rest.detector();
     let cuts = segmentation::cuts(&detector, &options.multipliers, at_rest.gravity);
+    let (_, from_initial_rest) = detector.noise();
+    drop(detector);
     let Some(chosen) = segmentation::choose(&cuts) else {
         compare_gyr(calibration, &|_| None);
         calibration.sensors.extend(gyr_on_rig);
@@ -102,14 +103,15 @@ pub(crate) fn calibrate(
     });
     let acc_outcome = Some(acc_outcome).filter(|_| !options.skip.contains(&SensorKind::Acc));
     calibration.sensors.extend(acc_outcome.into_iter().chain(gyr_outcome));
-    calibration.segmentation = Some(segmentation_report(chosen, &detector, &calibration.sensors, trials));
+    calibration.segmentation =
+        Some(segmentation_report(chosen, from_initial_rest, &calibration.sensors, trials));
     directions
 }
 
 /// What is reported of the rests.
 fn segmentation_report(
     chosen: &Cut,
-    detector: &RestDetector<'_>,
+    from_initial_rest: bool,
     sensors: &[SensorOutcome],
     trials: Vec<ThresholdTrial>,
 ) -> SegmentationReport {
@@ -118,7 +120,7 @@ fn segmentation_report(
         rests: chosen.rows.clone(),
         multiplier: chosen.multiplier,
         threshold: chosen.threshold,
-        from_initial_rest: detector.noise().1,
+        from_initial_rest,
         gain_spread: spreads.fold(0.0, f64::max),
         trials,
     }

@@ -4,9 +4,9 @@ use imucal_core::observation::Moments;
 use nalgebra::Vector3;
 
 use crate::{
-    observe::{held, quantum::ConverterSteps, series::Series},
+    observe::{held, quantum::ConverterSteps},
     recording::{
-        Recording, SensorKind, Triple,
+        Recording, SensorKind, Series, Triple,
         check::{integrity, integrity::Integrity},
     },
 };

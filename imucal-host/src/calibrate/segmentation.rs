@@ -50,7 +50,7 @@ pub fn cuts(detector: &RestDetector<'_>, multipliers: &[f64], gravity: f64) -> V
         .par_iter()
         .map(|multiplier| {
             let cut = detector.cut(*multiplier);
-            let rests: Vec<_> = cut.rests.iter().map(|rows| detector.rest(rows)).collect();
+            let rests: Vec<_> = cut.rests.par_iter().map(|rows| detector.rest(rows)).collect();
             let fit = rests::trial(&rests, gravity);
             Cut { multiplier: cut.multiplier, threshold: cut.threshold, rows: cut.rests, rests, fit }
         })

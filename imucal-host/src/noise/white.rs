@@ -2,7 +2,7 @@
 //!
 //! | purpose | estimator |
 //! | --- | --- |
-//! | errors of the means of rests: [`density`] | Allan variance at 0.5 s |
+//! | errors of the means of rests: [`RestMeans::density`] | Allan variance at 0.5 s |
 //! | weights of block means at rest: [`at_rest`] | steps between neighbouring pieces of a tenth of a second |
 //! | weights of block means in motion: [`second_differences`] | second differences of residuals, since movements are smooth |
 //! | size of a sample's noise, at rest or not: [`of_samples`] | median of steps from sample to sample |
@@ -27,31 +27,38 @@ const LEAST: usize = 48;
 /// An axis cannot be quieter than this share of the noisiest: rounding has swallowed its noise.
 const QUIETEST: f64 = 1e-3;
 
-/// Density of each axis, unit²·s; `None` where the stretches are too short or nothing but rounding moves the samples.
-pub fn density(
-    time: &[f64],
-    values: &[Vector3<f64>],
-    usable: &[bool],
-    stretches: &[Range<usize>],
-) -> Option<Vector3<f64>> {
-    let mut sum = Vector3::zeros();
-    let mut count = 0;
-    for rows in stretches {
-        let means = means(time, values, usable, rows.clone());
-        for pair in means.windows(2) {
+/// Means over τ in succession, of each rest on its own; `None` where samples are missing.
+#[derive(Clone, Debug)]
+pub struct RestMeans(Vec<Vec<Option<Vector3<f64>>>>);
+
+impl RestMeans {
+    /// Of the usable samples of rests.
+    pub fn of(time: &[f64], values: &[Vector3<f64>], usable: &[bool], rests: &[Range<usize>]) -> Self {
+        Self(rests.iter().map(|rows| means(time, values, usable, rows.clone())).collect())
+    }
+
+    /// Those of each rest.
+    pub(super) fn rests(&self) -> impl Iterator<Item = &[Option<Vector3<f64>>]> {
+        self.0.iter().map(Vec::as_slice)
+    }
+
+    /// Density of the white noise of each axis, unit²·s; `None` where the rests are too short or nothing but rounding moves the samples.
+    pub fn density(&self) -> Option<Vector3<f64>> {
+        let mut sum = Vector3::zeros();
+        let mut count = 0;
+        for pair in self.rests().flat_map(|means| means.windows(2)) {
             if let [Some(one), Some(next)] = pair {
                 sum += (next - one).map(|step| step * step);
                 count += 1;
             }
         }
+        let density = sum * (0.5 * AVERAGED / f64::from(count));
+        (count as usize >= LEAST && density.max().is_finite() && density.max() > 0.0)
+            .then(|| density.map(|axis| axis.max(QUIETEST * density.max())))
     }
-    let density = sum * (0.5 * AVERAGED / f64::from(count));
-    (count as usize >= LEAST && density.max().is_finite() && density.max() > 0.0)
-        .then(|| density.map(|axis| axis.max(QUIETEST * density.max())))
 }
 
-/// Means over successive intervals of a rest; `None` where samples are missing.
-pub(super) fn means(
+fn means(
     time: &[f64],
     values: &[Vector3<f64>],
     usable: &[bool],
@@ -145,7 +152,7 @@ mod tests {
             })
             .collect();
         let stretches: Vec<Range<usize>> = (0..32).map(|k| 400 * k..400 * (k + 1)).collect();
-        density(&time, &values, &[true; 12_800], &stretches).unwrap()
+        RestMeans::of(&time, &values, &[true; 12_800], &stretches).density().unwrap()
     }
 
     #[test]
@@ -163,7 +170,7 @@ mod tests {
     fn rests_that_are_too_short_or_too_still_tell_nothing() {
         let time: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
         let still = vec![Vector3::x(); 1000];
-        assert!(density(&time, &still, &[true; 1000], &[0..400, 500..900]).is_none());
-        assert!(density(&time, &still, &[false; 1000], &[0..400, 500..900]).is_none());
+        assert!(RestMeans::of(&time, &still, &[true; 1000], &[0..400, 500..900]).density().is_none());
+        assert!(RestMeans::of(&time, &still, &[false; 1000], &[0..400, 500..900]).density().is_none());
     }
 }

@@ -16,12 +16,10 @@
 //! in minutes. Likelihood: restricted, μ and S integrated out (Patterson & Thompson 1971). Not modelled: drift that begins
 //! beyond a rest's length; a share of the prior is kept for that (`KEPT`).
 
-use std::ops::Range;
-
 use nalgebra::{Cholesky, DMatrix, Vector3};
 use rayon::prelude::*;
 
-use super::{Span, flicker, white};
+use super::{Span, flicker, white, white::RestMeans};
 
 /// The shortest correlation time that means over half a second distinguish from white noise, s.
 const SHORTEST: f64 = 1.0;
@@ -39,11 +37,10 @@ pub struct Within {
 }
 
 impl Within {
-    /// Of the usable samples of rests.
-    pub fn of(time: &[f64], values: &[Vector3<f64>], usable: &[bool], rests: &[Range<usize>]) -> Self {
+    /// Of rests.
+    pub fn of(rests: &RestMeans) -> Self {
         let mut stretches = Vec::new();
-        for rows in rests {
-            let means = white::means(time, values, usable, rows.clone());
+        for means in rests.rests() {
             for run in means.split(Option::is_none) {
                 let run: Vec<Vector3<f64>> = run.iter().flatten().copied().collect();
                 stretches.extend(run.chunks(LONGEST).filter(|run| run.len() > 1).map(<[_]>::to_vec));
@@ -166,6 +163,8 @@ fn whitened(lower: &DMatrix<f64>, mut values: Vec<Vector3<f64>>) -> Vec<Vector3<
 
 #[cfg(test)]
 mod tests {
+    use std::ops::Range;
+
     use super::*;
     use crate::simulator::random::{Purpose, Random};
 
@@ -184,7 +183,7 @@ mod tests {
         let values: Vec<Vector3<f64>> = (0..24 * 200).map(|_| sample()).collect();
         let time: Vec<f64> = (0..values.len()).map(|k| 0.02 * k as f64).collect();
         let rests: Vec<Range<usize>> = (0..24).map(|k| 200 * k..200 * (k + 1)).collect();
-        let within = Within::of(&time, &values, &vec![true; values.len()], &rests);
+        let within = Within::of(&RestMeans::of(&time, &values, &vec![true; values.len()], &rests));
         let prior = [(0.0, 0.5), (0.5, 0.1), (2.0, 0.1), (8.0, 0.1), (32.0, 0.2)];
         within.weigh(&prior, &[10.0, 100.0], |ratio| ratio)[0].1
     }
@@ -224,7 +223,7 @@ mod tests {
     fn means_of_a_converter_s_few_steps_alter_nothing() {
         let values = vec![Vector3::new(1.0, 2.0, 3.0); 800];
         let time: Vec<f64> = (0..800).map(|k| 0.02 * f64::from(k)).collect();
-        let within = Within::of(&time, &values, &[true; 800], &[0..400, 400..800]);
+        let within = Within::of(&RestMeans::of(&time, &values, &[true; 800], &[0..400, 400..800]));
         let prior = [(0.0, 0.5), (1.0, 0.5)];
         assert_eq!(within.weigh(&prior, &[10.0], |ratio| ratio), prior);
     }

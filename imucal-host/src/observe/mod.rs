@@ -9,5 +9,4 @@ pub mod pose;
 pub mod quantum;
 pub mod rest;
 pub mod rest_halves;
-pub mod series;
 pub mod turn;

@@ -15,10 +15,12 @@ use nalgebra::{Matrix3, Quaternion, Vector3};
 use super::{
     compression,
     compression::{Sample, jump},
-    series::Series,
     turn::TurnGap,
 };
-use crate::{noise::Span, recording::Recording};
+use crate::{
+    noise::Span,
+    recording::{Recording, Series},
+};
 
 /// A block lasts about this long, s: five samples at 100 Hz.
 const BLOCK: f64 = 0.05;

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::cloud::cloud;
 use crate::{
-    noise::{Span, white},
+    noise::{Span, white::RestMeans},
     recording::{
         Recording, Triple,
         manifest::{Axis as FileAxis, Rig},
@@ -159,7 +159,7 @@ fn turned(to: &[f64; 3], from: &[f64; 3]) -> Vector3<f64> {
 pub fn poses(recording: &Recording, sensor: &Triple, usable: &[bool]) -> Result<Poses, NoPoses> {
     let (axes, gimbal) = axes_and_encoders(recording)?;
     let stretches = still_stretches(&recording.time, gimbal);
-    let density = white::density(&recording.time, &sensor.values, usable, &stretches);
+    let density = RestMeans::of(&recording.time, &sensor.values, usable, &stretches).density();
     let (mut poses, mut spans) = (Vec::new(), Vec::new());
     for rows in stretches {
         let Some(angles) = mean_angles(&gimbal[rows.clone()]) else { continue };

@@ -55,7 +55,7 @@ pub fn quantum(values: &[Vector3<f64>], usable: &[bool]) -> Vector3<f64> {
 
 /// Each value once, ascending: a converter puts out few of them, so that they are found before they are sorted.
 fn distinct(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut all: HashSet<u64, BuildHasherDefault<BitHash>> = HashSet::default();
+    let mut all = HashSet::with_capacity_and_hasher(FEW, BuildHasherDefault::<BitHash>::default());
     // Most samples repeat one of the last values, which a table with one place for each hash knows. No finite value has these bits.
     let mut recent = vec![u64::MAX; 1 << RECENT];
     for bits in values.map(f64::to_bits) {
@@ -76,6 +76,8 @@ fn rank(bits: u64) -> i64 {
     bits as i64 ^ (sign as u64 >> 1) as i64
 }
 
+/// Distinct values that there is room for at first: a recording of some minutes has them.
+const FEW: usize = 1 << 14;
 /// Bits of a place among the last values.
 const RECENT: u32 = 12;
 /// See [`BitHash`].

@@ -230,40 +230,56 @@ fn window(k: usize, half: usize, rows: usize) -> Range<usize> {
     k.saturating_sub(half)..k.saturating_add(half).saturating_add(1).min(rows)
 }
 
-/// Running sums of the usable rows so far, and of the gaps.
-#[derive(Clone, Copy, Default)]
-struct Sums {
+/// Sums of the usable rows before one, from a value near the data, so that differences of sums lose no digits that matter; and of the
+/// gaps. Two of them that follow the ends of a window, by the same additions, stand for the sums of every row.
+#[derive(Clone, Copy)]
+struct RunningSums<'a> {
+    samples: Samples<'a>,
+    origin: Vector3<f64>,
+    longest_gap: f64,
+    row: usize,
     sum: Vector3<f64>,
     square: f64,
     count: u32,
     gaps: u32,
 }
 
+impl<'a> RunningSums<'a> {
+    fn new(samples: Samples<'a>, longest_gap: f64) -> Self {
+        let first_usable = samples.acc.iter().zip(samples.usable).find(|(_, usable)| **usable);
+        let origin = first_usable.map(|(value, _)| *value).unwrap_or_default();
+        let sum = Vector3::zeros();
+        Self { samples, origin, longest_gap, row: 0, sum, square: 0.0, count: 0, gaps: 0 }
+    }
+
+    /// Takes the rows before `row`, which is none of those that it has taken.
+    fn advance(&mut self, row: usize) {
+        let Samples { time, acc, usable, .. } = self.samples;
+        for k in self.row..row {
+            if k > 0 && time[k] - time[k - 1] > self.longest_gap {
+                self.gaps += 1;
+            }
+            if usable[k] {
+                let x = acc[k] - self.origin;
+                self.sum += x;
+                self.square += x.norm_squared();
+                self.count += 1;
+            }
+        }
+        self.row = row;
+    }
+}
+
 /// Variance of the usable rows around each row; infinite where too few of them are, or time jumps.
 fn windowed_variance(samples: Samples<'_>, half: usize, longest_gap: f64) -> Vec<f64> {
     let rows = samples.acc.len();
-    let first_usable = samples.acc.iter().zip(samples.usable).find(|(_, usable)| **usable);
-    let origin = first_usable.map(|(value, _)| *value).unwrap_or_default();
-    // Running sums from a value near the data: differences of sums then lose no digits that matter.
-    let mut sums = Vec::with_capacity(rows + 1);
-    let mut now = Sums::default();
-    sums.push(now);
-    for k in 0..rows {
-        if k > 0 && samples.time[k] - samples.time[k - 1] > longest_gap {
-            now.gaps += 1;
-        }
-        if samples.usable[k] {
-            let x = samples.acc[k] - origin;
-            now.sum += x;
-            now.square += x.norm_squared();
-            now.count += 1;
-        }
-        sums.push(now);
-    }
+    let mut from = RunningSums::new(samples, longest_gap);
+    let mut to = from;
     (0..rows)
         .map(|k| {
             let w = window(k, half, rows);
-            let (from, to) = (sums[w.start], sums[w.end]);
+            from.advance(w.start);
+            to.advance(w.end);
             let n = f64::from(to.count - from.count);
             if to.gaps > from.gaps || n < USABLE_SHARE * w.len() as f64 {
                 return f64::INFINITY;
@@ -276,20 +292,20 @@ fn windowed_variance(samples: Samples<'_>, half: usize, longest_gap: f64) -> Vec
 
 fn windowed_mean(values: &[Vector3<f64>], usable: &[bool], half: usize) -> Vec<Vector3<f64>> {
     let rows = values.len();
-    let mut sums = Vec::with_capacity(rows + 1);
-    let mut sum = (Vector3::zeros(), 0u32);
-    sums.push(sum);
-    for (value, good) in values.iter().zip(usable) {
-        if *good {
-            sum = (sum.0 + value, sum.1 + 1);
+    let add = |(row, sum, count): &mut (usize, Vector3<f64>, u32), to: usize| {
+        for k in (*row..to).filter(|k| usable[*k]) {
+            (*sum, *count) = (*sum + values[k], *count + 1);
         }
-        sums.push(sum);
-    }
+        *row = to;
+    };
+    let mut from = (0, Vector3::zeros(), 0u32);
+    let mut to = from;
     (0..rows)
         .map(|k| {
             let w = window(k, half, rows);
-            let ((s1, n1), (s0, n0)) = (sums[w.end], sums[w.start]);
-            (s1 - s0) / f64::from((n1 - n0).max(1))
+            add(&mut from, w.start);
+            add(&mut to, w.end);
+            (to.1 - from.1) / f64::from((to.2 - from.2).max(1))
         })
         .collect()
 }

@@ -9,11 +9,12 @@ use std::ops::Range;
 use imucal_core::observation::{Block, Durations, Turn};
 use nalgebra::{Matrix3, Vector3};
 
+use crate::recording::Series;
+
 use super::{
     block_change::BlockChange,
     compression,
     compression::{Compressed, is_jump},
-    series::Series,
 };
 
 /// Samples a block. Five at 100 Hz differ from the product over samples by about 1e-5° in 100 s (models.md 3).

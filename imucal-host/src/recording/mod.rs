@@ -24,6 +24,7 @@ pub mod read;
 mod read_error;
 mod samples;
 mod sensor_kind;
+mod series;
 pub mod simulated;
 pub mod topic;
 pub mod transfer;
@@ -44,6 +45,7 @@ pub use self::{
     read_error::ReadError,
     samples::Samples,
     sensor_kind::SensorKind,
+    series::Series,
     simulated::{Simulated, Stream},
     triple::{Nominal, Triple},
     unit::Unit,

@@ -43,9 +43,8 @@ use crate::{
         held,
         quantum::ConverterSteps,
         rest_halves::{self, MeanVariance},
-        series::Series,
     },
-    recording::{Recording, SensorKind, check::integrity::Integrity, unit::STANDARD_GRAVITY},
+    recording::{Recording, SensorKind, Series, check::integrity::Integrity, unit::STANDARD_GRAVITY},
 };
 
 /// Probability that a sensor with white noise is suspected by score tests.

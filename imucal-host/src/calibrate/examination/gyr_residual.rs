@@ -31,7 +31,8 @@ use crate::{
         outcome::KnownTurn,
         suspicion::Follows,
     },
-    observe::{series::Series, turn::TurnSamples},
+    observe::turn::TurnSamples,
+    recording::Series,
 };
 
 /// Columns of one test.

@@ -24,6 +24,7 @@ use crate::{
         flicker,
         interval::{Parts, Scale, Whitening},
         semiseparable::{Mean, Semiseparable},
+        within::Within,
     },
     observe::quantum,
 };
@@ -42,11 +43,14 @@ pub struct BiasErrors {
     pub std: Vector3<f64>,
     /// The part that all rests share because the converter has steps, variance, (rad/s)².
     pub steps: Vector3<f64>,
+    /// Density of the white noise that the means err by, (rad/s)²·s.
+    pub density: Vector3<f64>,
 }
 
 /// Of the means of rests; `at_rest` are the samples that they are means of, `rests` how many there are in each.
 pub fn errors(rests: &[Rest<f64>], means: &[Vector3<f64>], at_rest: &AtRest<'_>) -> BiasErrors {
-    let (count, spans, density) = (rests.len(), at_rest.spans(), at_rest.density());
+    let within = at_rest.means();
+    let (count, spans, density) = (rests.len(), at_rest.spans(), at_rest.density_of(&within));
     let total: f64 = rests.iter().map(|rest| f64::from(rest.gyr.count())).sum();
     let influence = DMatrix::from_fn(count, 1, |k, _| f64::from(rests[k].gyr.count()) / total);
     let length = |k: usize| spans[k].end - spans[k].start;
@@ -54,7 +58,7 @@ pub fn errors(rests: &[Rest<f64>], means: &[Vector3<f64>], at_rest: &AtRest<'_>)
         |k: usize| Mean { row: k, span: spans[k].clone(), white: 1.0 / length(k), drifts: Vector3::x() };
     let noise =
         Semiseparable::new(vec![(0..count).map(mean_over).collect()], flicker::processes(&spans, 1.0));
-    let ratios = rest_noise::drifts(&at_rest.within(), &spans);
+    let ratios = rest_noise::drifts(&Within::of(&within), &spans);
     let parts = Parts { parts: &noise, ratios: &ratios, scale: Scale::AtLeastOne, five: true };
     let carried = noise.carried(&influence);
     let bias = mean(rests, means);
@@ -74,14 +78,14 @@ pub fn errors(rests: &[Rest<f64>], means: &[Vector3<f64>], at_rest: &AtRest<'_>)
     let mut steps = Vector3::zeros();
     steps.as_mut_slice().par_iter_mut().enumerate().for_each(|(axis, step)| *step = of_axis_steps(axis));
     let std = Vector3::from_fn(|axis, _| (of_axis(axis) * density[axis] + steps[axis]).sqrt());
-    BiasErrors { std, steps }
+    BiasErrors { std, steps, density }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
-        observe::series::Series,
+        recording::Series,
         simulator::random::{Purpose, Random},
     };
 

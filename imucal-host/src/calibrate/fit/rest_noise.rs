@@ -6,8 +6,9 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::{
-    noise::{Span, flicker, interval::Parts, white, within::Within},
-    observe::{quantum::variances_of_means, series::Series},
+    noise::{Span, flicker, interval::Parts, white::RestMeans, within::Within},
+    observe::quantum::variances_of_means,
+    recording::Series,
 };
 
 /// An axis is no quieter than this share of what the axes are on average: rounding may have swallowed its noise.
@@ -85,18 +86,19 @@ impl AtRest<'_> {
     fn noise_with_steps(&self, steps: impl Fn(f64, usize) -> Vec<f64> + Sync) -> RestNoise {
         let mut of_axes: [Vec<f64>; 3] = Default::default();
         of_axes.par_iter_mut().enumerate().for_each(|(axis, of)| *of = steps(self.step[axis], axis));
+        let means = self.means();
         RestNoise {
             spans: self.rows.iter().map(|rows| self.span(rows)).collect(),
-            density: self.density(),
+            density: self.density_of(&means),
             steps: (0..self.rows.len()).map(|k| Vector3::from_fn(|axis, _| of_axes[axis][k])).collect(),
-            within: self.within(),
+            within: Within::of(&means),
         }
     }
 
     /// Means within the rests.
-    pub fn within(&self) -> Within {
+    pub fn means(&self) -> RestMeans {
         let Series { time, values, usable, .. } = self.series;
-        Within::of(time, values, usable, self.rows)
+        RestMeans::of(time, values, usable, self.rows)
     }
 
     /// When each rest was.
@@ -114,10 +116,8 @@ impl AtRest<'_> {
     }
 
     /// Density of the white noise: of means half a second apart, or of the samples where rests are too short for that.
-    pub fn density(&self) -> Vector3<f64> {
-        let Series { time, values, usable, interval } = self.series;
-        let found = white::density(time, values, usable, self.rows);
-        let density = found.unwrap_or_else(|| self.variance() * interval);
+    pub fn density_of(&self, means: &RestMeans) -> Vector3<f64> {
+        let density = means.density().unwrap_or_else(|| self.variance() * self.series.interval);
         let least = QUIETEST * density.mean();
         density.map(|axis| axis.max(least))
     }

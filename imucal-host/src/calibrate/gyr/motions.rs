@@ -15,14 +15,13 @@ use crate::{
             rest_rates::{self, WarmRates},
         },
     },
-    noise::{self, Noise, Span, white},
+    noise::{self, Noise, Span, white::RestMeans},
     observe::{
         motion::{self, Attitudes, MotionData, MotionInput},
         pose,
         quantum::quantum,
-        series::Series,
     },
-    recording::{Recording, Triple, unit::STANDARD_GRAVITY},
+    recording::{Recording, Series, Triple, unit::STANDARD_GRAVITY},
     simulator::place::EARTH_RATE,
 };
 
@@ -167,7 +166,7 @@ fn noise(
     let means = stills.iter().flat_map(|still| still.mean.iter().copied());
     Noise::of(&noise::Residuals {
         spans: &spans,
-        density: white::density(time, values, usable, &rows),
+        density: RestMeans::of(time, values, usable, &rows).density(),
         residuals: &DVector::from_iterator(3 * stills.len(), means),
         jacobian: &DMatrix::from_fn(3 * stills.len(), 3, |row, k| f64::from(u8::from(row % 3 == k))),
     })

@@ -15,11 +15,8 @@ use crate::{
         outcome::{BiasWander, KnownTurn},
         temperature::{Thermometry, WarmTriad, rests},
     },
-    observe::{
-        series::Series,
-        turn::{BiasPath, TurnData, compress},
-    },
-    recording::Triple,
+    observe::turn::{BiasPath, TurnData, compress},
+    recording::{Series, Triple},
 };
 
 /// What the gyroscope is calibrated from.

@@ -118,8 +118,8 @@ pub fn calibrate(input: &GyrInput<'_>) -> SensorOutcome {
     if let Err(refusal) = check_turns(input, &turns) {
         return refuse(refusal, None);
     }
-    let mut fitted = fit(&input.with_directions(&turns.data));
-    let bias = bias_errors(input, of_bias.as_ref());
+    let (mut fitted, bias) =
+        rayon::join(|| fit(&input.with_directions(&turns.data)), || bias_errors(input, of_bias.as_ref()));
     let of_scale = finding.as_mut().and_then(|finding| {
         warm_scale(input, &turns, &FULL_GAIN.triad(fitted.fit.0.theta()).gain, &bias, finding)
     });
@@ -267,12 +267,16 @@ fn summarise(
 ) -> FitSummary {
     let gain = FULL_GAIN.triad(solver.theta()).gain;
     let classical = least_squares::covariance(solver);
-    let covariance = of_scale.map(|kept| kept.fit.first::<9>());
-    let covariance =
-        covariance.or_else(|| gain_covariance(input, turns, known, &gain, bias)).unwrap_or(classical);
+    let (covariance, (rms, held_out_rms)) = rayon::join(
+        || {
+            let covariance = of_scale.map(|kept| kept.fit.first::<9>());
+            covariance.or_else(|| gain_covariance(input, turns, known, &gain, bias)).unwrap_or(classical)
+        },
+        || (rms(&turn_errors(known, solver.theta())), held_out_rms(known, solver.theta())),
+    );
     let report = FitReport {
-        rms: rms(&turn_errors(known, solver.theta())),
-        held_out_rms: held_out_rms(known, solver.theta()),
+        rms,
+        held_out_rms,
         nonlinearity: accept::nonlinearity(
             solver,
             &ParallelTurns(TurnModel { turns: known, form: FULL_GAIN }),
@@ -323,7 +327,7 @@ fn rate_noise(input: &GyrInput<'_>, turns: &Turns, bias: &BiasErrors) -> RateNoi
     let rounding = input.step.map(|step| step * step / 12.0) * input.rates.interval;
     let interpolated = turns.wander.interpolated;
     RateNoise {
-        density: input.at_rest().density().zip_map(&rounding, f64::max).mean(),
+        density: bias.density.zip_map(&rounding, f64::max).mean(),
         bias: if interpolated { bias.steps } else { bias.std.map(|std| std * std) },
         interpolated,
     }

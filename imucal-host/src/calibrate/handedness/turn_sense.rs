@@ -27,10 +27,9 @@ use crate::{
     effect::axis_swap,
     observe::{
         rest::{RestDetector, Samples},
-        series::Series,
         turn::{BiasPath, TurnData, compress},
     },
-    recording::{Recording, median},
+    recording::{Recording, Series, median},
 };
 
 /// A turn counts once a direction moves by this much, rad (15°).

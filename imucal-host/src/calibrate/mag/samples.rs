@@ -27,9 +27,8 @@ use crate::{
     observe::{
         cloud::{Cloud, cloud},
         quantum::quantum,
-        series::Series,
     },
-    recording::{SensorKind, Triple, Unit},
+    recording::{SensorKind, Series, Triple, Unit},
 };
 
 /// Name of the model in files: ellipsoid, nine parameters.

@@ -62,9 +62,10 @@ impl<'a> AxisSamples<'a> {
     }
 
     fn saturated(&self) -> Vec<Saturation> {
-        let finite = || self.values.iter().copied().filter(|value| value.is_finite());
-        let low = finite().fold(f64::INFINITY, f64::min);
-        let high = finite().fold(f64::NEG_INFINITY, f64::max);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for value in self.values.iter().copied().filter(|value| value.is_finite()) {
+            (low, high) = (if value < low { value } else { low }, if value > high { value } else { high });
+        }
         if low >= high {
             return Vec::new();
         }

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::{
     clock::Clock,
     columns::{
-        GIMBAL, POSITION, REFERENCE, SEGMENT, SIM_TEMPERATURE, SIMULATED, TEMPERATURE, TIME, Table,
-        simulated_slot_of, slot_of,
+        GIMBAL, POSITION, REFERENCE, SEGMENT, SIM_TEMPERATURE, TEMPERATURE, TIME, Table, simulated_slot_of,
+        slot_of,
     },
     interval,
 };
@@ -63,9 +63,11 @@ fn converted(path: &Path, manifest: Manifest, mut table: Table) -> Result<(Recor
     }
     check_time(path, &time, (&table.places, &table.clock), manifest.units.t)?;
     let segment = segments(path, &table)?;
-    // All before the first fault is looked for: which one is reported does not depend on threads.
-    let of = |kind: &SensorKind| triple(path, &manifest, &table, *kind);
-    let sensors: Vec<_> = SensorKind::ALL.par_iter().map(of).collect();
+    // Columns are freed one sensor after the other. All are converted before the first fault is looked for: which one is reported does not
+    // depend on threads.
+    let parts = SensorKind::ALL.map(|kind| (kind, taken::<3>(&mut table.columns[slot_of(kind)..])));
+    let of = |(kind, columns)| triple(path, &manifest, columns, kind);
+    let sensors: Vec<_> = parts.into_par_iter().map(of).collect();
     let sensors = sensors.into_iter().collect::<Result<Vec<_>, _>>()?;
     let [acc, gyr, mag] = <[Option<Triple>; 3]>::try_from(sensors).unwrap_or_default();
     let angle = 1.0 / manifest.units.gimbal.per_si();
@@ -77,10 +79,10 @@ fn converted(path: &Path, manifest: Manifest, mut table: Table) -> Result<(Recor
         acc,
         gyr,
         mag,
-        gimbal: rows::<3>(&table.columns[GIMBAL..REFERENCE])
+        gimbal: rows(taken::<3>(&mut table.columns[GIMBAL..]))
             .map(|rows| rows.into_iter().map(|row| row.map(|value| value * angle)).collect()),
-        reference: rows::<4>(&table.columns[REFERENCE..POSITION]),
-        position: rows::<3>(&table.columns[POSITION..SIMULATED]),
+        reference: rows(taken::<4>(&mut table.columns[REFERENCE..])),
+        position: rows(taken::<3>(&mut table.columns[POSITION..])),
         simulated: simulated(&mut table),
         temperature: Some(std::mem::take(&mut table.columns[TEMPERATURE]))
             .filter(|column| !column.is_empty()),
@@ -140,18 +142,16 @@ fn scaled(mut time: Vec<f64>, per_si: f64) -> Vec<f64> {
 fn triple(
     path: &Path,
     manifest: &Manifest,
-    table: &Table,
+    [x, y, z]: [Vec<f64>; 3],
     kind: SensorKind,
 ) -> Result<Option<Triple>, ReadError> {
-    let first = slot_of(kind);
-    let (x, y, z) = (&table.columns[first], &table.columns[first + 1], &table.columns[first + 2]);
     if x.is_empty() {
         return Ok(None);
     }
     let manifest_path = || Manifest::path_for(path).unwrap_or_else(|| path.to_path_buf());
     let fault = |fault| ReadError::Manifest { path: manifest_path(), line: 1, fault };
     let nominal = manifest.nominal(kind).map_err(fault)?;
-    let raw = x.iter().zip(y).zip(z).map(|((x, y), z)| Vector3::new(*x, *y, *z));
+    let raw = x.iter().zip(&y).zip(&z).map(|((x, y), z)| Vector3::new(*x, *y, *z));
     let values = if nominal == Nominal::IDENTITY {
         raw.collect()
     } else {
@@ -163,8 +163,8 @@ fn triple(
 /// The simulator's columns, which are in SI units whatever the sensors' are in.
 fn simulated(table: &mut Table) -> Option<Simulated> {
     let values = |kind| {
-        let first = simulated_slot_of(kind);
-        rows::<3>(&table.columns[first..first + 3]).map(|rows| rows.into_iter().map(Vector3::from).collect())
+        let columns = taken::<3>(&mut table.columns[simulated_slot_of(kind)..]);
+        rows(columns).map(|rows| rows.into_iter().map(Vector3::from).collect())
     };
     let [acc, gyr, mag] = SensorKind::ALL.map(values);
     let temperature = std::mem::take(&mut table.columns[SIM_TEMPERATURE]);
@@ -172,7 +172,12 @@ fn simulated(table: &mut Table) -> Option<Simulated> {
     Some(Simulated { acc, gyr, mag, temperature }).filter(|simulated| !simulated.is_empty())
 }
 
-fn rows<const N: usize>(columns: &[Vec<f64>]) -> Option<Vec<[f64; N]>> {
+/// The first of some columns, which are empty from then on.
+fn taken<const N: usize>(columns: &mut [Vec<f64>]) -> [Vec<f64>; N] {
+    std::array::from_fn(|k| std::mem::take(&mut columns[k]))
+}
+
+fn rows<const N: usize>(columns: [Vec<f64>; N]) -> Option<Vec<[f64; N]>> {
     let count = columns.first()?.len();
     let row = |row: usize| std::array::from_fn(|column| columns[column][row]);
     (count > 0).then(|| (0..count).map(row).collect())
