@@ -10,6 +10,7 @@ use imucal_core::{
     triad::Triad,
 };
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
+use rayon::prelude::*;
 
 use super::{
     directions::{Directions, Move},
@@ -134,19 +135,16 @@ fn best(model: &DipModel<'_, f64>) -> LevenbergMarquardt<f64, 4> {
         solver.run(model);
         solver
     };
-    let [own, others @ ..] = &RELABELLINGS;
     let start = |way: &([i8; 3], i8)| {
         let phi = relabelling::<f64>(*way);
         SVector::<f64, 4>::new(phi.x, phi.y, phi.z, 0.0)
     };
-    let mut chosen = fit(start(own));
-    for way in others {
-        let other = fit(start(way));
-        if is_lower(other.report().cost, chosen.report().cost) {
-            chosen = other;
-        }
-    }
-    chosen
+    let [own, others @ ..] = &RELABELLINGS;
+    let (own, others) =
+        rayon::join(|| fit(start(own)), || others.par_iter().map(|way| fit(start(way))).collect::<Vec<_>>());
+    others.into_iter().fold(own, |chosen, other| {
+        if is_lower(other.report().cost, chosen.report().cost) { other } else { chosen }
+    })
 }
 
 fn held_out(model: &DipModel<'_, f64>, theta: &SVector<f64, 4>) -> Option<f64> {

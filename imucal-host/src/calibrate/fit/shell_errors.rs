@@ -182,8 +182,10 @@ fn steps<'a, const P: usize>(
             let before = |until: f64| at(k).partition_point(|at| *at < until);
             before(span.end).saturating_sub(before(span.start)) as f64 / at(k).len() as f64
         };
+        let first = blocks.partition_point(|block| block.span.end < span.start);
+        let beyond = blocks.partition_point(|block| block.span.start < span.end);
         let shares: Vec<(usize, f64)> =
-            (0..blocks.len()).map(|k| (k, share(k))).filter(|(_, share)| *share > 0.0).collect();
+            (first..beyond).map(|k| (k, share(k))).filter(|(_, share)| *share > 0.0).collect();
         for (k, of_k) in &shares {
             for (l, of_l) in &shares {
                 let (one, other) = (&blocks[*k].sees, &blocks[*l].sees);

@@ -105,22 +105,23 @@ fn fit(cloud: &Cloud, input: &MagInput<'_>) -> Result<Judged, Refusal> {
     let flat = poor(0.0, 0.0);
     let sphere = sphere::start(points, 1.0).ok_or(flat)?;
     // A circle with a little noise has an ellipsoid as thin as the noise, seen from which it covers every direction.
-    let seen = raw_coverage(points, &sphere.bias);
+    let norm = field.unwrap_or(1.0 / sphere.gain.m11);
+    let problem = NormProblem { points, norm, form: UPPER_TRIANGULAR, serial: true };
+    let (seen, fit) = rayon::join(|| raw_coverage(points, &sphere.bias), || best_fit(&problem));
     if seen.flatness < limits.flatness {
         return Err(poor(seen.share, seen.flatness));
     }
-    let norm = field.unwrap_or(1.0 / sphere.gain.m11);
-    let problem = NormProblem { points, norm, form: UPPER_TRIANGULAR, serial: true };
-    let fit = best_fit(&problem).ok_or(flat)?;
-    let coverage = problem.coverage(&fit);
+    let fit = fit.ok_or(flat)?;
     let at: Vec<f64> =
         cloud.rows.iter().map(|row| input.series.time.get(*row).copied().unwrap_or(*row as f64)).collect();
-    let at_rest = AtRest {
-        series: input.series,
-        rows: input.rests,
-        step: quantum(&sensor.values, input.series.usable),
-    };
-    let errors = ShellErrors::of_cloud(&problem, &fit, &at, &at_rest.noise_of_cloud());
+    let (coverage, errors) = rayon::join(
+        || problem.coverage(&fit),
+        || {
+            let step = quantum(&sensor.values, input.series.usable);
+            let at_rest = AtRest { series: input.series, rows: input.rests, step };
+            ShellErrors::of_cloud(&problem, &fit, &at, &at_rest.noise_of_cloud())
+        },
+    );
     let (bend, verdict) = problem.judge(&fit, &coverage, &errors.stated(&problem.form, &fit), false, &limits);
     let mut summary = summarise(&problem, &fit, sensor, &errors, (coverage.share, bend));
     if field.is_none() {
