@@ -11,7 +11,7 @@
 //! | `evidence` | rows of the fits, from what is kept |
 //! | [`estimate`] | a sensor's triad, its errors and its verdict |
 //! | `fitting`, `judgement` | fits by slices, outliers; errors and verdicts |
-//! | `sense` | whether the gyroscope turns as gravity does |
+//! | [`sense`] | whether the gyroscope turns as gravity does |
 //! | [`alignment`] | the magnetometer in the accelerometer's axes |
 //! | [`axes`] | the axes of a record that a rig has made |
 //! | [`design`] | which pose says most |
@@ -35,7 +35,7 @@ mod fitting;
 pub mod guide;
 mod judgement;
 pub mod poses;
-mod sense;
+pub mod sense;
 pub mod store;
 pub mod temperature;
 

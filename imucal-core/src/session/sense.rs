@@ -31,13 +31,15 @@ use crate::{
 };
 
 /// A raw gyroscope carries a direction as near as this, rad (23°): a gain wrong by a fifth over a long turn.
-const NEAR: f32 = 0.4;
+pub const NEAR: f64 = 0.4;
 /// As they are, rates that carry directions as near as this in the mean, rad (3°), turn as gravity does, whatever else might.
 const CARRIED: f32 = 0.05;
 /// Another order of the axes is as good within this factor.
-const ALIKE: f32 = 2.0;
-/// Cosine of the angle that a turn moves the direction by at least (15°).
-const MOVED: f32 = 0.966;
+pub const ALIKE: f64 = 2.0;
+/// A turn counts once a direction moves by this much, rad (15°).
+pub const LEAST_ANGLE: f64 = 0.26;
+/// Its cosine.
+const LEAST_COSINE: f64 = 0.966_389_978;
 
 impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     /// Looks at a gyroscope that was judged: one that is accepted tells the observer what turns come to.
@@ -71,10 +73,11 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
 
     /// Code of P; `None` where no order of the axes carries gravity, or no turn moves it.
     fn sense(&self) -> Option<usize> {
-        let acc = self.estimate(Sensor::Accelerometer)?.triad;
+        let (acc, near) = (self.estimate(Sensor::Accelerometer)?.triad, NEAR as f32);
         let (mut sums, mut turns) = ([0.0; CODES], 0.0);
         for pose in self.poses.list() {
-            let Some([before, after]) = pose.ends(&acc).filter(|[before, after]| before.dot(after) < MOVED)
+            let Some([before, after]) =
+                pose.ends(&acc).filter(|[before, after]| before.dot(after) < LEAST_COSINE as f32)
             else {
                 continue;
             };
@@ -89,16 +92,26 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
                 let c = if p.determinant() < 0.0 { &reversed } else { &as_is };
                 let off = image(c, &image(&p, &before)) - image(&p, &after);
                 let size = libm::sqrtf(off.norm_squared());
-                *sum += if size < NEAR { size } else { NEAR };
+                *sum += if size < near { size } else { near };
             }
         }
         let first = *sums.first()?;
         let least = sums.iter().fold(f32::INFINITY, |least, sum| if *sum < least { *sum } else { least });
-        if first <= ALIKE * least || first < CARRIED * turns {
+        if first <= ALIKE as f32 * least || first < CARRIED * turns {
             return Some(0);
         }
         // Half of the turns at least are carried.
         let place = sums.iter().position(|sum| *sum <= least)?;
-        (least < 0.5 * NEAR * turns).then_some(place)
+        (least < 0.5 * near * turns).then_some(place)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cosine_is_that_of_the_angle() {
+        assert!((LEAST_COSINE - LEAST_ANGLE.cos()).abs() < 1e-9, "{}", LEAST_ANGLE.cos());
     }
 }

@@ -18,7 +18,12 @@
 
 use std::ops::Range;
 
-use imucal_core::{model::turn, observation::Turn, triad::Triad};
+use imucal_core::{
+    model::turn,
+    observation::Turn,
+    session::sense::{ALIKE, LEAST_ANGLE, NEAR},
+    triad::Triad,
+};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -32,16 +37,10 @@ use crate::{
     recording::{Recording, Series, median},
 };
 
-/// A turn counts once a direction moves by this much, rad (15°).
-const LEAST_ANGLE: f64 = 0.26;
 /// Multiple of the initial rest's variance up to which the accelerometer alone is at rest.
 const MULTIPLIER: f64 = 5.0;
 /// Turns at least, and as many as are looked at.
 pub const TURNS: (usize, usize) = (6, 32);
-/// A raw gyroscope carries a direction as near as this, rad (23°): a gain wrong by a fifth over a long turn.
-const NEAR: f64 = 0.4;
-/// Another order of the axes is as good within this factor.
-const ALIKE: f64 = 2.0;
 
 /// What carries gravity from rest to rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
