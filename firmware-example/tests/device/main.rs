@@ -1,6 +1,7 @@
 //! The co-processor's logic, tested where it can be watched: on the host, with simulated flash and a bad link.
 
 mod adapter;
+mod axes;
 mod bad_link;
 mod bench;
 mod capture;

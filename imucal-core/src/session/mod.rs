@@ -66,8 +66,8 @@ pub struct SessionSettings {
     pub gravity: f32,
     /// Length of the field, µT, where it is known.
     pub field: Option<f32>,
-    /// Whether the field points down at this place, where it is known: it tells a magnetometer that is mounted otherwise from a
-    /// mirrored one.
+    /// Whether the field points down at this place, where it is known: it distinguishes a magnetometer that is mounted otherwise
+    /// from a mirrored one.
     pub field_down: Option<bool>,
     /// Error of a calibrated vector at which a sensor is done, as a share of its length: accelerometer, gyroscope, magnetometer.
     /// Zero: the sensor is not asked for.
