@@ -1,8 +1,8 @@
 //! What to do next, how sure each sensor is, and what was thrown away.
 //!
 //! ```text
-//! axes that contradict → correct them;   no rest yet → hold still;   a rest too short → hold on;   targets reached → enough;   else → the pose that says most,
-//! or, where only the magnetometer is missing, a direction of the field that was not seen
+//! targets reached → enough;   axes that contradict → correct them;   no rest yet → hold still;   a rest too short → hold on;
+//! else → the pose that says most, or, where only the magnetometer is missing, a direction of the field that was not seen
 //! ```
 //!
 //! A session ends at its targets, standard errors as shares of a vector's length, and not after a number of poses.

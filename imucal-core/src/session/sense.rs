@@ -14,7 +14,8 @@
 //! silence, and the three sensors of a record would agree on axes that are a mirror image. Where P is one, the gyroscope is mirrored;
 //! else it is turned, or the accelerometer is mirrored or turned, and neither is accepted.
 //!
-//! Not seen: all axes of the accelerometer reversed, and two sensors turned alike. Where the rates are in another unit no P carries gravity.
+//! Not seen: all axes of the accelerometer reversed, and two sensors turned alike. Where the rates are in another unit no P carries
+//! gravity.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -46,9 +46,9 @@ pub enum NotStored {
 }
 
 impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
-    /// A sensor's calibration for the record, in the `axes` of that, if it is accepted and surer than the one `stored`. Terms of temperature are those of the
-    /// stored one, from the mean temperature of the session's rests on. One with terms beyond the first order stays, since gain and
-    /// bias were fitted with them, and a session fits none.
+    /// A sensor's calibration for the record, in the `axes` of that, if it is accepted and surer than the one `stored`. Terms of
+    /// temperature are those of the stored one, from the mean temperature of the session's rests on. One with terms beyond the first
+    /// order stays, since gain and bias were fitted with them, and a session fits none.
     ///
     /// # Errors
     ///

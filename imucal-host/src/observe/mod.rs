@@ -10,3 +10,4 @@ pub mod quantum;
 pub mod rest;
 pub mod rest_halves;
 pub mod turn;
+mod windowed;

@@ -7,13 +7,13 @@
 //! has begun in it or not yet ended. Source: Tedaldi, Pretto & Menegatti 2014 (ICRA), section IV; the gyroscope's part,
 //! the recording's ends and the fallback without an initial rest are ours.
 
-use crate::recording::order_statistics::MEDIAN_SIZE;
 use std::ops::Range;
 
 use imucal_core::observation::{Moments, Rest};
 use nalgebra::Vector3;
 
-use crate::recording::median;
+use super::windowed;
+use crate::recording::{median, order_statistics::MEDIAN_SIZE};
 
 /// Window of the variance, s: long against vibration, short against a rest.
 pub const WINDOW: f64 = 1.0;
@@ -31,8 +31,6 @@ const INITIAL_EXCESS: f64 = 8.0;
 const NOISIEST: f64 = 0.25;
 /// Rows further apart than this are single shots, each a rest of its own, s.
 const SHOT_INTERVAL: f64 = 0.2;
-/// A window is used while this share of its rows is usable: dropouts are common, clipping is long.
-const USABLE_SHARE: f64 = 0.8;
 /// A gap longer than this many usual intervals ends a rest.
 const GAP: f64 = 5.0;
 /// At an end of the recording a motion shows where the mean of some last rows is this many of its standard deviations
@@ -87,8 +85,8 @@ impl<'a> RestDetector<'a> {
     pub fn new(samples: Samples<'a>, interval: f64) -> Self {
         let half = ((WINDOW / 2.0 / interval).round() as usize).max(1);
         let (variance, rate) = rayon::join(
-            || windowed_variance(samples, half, GAP * interval),
-            || samples.gyr.map(|gyr| windowed_mean(gyr, samples.usable, half)),
+            || windowed::variance(samples, half, GAP * interval),
+            || samples.gyr.map(|gyr| windowed::mean(gyr, samples.usable, half)),
         );
         let (noise, from_initial) = reference_noise(&variance, (INITIAL / interval).round() as usize, half);
         Self { samples, variance, rate, noise, from_initial, interval, half }
@@ -223,91 +221,6 @@ fn reference_noise(variance: &[f64], initial_rows: usize, half: usize) -> (f64, 
     let tenth = sorted.len() / 10;
     let quietest = *sorted.select_nth_unstable_by(tenth, f64::total_cmp).1;
     if initial <= INITIAL_EXCESS * quietest { (initial, true) } else { (quietest, false) }
-}
-
-/// Rows around each row that its window holds.
-fn window(k: usize, half: usize, rows: usize) -> Range<usize> {
-    k.saturating_sub(half)..k.saturating_add(half).saturating_add(1).min(rows)
-}
-
-/// Sums of the usable rows before one, from a value near the data, so that differences of sums lose no digits that matter; and of the
-/// gaps. Two of them that follow the ends of a window, by the same additions, stand for the sums of every row.
-#[derive(Clone, Copy)]
-struct RunningSums<'a> {
-    samples: Samples<'a>,
-    origin: Vector3<f64>,
-    longest_gap: f64,
-    row: usize,
-    sum: Vector3<f64>,
-    square: f64,
-    count: u32,
-    gaps: u32,
-}
-
-impl<'a> RunningSums<'a> {
-    fn new(samples: Samples<'a>, longest_gap: f64) -> Self {
-        let first_usable = samples.acc.iter().zip(samples.usable).find(|(_, usable)| **usable);
-        let origin = first_usable.map(|(value, _)| *value).unwrap_or_default();
-        let sum = Vector3::zeros();
-        Self { samples, origin, longest_gap, row: 0, sum, square: 0.0, count: 0, gaps: 0 }
-    }
-
-    /// Takes the rows before `row`, which is none of those that it has taken.
-    fn advance(&mut self, row: usize) {
-        let Samples { time, acc, usable, .. } = self.samples;
-        for k in self.row..row {
-            if k > 0 && time[k] - time[k - 1] > self.longest_gap {
-                self.gaps += 1;
-            }
-            if usable[k] {
-                let x = acc[k] - self.origin;
-                self.sum += x;
-                self.square += x.norm_squared();
-                self.count += 1;
-            }
-        }
-        self.row = row;
-    }
-}
-
-/// Variance of the usable rows around each row; infinite where too few of them are, or time jumps.
-fn windowed_variance(samples: Samples<'_>, half: usize, longest_gap: f64) -> Vec<f64> {
-    let rows = samples.acc.len();
-    let mut from = RunningSums::new(samples, longest_gap);
-    let mut to = from;
-    (0..rows)
-        .map(|k| {
-            let w = window(k, half, rows);
-            from.advance(w.start);
-            to.advance(w.end);
-            let n = f64::from(to.count - from.count);
-            if to.gaps > from.gaps || n < USABLE_SHARE * w.len() as f64 {
-                return f64::INFINITY;
-            }
-            let mean = (to.sum - from.sum) / n;
-            ((to.square - from.square) / n - mean.norm_squared()).max(0.0)
-        })
-        .collect()
-}
-
-fn windowed_mean(values: &[Vector3<f64>], usable: &[bool], half: usize) -> Vec<Vector3<f64>> {
-    let rows = values.len();
-    let add = |(row, sum, count): &mut (usize, Vector3<f64>, u32), to: usize| {
-        for k in (*row..to).filter(|k| usable[*k]) {
-            (*sum, *count) = (*sum + values[k], *count + 1);
-        }
-        *row = to;
-    };
-    let mut from = (0, Vector3::zeros(), 0u32);
-    let mut to = from;
-    (0..rows)
-        .map(|k| {
-            let w = window(k, half, rows);
-            add(&mut from, w.start);
-            add(&mut to, w.end);
-            (to.1 - from.1) / f64::from((to.2 - from.2).max(1))
-        })
-        .collect()
 }
 
 /// Spread of a rest's mean that its own samples explain, per axis.
