@@ -9,7 +9,8 @@ use firmware_example::RECORD_2;
 use imucal_core::{
     corrector::FullCorrector,
     link::FitModel,
-    record::{self, Date, HigherOrder, TriadRecord},
+    nonlinearity::NonlinearTerms,
+    record::{self, Date, HigherOrder, NonlinearRecord, Order, TriadRecord},
 };
 use imucal_host::recording::{Recording, SensorKind};
 use imucal_tests::{
@@ -220,6 +221,41 @@ fn a_session_on_board_is_turned_into_the_axes_of_its_record_as_on_this_machine()
         let (stored, rig) = (Matrix3::from(stored.gain), Matrix3::from(rig.gain));
         assert!((stored - rig).amax() < 1e-4 * rig.amax(), "{stored} {rig}");
     }
+}
+
+#[test]
+fn a_session_on_board_leaves_a_triad_of_higher_order_and_replaces_the_others() {
+    if !ready() {
+        return;
+    }
+    let scratch = tempfile::tempdir().expect("a scratch folder");
+    let recording = simulated::write_small(scratch.path()).display().to_string();
+    let at = |name: &str| scratch.path().join(name).display().to_string();
+    let (device, flash, bent, out) = (address(BOARDS[0]), at("unit.flash"), at("bent.bin"), at("unit.bin"));
+    let run = |command: &[&str]| {
+        let arguments = [command, &["--device", &device, "--flash", &flash]].concat();
+        program::run(PROGRAM, &[], &arguments.into_iter().map(str::to_owned).collect::<Vec<_>>())
+    };
+    run(&["capture", &recording, "--target", "1,1,1", "--record", &bent]).with(0);
+    let mut held = record::decode_as::<HigherOrder>(&std::fs::read(&bent).expect("a record")).expect("whole");
+    let terms = NonlinearTerms { quadratic: [1e-8; 3], ..NonlinearTerms::none() };
+    let bends = NonlinearRecord { range: 16_000.0, terms, std: NonlinearTerms::none() };
+    held.acc.as_mut().expect("an accelerometer").order.nonlinearity = Some(bends);
+    let mag = held.mag.as_mut().expect("a magnetometer");
+    let largest = mag.quality.gain_std.iter().flatten().fold(0.0, |a: f32, b| a.max(*b));
+    mag.quality.gain_std = [[10.0 * largest; 3]; 3];
+    let mut buffer = [0; HigherOrder::MAX_LEN];
+    std::fs::write(&bent, record::encode(&held, &mut buffer).expect("plausible")).expect("it is written");
+
+    run(&["device", "put", &bent, "--replace"]).with(0);
+    run(&["capture", &recording, "--target", "1,1,1", "--record", &out]).with(0).printing(&[
+        "accelerometer is not calibrated: the one in use has nonlinear terms",
+        "magnetometer is calibrated",
+        "equal bit for bit",
+    ]);
+    let stored = record::decode_as::<HigherOrder>(&std::fs::read(&out).expect("a record")).expect("whole");
+    assert_eq!(stored.acc, held.acc);
+    assert_ne!(stored.mag, held.mag);
 }
 
 #[test]

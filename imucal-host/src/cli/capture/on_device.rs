@@ -8,7 +8,7 @@ use std::{
 
 use imucal_core::{
     link::{CaptureOutcome, CaptureTask, RecordState, SAMPLES},
-    record::{self, CalibrationRecord, TriadRecord},
+    record::{self, CalibrationRecord, HigherOrder, TriadRecord},
     session::guide::{Advice, Guide},
 };
 
@@ -126,7 +126,7 @@ fn end(
     }
     say!("stored as record {}", session.store_record(false)?);
     let bytes = session.record()?.unwrap_or_default();
-    let record = record::decode(&bytes)?;
+    let record = record::decode_as::<HigherOrder>(&bytes)?;
     let equal = asked
         .iter()
         .filter(|kind| adopted(kind))
@@ -137,7 +137,7 @@ fn end(
     if here.is_some() {
         say!("the same session here: {}", if equal { "equal bit for bit" } else { "DIFFERENT" });
     }
-    let stored = StoredCalibration::from_record(&record::decode_as(&bytes)?);
+    let stored = StoredCalibration::from_record(&record);
     write(arguments, &stored, &mut files)?;
     files.commit()?;
     let done = equal && guide.advice == Advice::Enough;
@@ -145,10 +145,10 @@ fn end(
 }
 
 /// The record that the device uses.
-fn held(session: &mut Session) -> anyhow::Result<Option<CalibrationRecord>> {
+fn held(session: &mut Session) -> anyhow::Result<Option<CalibrationRecord<HigherOrder>>> {
     let in_use = matches!(session.status()?.record, RecordState::InUse | RecordState::Unconfirmed);
     let bytes = if in_use { session.record()? } else { None };
-    Ok(bytes.as_deref().map(record::decode).transpose()?)
+    Ok(bytes.as_deref().map(record::decode_as).transpose()?)
 }
 
 /// Gain, bias and terms of temperature that the device has stored are those of the session here, to the bit, in the axes of the record
@@ -156,8 +156,8 @@ fn held(session: &mut Session) -> anyhow::Result<Option<CalibrationRecord>> {
 fn is_equal(
     here: &Capture,
     task: &CaptureTask,
-    before: Option<&CalibrationRecord>,
-    record: &CalibrationRecord,
+    before: Option<&CalibrationRecord<HigherOrder>>,
+    record: &CalibrationRecord<HigherOrder>,
     kind: SensorKind,
 ) -> bool {
     let sensor = kind.into();
