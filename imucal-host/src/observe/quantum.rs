@@ -1,10 +1,6 @@
 //! The step of a converter, from the samples.
 
-use std::{
-    collections::HashSet,
-    hash::{BuildHasherDefault, Hasher},
-    sync::{LazyLock, OnceLock},
-};
+use std::sync::{LazyLock, OnceLock};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -55,17 +51,9 @@ pub fn quantum(values: &[Vector3<f64>], usable: &[bool]) -> Vector3<f64> {
 
 /// Each value once, ascending: a converter puts out few of them, so that they are found before they are sorted.
 fn distinct(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut all = HashSet::with_capacity_and_hasher(FEW, BuildHasherDefault::<BitHash>::default());
-    // Most samples repeat one of the last values, which a table with one place for each hash knows. No finite value has these bits.
-    let mut recent = vec![u64::MAX; 1 << RECENT];
-    for bits in values.map(f64::to_bits) {
-        let place = &mut recent[(bits.wrapping_mul(MIX) >> (64 - RECENT)) as usize];
-        if *place != bits {
-            *place = bits;
-            all.insert(bits);
-        }
-    }
-    let mut ranks: Vec<i64> = all.into_iter().map(rank).collect();
+    let mut seen = Seen::with_places(PLACES_AT_FIRST);
+    values.for_each(|value| seen.insert(value.to_bits()));
+    let mut ranks: Vec<i64> = seen.all().map(rank).collect();
     ranks.sort_unstable();
     ranks.into_iter().map(|rank| f64::from_bits(self::rank(rank as u64) as u64)).collect()
 }
@@ -76,30 +64,51 @@ fn rank(bits: u64) -> i64 {
     bits as i64 ^ (sign as u64 >> 1) as i64
 }
 
-/// Distinct values that there is room for at first: a recording of some minutes has them.
-const FEW: usize = 1 << 14;
-/// Bits of a place among the last values.
-const RECENT: u32 = 12;
-/// See [`BitHash`].
+/// Binary logarithm of the places at first: a recording of some minutes has fewer than half as many distinct values.
+const PLACES_AT_FIRST: u32 = 14;
+/// The bits of no finite number.
+const NOTHING: u64 = u64::MAX;
+/// See [`Seen::place`].
 const MIX: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// A hash of a number's bits, by multiplication (Knuth, *The Art of Computer Programming* 3, 6.4).
-#[derive(Default)]
-struct BitHash(u64);
+/// The bits of numbers, each once: a table with open addresses, at most half of which are taken (Knuth, *The Art of Computer
+/// Programming* 3, 6.4, algorithm L). Most numbers are in it already, and need one look.
+struct Seen {
+    places: Vec<u64>,
+    taken: usize,
+}
 
-impl Hasher for BitHash {
-    fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|byte| self.write_u64(u64::from(*byte)));
+impl Seen {
+    fn with_places(logarithm: u32) -> Self {
+        Self { places: vec![NOTHING; 1 << logarithm], taken: 0 }
     }
 
-    fn write_u64(&mut self, bits: u64) {
-        let mixed = (self.0 ^ bits).wrapping_mul(MIX);
-        // Both ends are looked at, and a product's lower bits know nothing of the upper ones.
-        self.0 = mixed ^ (mixed >> 32);
+    fn insert(&mut self, bits: u64) {
+        let place = self.place(bits);
+        if self.places[place] == bits {
+            return;
+        }
+        self.places[place] = bits;
+        self.taken += 1;
+        if 2 * self.taken > self.places.len() {
+            let mut larger = Self::with_places(self.places.len().ilog2() + 1);
+            self.all().for_each(|bits| larger.insert(bits));
+            *self = larger;
+        }
     }
 
-    fn finish(&self) -> u64 {
-        self.0
+    /// Where a number is, or would be: from the upper bits of a product on (the same, multiplicative hashing).
+    fn place(&self, bits: u64) -> usize {
+        let last = self.places.len() - 1;
+        let mut place = (bits.wrapping_mul(MIX) >> (64 - self.places.len().ilog2())) as usize;
+        while self.places[place] != bits && self.places[place] != NOTHING {
+            place = (place + 1) & last;
+        }
+        place
+    }
+
+    fn all(&self) -> impl Iterator<Item = u64> {
+        self.places.iter().copied().filter(|bits| *bits != NOTHING)
     }
 }
 
@@ -272,6 +281,15 @@ mod tests {
         let of_all = counted(vec![7, far, -3, 7, 0, -3, 7], [-3, far]);
         assert_eq!((&of_all[..3], of_all[3]), (&expected[..], (far, 1.0)));
         assert_eq!(counted(vec![far, far], [far, far]), [(far, 2.0)]);
+    }
+
+    #[test]
+    fn each_of_very_many_values_is_kept_once() {
+        let value = |k: u32| f64::from(k % 30_000) * -0.1;
+        let found = distinct((0..60_000).map(value));
+        let expected: Vec<f64> = (0..30_000).rev().map(value).collect();
+        assert_eq!(found, expected);
+        assert!(distinct(std::iter::empty()).is_empty());
     }
 
     #[test]

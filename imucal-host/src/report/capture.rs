@@ -10,7 +10,7 @@ use imucal_core::{
 };
 
 use super::{
-    measure::{plain, rounded},
+    measure::{counted, plain, rounded},
     table::words,
 };
 use crate::recording::SensorKind;
@@ -62,10 +62,6 @@ pub fn line(time: f64, guide: &Guide, hold: f32, recorded: &[SensorKind]) -> Str
     let never = if guide.never_still { " (it has moved since the beginning)" } else { "" };
     let next = advice(&guide.advice, hold);
     format!("{:>8} s  {}{sure}: {next}{never}", rounded(time, 1), counted(guide.rests, "pose"))
-}
-
-fn counted(count: u16, what: &str) -> String {
-    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }
 
 /// How sure each recorded sensor is, what is covered, and what was thrown away; ends its lines.

@@ -58,6 +58,14 @@ pub fn measured_degrees(angle: f64, std: f64) -> String {
     format!("{}°", measure(angle.to_degrees(), std.to_degrees()))
 }
 
+/// So many things, whose plural ends in s.
+pub fn counted(count: impl Into<u64>, what: &str) -> String {
+    match count.into() {
+        1 => format!("1 {what}"),
+        count => format!("{count} {what}s"),
+    }
+}
+
 /// A value with so many decimals.
 pub fn rounded(value: f64, decimals: usize) -> String {
     if value.is_nan() { NOT_KNOWN.into() } else { format!("{value:.decimals$}") }

@@ -5,7 +5,7 @@ use std::fmt::{self, Write};
 use imucal_core::triad::Triad;
 
 use super::{
-    measure::{degrees, measure, measured_degrees, percent, plain, rounded},
+    measure::{counted, degrees, measure, measured_degrees, percent, plain, rounded},
     model,
     prose::hanging,
     temperature,
@@ -152,10 +152,10 @@ fn write_fit(text: &mut String, kind: SensorKind, fit: &FitSummary) -> fmt::Resu
     )?;
     writeln!(
         text,
-        "  condition {}, coverage {}, {} iterations, stopped by {}",
+        "  condition {}, coverage {}, {}, stopped by {}",
         rounded(fit.condition, 1),
         percent(fit.coverage),
-        fit.iterations,
+        counted(fit.iterations, "iteration"),
         fit.termination.name()
     )?;
     write_notes(text, fit)

@@ -16,6 +16,19 @@ pub fn solve<const P: usize>(
     solver
 }
 
+/// The same from a start that is near the end: undamped, which takes fewer passes over the observations.
+pub fn refine<const P: usize>(
+    model: &impl Model<f64, P>,
+    start: SVector<f64, P>,
+) -> LevenbergMarquardt<f64, P> {
+    let mut solver = LevenbergMarquardt::new(start, Settings { damping: UNDAMPED, ..Settings::default() });
+    solver.run(model);
+    solver
+}
+
+/// Slows a step by no more than rounding does; where a step fails nevertheless, damping grows from here.
+const UNDAMPED: f64 = 1e-9;
+
 /// Rms residual with the degrees of freedom left; NaN without any.
 pub fn rms<const P: usize>(solver: &LevenbergMarquardt<f64, P>) -> f64 {
     solver.variance().map_or(f64::NAN, f64::sqrt)

@@ -88,15 +88,26 @@ impl<const P: usize> NormProblem<'_, P> {
         least_squares::solve(&self.parts(points), start)
     }
 
+    /// The same from a start that is near the end: of very many points each pass counts.
+    fn refine(&self, points: &[ShellPoint<f64>], start: SVector<f64, P>) -> LevenbergMarquardt<f64, P> {
+        if points.len() <= FEW {
+            return self.solve(points, start);
+        }
+        least_squares::refine(&self.parts(points), start)
+    }
+
     fn parts<'a>(&self, points: &'a [ShellPoint<f64>]) -> ParallelRows<NormModel<'a, f64, P>> {
         ParallelRows(points.chunks(PART).map(|part| self.model(part)).collect())
     }
 
-    /// Cost of a plain fit from `start`, and where it ended: for choosing among starts. Of very many points an even sample decides.
+    /// An even sample of the points, all of them where they are not very many: for choosing among starts.
+    pub fn sample(&self) -> Vec<ShellPoint<f64>> {
+        self.points.iter().copied().step_by(self.points.len().div_ceil(SAMPLE).max(1)).collect()
+    }
+
+    /// Cost of a plain fit from `start`, and where it ended.
     pub fn ends(&self, start: &Triad<f64>) -> (f64, Triad<f64>) {
-        let sample: Vec<_> =
-            self.points.iter().copied().step_by(self.points.len().div_ceil(SAMPLE).max(1)).collect();
-        let solver = self.solve(&sample, self.form.theta(start));
+        let solver = self.solve(self.points, self.form.theta(start));
         let cost = solver.report().cost;
         (if cost.is_finite() { cost } else { f64::INFINITY }, self.form.triad(solver.theta()))
     }
@@ -111,11 +122,13 @@ impl<const P: usize> NormProblem<'_, P> {
                     all.copy_from_slice(self.points);
                 }
                 let mut points: Vec<_> = used.iter().map(|k| all[*k]).collect();
-                let start = before.map_or_else(|| self.form.theta(start), |(solver, _)| *solver.theta());
-                let mut solver = self.solve(&points, start);
+                let mut solver = match before {
+                    None => self.solve(&points, self.form.theta(start)),
+                    Some((before, _)) => self.refine(&points, *before.theta()),
+                };
                 if self.serial {
                     self.expect_curvature(&mut points, &solver);
-                    solver = self.solve(&points, *solver.theta());
+                    solver = self.refine(&points, *solver.theta());
                     used.iter().zip(&points).for_each(|(k, point)| all[*k] = *point);
                 }
                 let residuals = self.residuals(&points, solver.theta());
@@ -204,7 +217,7 @@ impl<const P: usize> NormProblem<'_, P> {
         nominal: bool,
         limits: &Limits,
     ) -> (f64, Result<(), Refusal>) {
-        let bend = accept::nonlinearity(&fit.solver, &self.model(&fit.points), stated.inflation);
+        let bend = accept::nonlinearity(&fit.solver, &self.parts(&fit.points), stated.inflation);
         let verdict = self.verdict(fit, coverage, (bend, &stated.std), nominal, limits);
         (bend, verdict)
     }
@@ -274,7 +287,7 @@ mod tests {
         let problem = NormProblem { points: &points, norm: 48.0, form: UPPER_TRIANGULAR, serial: false };
         let start = Triad::identity();
         let whole = least_squares::solve(&problem.model(&points), problem.form.theta(&start));
-        let (_, end) = problem.ends(&start);
+        let (_, end) = NormProblem { points: &problem.sample(), ..problem }.ends(&start);
         // Of every third point; five of its standard errors.
         let std = whole.covariance().unwrap().diagonal().map(f64::sqrt) * 3f64.sqrt();
         let apart = (problem.form.theta(&end) - whole.theta()).component_div(&std);

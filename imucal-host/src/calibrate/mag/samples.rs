@@ -76,12 +76,13 @@ fn outcome(
     SensorOutcome { suspicions: Vec::new(), kind: SensorKind::Mag, model: MODEL, verdict, fit, evidence }
 }
 
-/// Fits from the start that ends lower: an algebraic ellipsoid can be far off on a small part of the sphere.
+/// Fits from the start that ends lower: an algebraic ellipsoid can be far off on a small part of the sphere. Of very many points a
+/// sample decides.
 fn best_fit(problem: &NormProblem<'_, 9>) -> Option<NormFit<9>> {
-    let (points, norm) = (problem.points, problem.norm);
-    let (ellipsoid, sphere) = rayon::join(|| adjusted::start(points, norm), || sphere::start(points, norm));
-    let starts = [ellipsoid, sphere];
-    let ends = starts.par_iter().flatten().map(|start| problem.ends(start));
+    let (sample, norm) = (problem.sample(), problem.norm);
+    let few = NormProblem { points: &sample, ..*problem };
+    let starts = [adjusted::start, sphere::start];
+    let ends = starts.par_iter().filter_map(|start| Some(few.ends(&start(&sample, norm)?)));
     let (_, lowest) = ends.min_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(problem.fit(&lowest))
 }

@@ -27,7 +27,10 @@ use crate::{
     calibrate::{Options, calibrate},
     device::{Address, DeviceError, Session, fit::BoardFit},
     recording::{Recording, SensorKind},
-    report::{measure::rounded, table::words},
+    report::{
+        measure::{counted, rounded},
+        table::words,
+    },
     store::StoredCalibration,
 };
 
@@ -382,13 +385,13 @@ fn print(
     report: &FitReport,
 ) -> anyhow::Result<bool> {
     say!(
-        "{}: {}: {} of {}: {} after {} iterations, condition {}: {}",
+        "{}: {}: {} of {}: {} after {}, condition {}: {}",
         recording.name,
         words(kind),
         report.model.name(),
         fit.observations.len(),
         report.termination.name(),
-        report.iterations,
+        counted(report.iterations, "iteration"),
         rounded(report.condition.into(), 1),
         report
             .refusal

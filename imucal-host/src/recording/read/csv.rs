@@ -2,6 +2,8 @@
 
 use std::{ops::ControlFlow, path::Path};
 
+use rayon::prelude::*;
+
 use super::{
     clock::Clock,
     columns::{Layout, TIME, Table, Target, infinite_is_missing},
@@ -187,15 +189,16 @@ impl CsvReader<'_> {
         }
         let Some(pieces) = rows.pieces(self.names.len())? else { return Ok(false) };
         for piece in pieces {
-            for (values, target) in piece.columns.iter().zip(&self.layout.targets) {
-                if let Target::Known(slot) = *target {
-                    table.columns[slot].extend_from_slice(values);
-                }
-            }
             lines.extend_from_slice(&piece.lines);
             self.by_pieces = !piece.stopped;
             self.take_rows(piece.lines.len(), 0)?;
         }
+        let targets = &self.layout.targets;
+        table.columns.par_iter_mut().enumerate().for_each(|(slot, column)| {
+            if let Some(of_file) = targets.iter().position(|target| *target == Target::Known(slot)) {
+                pieces.iter().for_each(|piece| column.extend_from_slice(&piece.columns[of_file]));
+            }
+        });
         Ok(true)
     }
 
