@@ -20,6 +20,8 @@ type Chunk = io::Result<Vec<u8>>;
 pub(super) struct Inflated {
     chunks: Receiver<Chunk>,
     chunk: io::Cursor<Vec<u8>>,
+    /// What is wrong with the stream behind what was read.
+    fault: Option<io::Error>,
     ended: bool,
 }
 
@@ -28,7 +30,30 @@ impl Inflated {
     pub(super) fn of(source: impl Read + Send + 'static) -> io::Result<Self> {
         let (sender, chunks) = sync_channel(AHEAD);
         thread::Builder::new().name("gzip".into()).spawn(move || inflate(source, &sender))?;
-        Ok(Self { chunks, chunk: io::Cursor::default(), ended: false })
+        Ok(Self { chunks, chunk: io::Cursor::default(), fault: None, ended: false })
+    }
+
+    /// Goes on to the next chunk; false at the end. Waits for one where `waits`; else a chunk that is not there yet is none, and a fault
+    /// is kept for the next time.
+    fn advance(&mut self, waits: bool) -> io::Result<bool> {
+        if self.ended {
+            return Ok(false);
+        }
+        let gone = |_| Err(io::Error::other("its thread has ended"));
+        let next = match self.fault.take() {
+            Some(fault) => Err(fault),
+            None if waits => self.chunks.recv().unwrap_or_else(gone),
+            None => match self.chunks.try_recv() {
+                Ok(next) => next,
+                Err(_) => return Ok(false),
+            },
+        };
+        match next {
+            Err(fault) if !waits => self.fault = Some(fault),
+            next => self.chunk = io::Cursor::new(next?),
+        }
+        self.ended = self.fault.is_none() && self.chunk.get_ref().is_empty();
+        Ok(self.fault.is_none() && !self.ended)
     }
 }
 
@@ -49,16 +74,17 @@ fn inflate(source: impl Read, chunks: &SyncSender<Chunk>) {
 }
 
 impl Read for Inflated {
+    /// All that is there already: many lines are read on several cores.
     fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
-        loop {
-            let count = self.chunk.read(to)?;
-            if count > 0 || to.is_empty() || self.ended {
-                return Ok(count);
+        let mut filled = 0;
+        while filled < to.len() {
+            let count = self.chunk.read(&mut to[filled..])?;
+            filled += count;
+            if count == 0 && !self.advance(filled == 0)? {
+                break;
             }
-            let next = self.chunks.recv().map_err(|_| io::Error::other("its thread has ended"))??;
-            self.ended = next.is_empty();
-            self.chunk = io::Cursor::new(next);
         }
+        Ok(filled)
     }
 }
 
