@@ -9,6 +9,7 @@ use std::{
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use firmware_example::{
+    RECORD_2,
     standalone::{self, HEADER, MAGIC, SAMPLE, Standalone},
     storage::Slots,
 };
@@ -214,4 +215,19 @@ fn a_session_that_warms_and_cools_ends_in_a_record_with_terms_of_temperature() {
     let per_unit = recording.acc.as_ref().expect("recorded").nominal.per_unit;
     let found = there.temperature.expect("terms").bias_slope.map(|slope| f64::from(slope) / per_unit);
     assert!(found.iter().zip(slopes).all(|(found, slope)| (found - slope).abs() < 4e-4), "{found:?}");
+}
+
+#[test]
+fn a_record_that_the_firmware_cannot_read_stays_where_it_is() {
+    let tape = tape(&simulated::tumbled(24, 4000));
+    for unreadable in [RECORD_2, &[0x55; 40]] {
+        let mut slots = Slots::open(Memory(vec![0xFF; FLASH])).expect("a flash");
+        let mut writing = slots.begin(unreadable).expect("it is short");
+        while slots.step(&mut writing).expect("a flash").is_none() {}
+        let mut flash = slots.close().0;
+        let before = flash.clone();
+        let lines = on_host(&tape, &mut flash);
+        assert!(lines.contains("accepted") && lines.contains("firmware cannot read"), "{lines}");
+        assert!(flash == before);
+    }
 }

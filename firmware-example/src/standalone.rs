@@ -17,7 +17,7 @@
 
 use core::fmt::{self, Write};
 
-use crate::storage::Slots;
+use crate::storage::{Slots, StorageError};
 use embedded_storage::nor_flash::NorFlash;
 use imucal_core::{
     link::{CaptureSensor, CaptureTask, RawSample},
@@ -126,7 +126,24 @@ pub fn run<'s, F: NorFlash>(
     match store(session, &header, flash, unit) {
         Ok(Some(number)) => writeln!(out, "stored as number {number}"),
         Ok(None) => writeln!(out, "nothing stored: no sensor is accepted and surer than before"),
-        Err(()) => writeln!(out, "the flash did not take it"),
+        Err(NotStored::Unreadable) => {
+            writeln!(out, "nothing stored: the flash holds a record that this firmware cannot read")
+        }
+        Err(NotStored::Flash) => writeln!(out, "the flash did not take it"),
+    }
+}
+
+/// Why the flash holds what it held.
+enum NotStored {
+    /// A record of higher order, or of newer firmware: it may be better than what a session finds.
+    Unreadable,
+    /// The flash cannot be used.
+    Flash,
+}
+
+impl From<StorageError> for NotStored {
+    fn from(error: StorageError) -> Self {
+        if error == StorageError::TooLong { Self::Unreadable } else { Self::Flash }
     }
 }
 
@@ -170,10 +187,14 @@ fn store<F: NorFlash>(
     header: &Header,
     flash: F,
     unit: &SensorIdentity,
-) -> Result<Option<u32>, ()> {
-    let mut slots = Slots::open(flash).map_err(|_| ())?;
+) -> Result<Option<u32>, NotStored> {
+    let mut slots = Slots::open(flash)?;
     let mut buffer = [0xFF; record::MAX_LEN];
-    let stored = slots.read(&mut buffer).ok().and_then(|bytes| record::decode(bytes).ok());
+    let stored = match slots.read(&mut buffer)? {
+        _ if slots.is_newer() => return Err(NotStored::Unreadable),
+        [] => None,
+        bytes => Some(record::decode(bytes).map_err(|_| NotStored::Unreadable)?),
+    };
     // Another unit's record is no measure for this one, and is not mixed with it.
     let mut record = stored
         .filter(|stored| stored.made_for(&unit.serial).is_ok())
@@ -193,10 +214,10 @@ fn store<F: NorFlash>(
     if !surer {
         return Ok(None);
     }
-    let bytes = record::encode(&record, &mut buffer).map_err(|_| ())?;
-    let mut writing = slots.begin(bytes).map_err(|_| ())?;
+    let bytes = record::encode(&record, &mut buffer).map_err(|_| NotStored::Flash)?;
+    let mut writing = slots.begin(bytes)?;
     loop {
-        if let Some(number) = slots.step(&mut writing).map_err(|_| ())? {
+        if let Some(number) = slots.step(&mut writing)? {
             return Ok(Some(number));
         }
     }
