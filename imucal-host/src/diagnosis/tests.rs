@@ -59,7 +59,7 @@ fn with_fit<T>(recording: &Recording, check: impl FnOnce(Linearisation<'_>, &Fit
         .iter()
         .map(|effect| Dose { effect, values: vec![0.0; effect.parameters.len()] })
         .collect();
-    let fit = refit(&scene, doses, None).unwrap();
+    let fit = refit(&scene, Fit::of(&scene, doses).unwrap(), None).unwrap();
     let noise = Linearisation::fitted_alone(&scene, &candidates, &fit).unwrap().weighing.white(&fit.residual);
     check(Linearisation::new(&scene, &candidates, &fit, &noise, None).unwrap(), &fit)
 }

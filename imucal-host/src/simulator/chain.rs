@@ -22,7 +22,7 @@ pub struct Chain<'a> {
 impl<'a> Chain<'a> {
     /// A chain with these effects, given in any order. Of two doses of one effect, both act.
     pub fn new(doses: &'a [Dose]) -> Self {
-        let mut active: Vec<&Dose> = doses.iter().filter(|dose| !dose.effect.is_off(&dose.values)).collect();
+        let mut active: Vec<&Dose> = doses.iter().filter(|dose| dose.acts()).collect();
         active.sort_by_key(|dose| place(dose.effect));
         Self { doses: active }
     }

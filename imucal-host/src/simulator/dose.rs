@@ -4,7 +4,7 @@ use super::random::{Purpose, Random};
 use crate::effect::{Effect, Parameter, Role};
 
 /// An effect and how much of it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Dose {
     /// The effect.
     pub effect: &'static Effect,
@@ -13,6 +13,11 @@ pub struct Dose {
 }
 
 impl Dose {
+    /// Whether it changes anything.
+    pub fn acts(&self) -> bool {
+        !self.effect.is_off(&self.values)
+    }
+
     /// An effect of a size, in multiples of its usual one, in a run of `duration` s.
     ///
     /// - A single amplitude is size × prior scale; one that cannot be negative takes the size without its sign.

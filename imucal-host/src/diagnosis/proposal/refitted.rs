@@ -53,10 +53,9 @@ pub fn without_effects(
     let is_kept = |dose: &&Dose| candidates.has_term(dose.effect) || set.contains(&dose.effect);
     let mut doses: Vec<Dose> = explained.fit.doses.iter().filter(is_kept).cloned().collect();
     doses.extend(formula.iter().filter_map(|effect| entry::fitted(effect)));
-    let mut fit = refit(scene, doses, Some(noise))?;
+    let mut fit = refit(scene, Fit::of(scene, doses)?, Some(noise))?;
     fit.doses.retain(|dose| !formula.contains(&dose.effect));
-    fit.residual = scene.residual(&fit.doses)?;
-    Ok(fit)
+    Fit::of(scene, fit.doses)
 }
 
 /// Axes of which something is known. One whose amplitude is lost in its error counts, since it may act by way of another axis:

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::{
     motion_evidence::{self, Found},
-    refit::refit,
+    refit::{Fit, refit},
     stepwise::Solution,
 };
 use crate::{
@@ -78,7 +78,7 @@ pub fn left_out<'a>(
         baseline.map(|effect| Dose { effect, values: vec![0.0; effect.parameters.len()] }).collect();
     let (mut stretches, mut jolts): (Vec<Stretch>, usize) = (Vec::new(), 0);
     for _ in 0..ROUNDS {
-        let fit = refit(&scene, doses, None)?;
+        let fit = refit(&scene, Fit::of(&scene, doses)?, None)?;
         if by.weighs_vibration {
             scene.vibration = vibration::ratios(&scene, &fit.doses)?;
         }

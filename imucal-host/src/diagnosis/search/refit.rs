@@ -24,6 +24,8 @@ use crate::{
 const STEPS: usize = 8;
 /// A step is small enough when no parameter moves by more than this share of its standard error.
 const SETTLED: f64 = 0.05;
+/// A step that would move none by more than this share is not tried: what it gains is lost in the energy's rounding.
+const DONE: f64 = 1e-4;
 /// After a step that moved none by more than this many of them, the derivative is that of before.
 const NEAR: f64 = 1.0;
 
@@ -41,6 +43,30 @@ pub struct Fit {
     pub doses: Vec<Dose>,
     /// Recorded less simulated.
     pub residual: Means,
+}
+
+impl Fit {
+    /// Doses as they are, and what they leave.
+    ///
+    /// # Errors
+    ///
+    /// [`DiagnosisError`], when the simulator fails.
+    pub fn of(scene: &ForwardModel<'_>, doses: Vec<Dose>) -> Result<Self, DiagnosisError> {
+        Ok(Self { residual: scene.residual(&doses)?, doses })
+    }
+
+    /// The same with other doses in their place; where the same of them act, they leave the same.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::of`].
+    pub fn with(self, scene: &ForwardModel<'_>, doses: Vec<Dose>) -> Result<Self, DiagnosisError> {
+        let acting = |doses: &'_ [Dose]| doses.iter().filter(|dose| dose.acts()).cloned().collect::<Vec<_>>();
+        if acting(&self.doses) == acting(&doses) {
+            return Ok(Self { doses, ..self });
+        }
+        Self::of(scene, doses)
+    }
 }
 
 /// All amplitudes of some effects, and their details where these are fitted.
@@ -76,15 +102,9 @@ pub fn signatures(
     columns.par_iter().map(of).collect()
 }
 
-/// Fits the amplitudes of all doses.
-pub fn refit(
-    scene: &ForwardModel<'_>,
-    doses: Vec<Dose>,
-    noise: Option<&Noise>,
-) -> Result<Fit, DiagnosisError> {
-    let columns = free(scene, &doses);
-    let residual = scene.residual(&doses)?;
-    let mut fit = Fit { doses, residual };
+/// Fits the amplitudes of all doses, from what they are.
+pub fn refit(scene: &ForwardModel<'_>, mut fit: Fit, noise: Option<&Noise>) -> Result<Fit, DiagnosisError> {
+    let columns = free(scene, &fit.doses);
     let mut least: Option<Noise> = None;
     let mut near: Option<(Weighing<'_>, Design)> = None;
     for _ in 0..STEPS {
@@ -105,6 +125,9 @@ pub fn refit(
         least = Some(noise.clone());
         let precisions = weighing.precisions(&design, &noise);
         let (step, largest) = step(&fit, &columns, &design, &precisions)?;
+        if largest < DONE {
+            break;
+        }
         let energy = |fit: &Fit| {
             let (precision, at) = prior(&fit.doses, &columns);
             let data = Design::of_residual(scene, &fit.residual).normal(&precisions, &[]).energy;
@@ -113,14 +136,12 @@ pub fn refit(
         let before = energy(&fit);
         let mut factor = 1.0;
         let better = loop {
-            let doses = moved_by(&fit.doses, &columns, &(&step * factor));
-            let residual = scene.residual(&doses)?;
-            let tried = Fit { doses, residual };
+            let tried = Fit::of(scene, moved_by(&fit.doses, &columns, &(&step * factor)))?;
             if energy(&tried) <= before + 1e-9 {
                 break Some(tried);
             }
             factor *= 0.5;
-            if factor < 0.05 {
+            if factor < 0.05 || largest < SETTLED {
                 break None;
             }
         };

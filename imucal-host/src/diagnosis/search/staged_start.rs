@@ -25,25 +25,27 @@ const ROUNDS: usize = 2;
 const MUTED: f64 = 1e6;
 
 /// Fits the baseline to the sensors in turn. `None` where the simulator fails.
-pub fn start(scene: &ForwardModel<'_>, mut doses: Vec<Dose>) -> Result<Fit, DiagnosisError> {
+pub fn start(scene: &ForwardModel<'_>, doses: Vec<Dose>) -> Result<Fit, DiagnosisError> {
+    let mut fit = Fit::of(scene, doses)?;
     for heard in STAGES {
         let is_shown = |effect: &Effect| match effect.part {
             Part::ClockTerm => true,
             Part::RigTerm(shown_by) => shown_by.iter().any(|kind| heard.contains(kind)),
             _ => effect.sensors.iter().all(|kind| heard.contains(kind)),
         };
-        let (mut asked, rest): (Vec<Dose>, Vec<Dose>) =
-            doses.into_iter().partition(|dose| is_shown(dose.effect));
+        let (asked, rest): (Vec<Dose>, Vec<Dose>) =
+            fit.doses.iter().cloned().partition(|dose| is_shown(dose.effect));
+        fit = fit.with(scene, asked)?;
         for _ in 0..ROUNDS {
-            let reference = Reference::new(scene, asked.clone(), &scene.fine)?;
+            let reference = Reference::new(scene, fit.doses.clone(), &scene.fine)?;
             let weighing = Weighing::new(scene, SensorKind::ALL.map(|kind| reference.output(kind)));
-            let noise = muted(weighing.white(&scene.residual(&asked)?), heard);
-            asked = refit(scene, asked, Some(&noise))?.doses;
+            let noise = muted(weighing.white(&fit.residual), heard);
+            fit = refit(scene, fit, Some(&noise))?;
         }
-        doses = asked;
-        doses.extend(rest);
+        let all = fit.doses.iter().cloned().chain(rest).collect();
+        fit = fit.with(scene, all)?;
     }
-    Ok(Fit { residual: scene.residual(&doses)?, doses })
+    Ok(fit)
 }
 
 /// A noise that lets only these sensors be heard.

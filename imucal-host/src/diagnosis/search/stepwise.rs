@@ -46,8 +46,11 @@ pub fn search<'s>(
         .map(|effect| Dose { effect, values: vec![0.0; effect.parameters.len()] })
         .collect();
     let by = &scene.settings.search;
-    let mut fit =
-        if by.staged_start { staged_start::start(scene, doses)? } else { refit(scene, doses, None)? };
+    let mut fit = if by.staged_start {
+        staged_start::start(scene, doses)?
+    } else {
+        refit(scene, Fit::of(scene, doses)?, None)?
+    };
     trace("baseline fitted");
     let mut linear = Linearisation::fitted_alone(scene, candidates, &fit)?;
     let white = linear.weighing.white(&fit.residual);
@@ -55,7 +58,7 @@ pub fn search<'s>(
     trace(&format!("none: {:.1} {:?}", none.log_evidence, none.noise));
     // The first noise may hold much of the misfit that the first fit began with.
     for _ in 0..by.settling {
-        fit = refit(scene, fit.doses, Some(&none.noise))?;
+        fit = refit(scene, fit, Some(&none.noise))?;
         linear = Linearisation::fitted_alone(scene, candidates, &fit)?;
         let start = with_white(&none.noise, &linear.weighing.white(&fit.residual));
         none = linear.judge(&[], &start, &SensorKind::ALL, &FAR)?;
@@ -126,7 +129,7 @@ impl<'s> Solution<'s> {
             let values = refined(effect, found_in, &doses, &rest, &next.noise)?;
             doses.push(Dose { effect, values });
         }
-        let fit = refit(scene, doses, Some(&next.noise))?;
+        let fit = refit(scene, self.fit.clone().with(scene, doses)?, Some(&next.noise))?;
         next.noise = with_white(&next.noise, &found_in.weighing.white(&fit.residual));
         let linear = Linearisation::new(scene, candidates, &fit, &next.noise, Some(&self.linear))?;
         Ok(Self { best: next, none: self.none.clone(), fit, linear })
