@@ -4,7 +4,7 @@
 //! a multiple of that of the quietest window so far:
 //!
 //! ```text
-//! σ² = Σ_axes Var(f over four quarters)      still: σ² ≤ m · max(σ²_min, σ²_0),  |w̄ − b| ≤ w_0
+//! σ² = Σ_axes Var(f over four quarters)      still: σ² ≤ m · max(σ²_min, σ²_0),  |w̄ − b| ≤ w_0,  Σ_axes Var(w) ≤ w_1²
 //! b ← b + clamp(w̄ − b, ±s)
 //! ```
 //!
@@ -16,6 +16,7 @@
 //! | w̄ | mean rate of the window |
 //! | b | median rate of the windows in which the accelerometer is still, followed by steps s (the first step reaches it) |
 //! | w_0 | [`RestSettings::turning`] |
+//! | w_1 | [`SWINGING`]: a swing about the vertical comes back, and has no mean |
 //!
 //! A rest holds the quarters between the middles of its first and its last still window, so that it ends half a window before a
 //! motion begins. It lasts a second at least. A rest that is noisier than the multiple of a quieter window which came later is
@@ -41,6 +42,9 @@ pub const QUARTER: u64 = 250_000;
 pub const SHORTEST: u8 = 4;
 /// Noisier than this nothing is at rest, however long it lasts, (m/s²)².
 pub const NOISIEST: f64 = 0.25;
+/// A gyroscope whose rates deviate by more than this from their mean swings, rad/s (6°/s): ten times what most show at rest, and more
+/// than a hand that holds still does.
+pub const SWINGING: f64 = 0.1;
 /// Time from one sample to the next that is so many times the usual one breaks a window.
 const GAP: u64 = 5;
 /// Steps by which the usual rate follows that of a window, rad/s: where they agree within [`RestSettings::turning`], and where
@@ -337,7 +341,8 @@ impl<T: Scalar> RestObserver<T> {
         if self.quietest.is_none_or(|quietest| variance < quietest) {
             self.quietest = Some(variance);
         }
-        (variance <= self.threshold()? && self.is_usual(window.rate)).then_some(variance)
+        let swings = window.swing > T::of(SWINGING * SWINGING);
+        (variance <= self.threshold()? && !swings && self.is_usual(window.rate)).then_some(variance)
     }
 
     /// The mean rate of a window in which the accelerometer is still is the usual one, which follows it.

@@ -9,7 +9,10 @@
 
 use std::ops::Range;
 
-use imucal_core::observation::{Moments, Rest};
+use imucal_core::{
+    observation::{Moments, Rest},
+    observer::rest::{NOISIEST, SWINGING},
+};
 use nalgebra::Vector3;
 
 use super::windowed;
@@ -27,8 +30,8 @@ const TURNING: f64 = 6.0;
 const TURNING_LIMITS: (f64, f64) = (0.015, 0.052);
 /// The initial stretch counts as a rest unless it is this many times noisier than the quietest tenth.
 const INITIAL_EXCESS: f64 = 8.0;
-/// Noisier than this nothing is at rest, however long it lasts, (m/s²)²: ten times what a trembling hand shows.
-const NOISIEST: f64 = 0.25;
+/// A gyroscope whose usual variance at rest, so many times, is above that of a swing is noisy.
+const NOISY: f64 = 4.0;
 /// Rows further apart than this are single shots, each a rest of its own, s.
 const SHOT_INTERVAL: f64 = 0.2;
 /// A gap longer than this many usual intervals ends a rest.
@@ -58,8 +61,8 @@ pub struct RestDetector<'a> {
     samples: Samples<'a>,
     /// Variance of the window around each row, (m/s²)²; infinite where too little of it is usable.
     variance: Vec<f64>,
-    /// Mean rate of the window around each row, rad/s.
-    rate: Option<Vec<Vector3<f64>>>,
+    /// Mean rate of the window around each row, rad/s, and its variance there, (rad/s)².
+    rate: Option<(Vec<Vector3<f64>>, Vec<f64>)>,
     /// Variance of the reference rest, (m/s²)².
     noise: f64,
     /// The reference is the initial rest, not the quietest stretch.
@@ -86,7 +89,14 @@ impl<'a> RestDetector<'a> {
         let half = ((WINDOW / 2.0 / interval).round() as usize).max(1);
         let (variance, rate) = rayon::join(
             || windowed::variance(samples, half, GAP * interval),
-            || samples.gyr.map(|gyr| windowed::mean(gyr, samples.usable, half)),
+            || {
+                let gyr = samples.gyr?;
+                let of_rate = Samples { acc: gyr, ..samples };
+                Some((
+                    windowed::mean(gyr, samples.usable, half),
+                    windowed::variance(of_rate, half, GAP * interval),
+                ))
+            },
         );
         let (noise, from_initial) = reference_noise(&variance, (INITIAL / interval).round() as usize, half);
         Self { samples, variance, rate, noise, from_initial, interval, half }
@@ -116,7 +126,7 @@ impl<'a> RestDetector<'a> {
     fn runs(&self, threshold: f64) -> Vec<Range<usize>> {
         let quiet: Vec<bool> = self.variance.iter().map(|v| *v <= threshold).collect();
         let quiet = match &self.rate {
-            Some(rate) => without_turning(quiet, rate),
+            Some((rate, swing)) => without_turning(without_swings(quiet, swing, self.half), rate),
             None => quiet,
         };
         let mut rests = Vec::new();
@@ -194,6 +204,25 @@ fn mean_of_measured(values: &[f64]) -> f64 {
     let (sum, count) =
         values.iter().filter(|v| v.is_finite()).fold((0.0, 0u32), |(sum, count), v| (sum + v, count + 1));
     sum / f64::from(count)
+}
+
+/// Cuts out what swings about the vertical and comes back within a window. Less than a window of it is where a motion begins or ends.
+/// A gyroscope may be so noisy that it always seems to swing.
+fn without_swings(mut quiet: Vec<bool>, swing: &[f64], half: usize) -> Vec<bool> {
+    let at_rest = quiet.iter().zip(swing).filter(|(still, _)| **still);
+    let usual = median(at_rest.map(|(_, variance)| *variance).step_by(10).collect());
+    let limit = (SWINGING * SWINGING).max(NOISY * usual.unwrap_or(0.0));
+    let swings: Vec<bool> =
+        quiet.iter().zip(swing).map(|(still, variance)| *still && *variance > limit).collect();
+    let mut row = 0;
+    for alike in swings.chunk_by(|a, b| a == b) {
+        let rows = row..row + alike.len();
+        row = rows.end;
+        if alike[0] && rows.len() > 2 * half {
+            quiet[rows].fill(false);
+        }
+    }
+    quiet
 }
 
 /// Cuts out what turns so smoothly that the accelerometer does not notice: about the vertical, or creeping.
@@ -299,6 +328,31 @@ mod tests {
         let samples = Samples { time: &time, acc: &acc, gyr: Some(&gyr), temperature: None, usable: &usable };
         let cut = RestDetector::new(samples, DT).cut(4.0);
         assert_eq!(cut.rests.len(), 2, "{cut:?}");
+    }
+
+    #[test]
+    fn a_swing_about_the_vertical_is_no_rest_and_a_noisy_gyroscope_has_rests() {
+        let time: Vec<f64> = (0..1200).map(|k| k as f64 * DT).collect();
+        let noise = |k: usize| (0.7 * (k * k) as f64).sin();
+        let acc: Vec<_> = (0..1200)
+            .map(|k| Vector3::new(noise(k), noise(k + 3), noise(k + 9)) * 1e-3 + Vector3::z() * 9.8)
+            .collect();
+        let usable = vec![true; 1200];
+        let rests = |rate: &dyn Fn(usize) -> f64| {
+            let gyr: Vec<_> = (0..1200).map(|k| Vector3::new(0.1, 0.1, 0.1 + rate(k))).collect();
+            let samples =
+                Samples { time: &time, acc: &acc, gyr: Some(&gyr), temperature: None, usable: &usable };
+            RestDetector::new(samples, DT).cut(4.0).rests
+        };
+        // Once a second: its mean over a window is that of a rest.
+        let swing = |k: usize| {
+            if (400..800).contains(&k) { (k as f64 * DT * std::f64::consts::TAU).sin() } else { 0.0 }
+        };
+        let found = rests(&swing);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(found[0].end <= 400 && found[1].start >= 800, "{found:?}");
+        let noisy = |k: usize| if k.is_multiple_of(2) { 0.3 } else { -0.3 };
+        assert_eq!(rests(&noisy), std::slice::from_ref(&(0..1200)));
     }
 
     #[test]

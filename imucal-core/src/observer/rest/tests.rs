@@ -82,6 +82,19 @@ fn a_turn_that_the_accelerometer_does_not_feel_is_no_rest() {
 }
 
 #[test]
+fn a_swing_that_comes_back_within_a_window_is_no_rest() {
+    let mut session = Session::new(3, &[(6.0, 0.0, 0.0), (8.0, 0.0, 0.0), (6.0, 0.0, 0.0)]);
+    for (k, sample) in session.samples.iter_mut().enumerate().skip(600).take(800) {
+        // Once a second through 18 degrees.
+        let rate = (k as f64 * std::f64::consts::TAU / 100.0).sin();
+        sample.gyr.iter_mut().for_each(|gyr| gyr.z += rate);
+    }
+    let rests = session.rests();
+    assert_eq!(rests.len(), 2);
+    assert!(seconds(&rests[0]).1 < 6.1 && seconds(&rests[1]).0 > 13.9, "{rests:?}");
+}
+
+#[test]
 fn what_seemed_a_rest_before_a_quieter_one_came_is_none() {
     // Carried steadily at first: quiet as long as nothing quieter is known.
     let parts = [(5.0, 0.0, 0.25), (2.0, 1.0, 2.0), (6.0, 0.0, 0.0), (2.0, 1.0, 2.0), (6.0, 0.0, 0.25)];

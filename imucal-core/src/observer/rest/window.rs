@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Stretch;
-use crate::scalar::Scalar;
+use crate::{observation::Moments, scalar::Scalar};
 
 /// Four quarters together.
 pub(super) struct Window<T: Scalar> {
@@ -11,6 +11,8 @@ pub(super) struct Window<T: Scalar> {
     pub(super) variance: T,
     /// Mean rate, rad/s; zero without a gyroscope.
     pub(super) rate: Vector3<T>,
+    /// Variance of the rate, sum of the axes, (rad/s)²; not above zero without a gyroscope.
+    pub(super) swing: T,
 }
 
 /// Four quarters together; `None` where one is broken. Only what is asked for: [`Stretch::join`] of all costs several times as much.
@@ -18,17 +20,23 @@ pub(super) fn window<T: Scalar>(quarters: [&Stretch<T>; 4]) -> Option<Window<T>>
     if quarters.iter().any(|quarter| quarter.is_broken()) {
         return None;
     }
-    let weights = |of: fn(&Stretch<T>) -> u32| quarters.map(|quarter| T::whole(of(quarter)));
-    let (acc, gyr) = (weights(|quarter| quarter.acc.count()), weights(|quarter| quarter.gyr.count()));
-    let force = weighted(quarters.map(|quarter| quarter.acc.mean()), acc);
+    let (_, variance) = together(quarters.map(|quarter| &quarter.acc));
+    let (rate, swing) = together(quarters.map(|quarter| &quarter.gyr));
+    Some(Window { variance, rate, swing })
+}
+
+/// Mean and variance, sum of the axes, of four quarters.
+#[inline(never)]
+fn together<T: Scalar>(quarters: [&Moments<T>; 4]) -> (Vector3<T>, T) {
+    let weights = quarters.map(|quarter| T::whole(quarter.count()));
+    let mean = weighted(quarters.map(|quarter| quarter.mean()), weights);
     let mut squares = T::zero();
-    for (quarter, weight) in quarters.into_iter().zip(acc) {
-        let (off, own) = (quarter.acc.mean() - force, quarter.acc.squares());
+    for (quarter, weight) in quarters.into_iter().zip(weights) {
+        let (off, own) = (quarter.mean() - mean, quarter.squares());
         squares += weight * (off.x * off.x + off.y * off.y + off.z * off.z) + (own.x + own.y + own.z);
     }
-    let [a, b, c, d] = acc;
-    let rate = weighted(quarters.map(|quarter| quarter.gyr.mean()), gyr);
-    Some(Window { variance: squares / (a + b + c + d - T::one()), rate })
+    let [a, b, c, d] = weights;
+    (mean, squares / (a + b + c + d - T::one()))
 }
 
 /// Mean by weights; zero where all are. By components, as in [`crate::observation::Moments::push`].

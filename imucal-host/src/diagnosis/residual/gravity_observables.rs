@@ -8,15 +8,25 @@
 //!
 //! ψ is the error of the turn, δω over its time less what it is at the two rests between. All are linear in the error,
 //! and what they make of a residual they make of a signature too. One row more holds the rotation that the errors of
-//! all rests have in common: the table's axes are those in which the accelerometer has none. Not modelled: that two
-//! neighbouring turns share the error of the rest between them.
+//! all rests have in common: the table's axes are those in which the accelerometer has none. White noise of the gyroscope, σ a sample,
+//! makes
+//!
+//! ```text
+//! Var ψ = σ² (Δt T + ¼ T² (1/n + 1/n'))
+//! ```
+//!
+//! of a turn that takes T between rests of n and n' samples. Not modelled: that two neighbouring turns share the error of the rest
+//! between them.
 
 use std::ops::Range;
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::block::{Block, Means};
-use crate::{diagnosis::reference::rest_to_rest::RestToRest, recording::SensorKind};
+use crate::{
+    diagnosis::reference::rest_to_rest::RestToRest,
+    recording::{SensorKind, median},
+};
 
 /// How block means become rows.
 #[derive(Clone, Debug)]
@@ -44,6 +54,8 @@ struct Rest {
     from_before: Option<Matrix3<f64>>,
     /// Blocks of the turn: axes there to those at this rest, length in time, s, share of the way.
     turn: Vec<(usize, Matrix3<f64>, f64, f64)>,
+    /// Standard deviation of ψ by white noise over that of the usual turn.
+    spread: f64,
 }
 
 impl Rest {
@@ -59,7 +71,35 @@ impl Rest {
             across: [first, along.cross(&first)],
             from_before: None,
             turn: Vec::new(),
+            spread: 1.0,
         }
+    }
+
+    /// Samples of the gyroscope in it.
+    fn rates(&self) -> f64 {
+        self.inside.iter().map(|(_, [_, rates])| rates).sum()
+    }
+
+    /// Variance of ψ for white noise of variance 1, s²; `counts` are samples of the gyroscope in each block. `None` where no turn is known.
+    fn variance(&self, before: &Self, counts: &[usize]) -> Option<f64> {
+        self.from_before?;
+        let seconds: f64 = self.turn.iter().map(|(_, _, duration, _)| duration).sum();
+        let white = |(cut, _, duration, _): &(usize, Matrix3<f64>, f64, f64)| {
+            duration * duration / counts.get(*cut).map_or(1.0, |count| (*count).max(1) as f64)
+        };
+        let of_rests = 1.0 / self.rates().max(1.0) + 1.0 / before.rates().max(1.0);
+        let variance = self.turn.iter().map(white).sum::<f64>() + 0.25 * seconds * seconds * of_rests;
+        (variance > 0.0).then_some(variance)
+    }
+}
+
+/// Weighs each turn by what white noise makes of it.
+fn spread(rests: &mut [Rest], counts: &[usize]) {
+    let variances: Vec<Option<f64>> =
+        rests.windows(2).map(|pair| pair[1].variance(&pair[0], counts)).collect();
+    let Some(usual) = median(variances.iter().copied().flatten().collect()) else { return };
+    for (rest, variance) in rests.iter_mut().skip(1).zip(variances) {
+        rest.spread = variance.map_or(1.0, |variance| (variance / usual).sqrt());
     }
 }
 
@@ -93,6 +133,7 @@ impl GravityObservables {
             blocks.push(Block { rows: rows.clone(), time: middle(rows), rest: Some(at + 1) });
             rests.push(rest);
         }
+        spread(&mut rests, &counts[SensorKind::Gyr as usize]);
         let usable =
             |kind: usize, rest: &Rest| rest.inside.iter().map(|(_, n)| n[kind] as usize).sum::<usize>();
         let mut rows: [Vec<usize>; 3] = [
@@ -168,10 +209,10 @@ impl GravityObservables {
         Vector3::new(skew[(2, 1)], skew[(0, 2)], skew[(1, 0)])
     }
 
-    /// What a sensor is given in each row: scatter of the turns shows across gravity, and not along it.
+    /// What a sensor is given in each row: scatter of the turns shows across gravity, more of it after a longer turn, and not along it.
     pub fn given(&self, kind: SensorKind) -> Vec<Vector3<f64>> {
         let along = if kind == SensorKind::Acc { self.gravity } else { 0.0 };
-        let rest = |_: &Rest| Vector3::new(along, 0.0, 0.0);
+        let rest = |rest: &Rest| Vector3::new(along * rest.spread, 0.0, 0.0);
         self.rests.iter().map(rest).chain([Vector3::zeros()]).collect()
     }
 
