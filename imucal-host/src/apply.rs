@@ -1,6 +1,6 @@
 //! Apply: a recording corrected by the core, in `f32`, as the device would.
 
-use std::convert::Infallible;
+use std::{convert::Infallible, ops::RangeInclusive};
 
 mod stream;
 
@@ -14,12 +14,12 @@ use imucal_core::{
 use nalgebra::Vector3;
 
 use crate::{
-    recording::{Nominal, Recording, SensorKind, Unit},
+    recording::{Nominal, Recording, SensorKind, Triple, Unit},
     store::{StoredCalibration, StoredTriad},
 };
 
 /// Why a calibration does not fit a recording.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ApplyError {
     /// It was made for another sensor.
     #[error(
@@ -49,6 +49,22 @@ pub enum ApplyError {
         /// Unit of the calibration.
         expected: Unit,
     },
+    /// A count is another part of a unit than the manifest says.
+    #[error(
+        "{recording}: {sensor}: in the calibration a count is {ratio:.2} times what [counts] of the recording says, \
+         expected {least} to {most} times; the calibration was made at another full scale: calibrate at this one, or \
+         correct [counts]",
+        least = COUNT.start(),
+        most = COUNT.end()
+    )]
+    OtherCounts {
+        /// The recording.
+        recording: String,
+        /// Which sensor.
+        sensor: SensorKind,
+        /// The count of the calibration over that of the manifest.
+        ratio: f64,
+    },
     /// Nothing in the recording is calibrated.
     #[error(
         "{recording}: holds none of the sensors that the calibration is for; check that both belong together"
@@ -59,11 +75,21 @@ pub enum ApplyError {
     },
 }
 
+/// A calibrated count over a nominal one: sensors differ by some percent, full scales by a factor of two.
+const COUNT: RangeInclusive<f64> = 0.67..=1.5;
+
+/// The calibration's count over the manifest's; `None` where either is unknown, and of a magnetometer, whose nominal scale nothing checks.
+fn count_ratio(triple: &Triple, triad: &StoredTriad, kind: SensorKind) -> Option<f64> {
+    let known = triple.unit == Unit::Counts && kind != SensorKind::Mag;
+    let per_si = triad.unit_out.per_si().filter(|_| known)?;
+    Some(triad.triad().gain.determinant().abs().cbrt() / per_si * triple.nominal.per_unit.abs())
+}
+
 /// Whether a calibration belongs to a recording; a warning where nobody can know. `other_serial` turns the
 /// refusal of another serial into a warning.
 ///
 /// # Errors
-/// [`ApplyError`] for another serial, another unit, or nothing in common.
+/// [`ApplyError`] for another serial, another unit, another full scale, or nothing in common.
 pub fn check(
     recording: &Recording,
     stored: &StoredCalibration,
@@ -102,6 +128,9 @@ pub fn check(
                 found: triple.unit,
                 expected: triad.unit_in,
             });
+        }
+        if let Some(ratio) = count_ratio(triple, triad, kind).filter(|ratio| !COUNT.contains(ratio)) {
+            return Err(ApplyError::OtherCounts { recording: recording.name.clone(), sensor: kind, ratio });
         }
     }
     if any { Ok(warning) } else { Err(ApplyError::NothingToApply { recording: recording.name.clone() }) }

@@ -252,9 +252,21 @@ cross_std = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
             matches!(refused, StreamError::Refused { .. })
                 && refused.to_string().contains("acc is in counts")
         );
+        bench.stored.acc.as_mut().unwrap().unit_in = crate::recording::Unit::Counts;
+        // Twice the full scale.
+        let twice = |acc: &mut crate::store::StoredTriad| {
+            acc.gain.as_flattened_mut().iter_mut().for_each(|entry| *entry *= 2.0)
+        };
+        bench.stored.acc.iter_mut().for_each(twice);
+        let refused = bench.stream("out.csv").unwrap_err().to_string();
+        assert!(refused.contains("acc: in the calibration a count is 2.00 times what [counts]"), "{refused}");
+        bench
+            .stored
+            .acc
+            .iter_mut()
+            .for_each(|acc| acc.gain.as_flattened_mut().iter_mut().for_each(|entry| *entry /= 2.0));
         let text = fs::read_to_string(bench.path("run.csv")).unwrap();
         fs::write(bench.path("run.csv"), text + "0,1,2,3,,,\n").unwrap();
-        bench.stored.acc.as_mut().unwrap().unit_in = crate::recording::Unit::Counts;
         assert!(matches!(bench.stream("out.csv").unwrap_err(), StreamError::Read(_)));
         assert_eq!(fs::read_dir(bench.folder.path()).unwrap().count(), 2);
     }
