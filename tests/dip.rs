@@ -3,7 +3,7 @@
 use imucal_core::rotation::exp;
 use imucal_host::{
     calibrate::{
-        Options, calibrate,
+        Follows, Options, Status, calibrate,
         fit::alignment::{Alignment, align},
     },
     recording::{Recording, SensorKind},
@@ -12,6 +12,7 @@ use imucal_host::{
 use imucal_tests::{
     data,
     rig::{Draw, moments, rms},
+    simulated,
 };
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -192,4 +193,18 @@ fn a_real_magnetometer_with_two_axes_swapped_is_refused_by_name() {
             assert!(refused.advice.contains(because), "{file}: {refused:?}");
         }
     }
+}
+
+#[test]
+fn a_magnetometer_is_suspect_where_the_declared_field_dips_otherwise() {
+    let mut recording = simulated::tumbled(24, 4000);
+    let found = |recording: &Recording| {
+        let calibration = calibrate(recording, &Options::default(), &|_| {});
+        let mag = calibration.sensor(SensorKind::Mag).expect("recorded");
+        (mag.status(), mag.suspicions.iter().map(|found| found.follows).collect::<Vec<_>>())
+    };
+    assert_eq!(found(&recording), (Status::Accepted, Vec::new()));
+    // Its own dips by 57.6°; this one, of Oslo, by 73°.
+    recording.manifest.site.field_ned_ut = Some([15.0, 0.8, 49.0]);
+    assert_eq!(found(&recording), (Status::Suspect, vec![Follows::Field]));
 }

@@ -35,7 +35,7 @@ pub use thresholds::SegmentationReport;
 pub use self::acc::rests::AccModel;
 use self::{
     fit::{alignment::FieldAtRest, directions::Directions},
-    mag::samples::MagInput,
+    mag::{declared_field, samples::MagInput},
 };
 
 /// What to calibrate, and how.
@@ -117,6 +117,8 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
                 && let Some(fit) = &mut outcome.fit
             {
                 align(fit, recording, &usable, &calibration, directions.as_ref());
+                let declared = recording.manifest.site.field_ned_ut.map(Vector3::from);
+                outcome.suspicions.extend(declared.and_then(|field| declared_field::check(fit, &field)));
             }
             outcome
         });

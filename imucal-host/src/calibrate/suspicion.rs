@@ -20,6 +20,8 @@ pub enum Follows {
     Neighbours,
     /// The clock of the samples.
     Clock,
+    /// The field that the manifest declares.
+    Field,
     /// Another sensor, itself suspect, that this one is calibrated against.
     Accelerometer,
 }
@@ -35,6 +37,7 @@ impl Follows {
             Self::Rate => "rate",
             Self::Neighbours => "neighbours",
             Self::Clock => "clock",
+            Self::Field => "field",
             Self::Accelerometer => "accelerometer",
         }
     }

@@ -6,4 +6,5 @@
 //!
 //! Not done here: known attitudes are used in `known_attitudes`.
 
+pub mod declared_field;
 pub mod samples;
