@@ -53,8 +53,8 @@ pub(super) struct Arguments {
     /// Your own effects, in TOML: candidates like those of the catalogue (see docs/user_effects.md)
     #[arg(long, value_name = "FILE")]
     effects: Option<PathBuf>,
-    /// Confirm the effects of --effects with their amplitudes as the file has found them, on another recording; a file that a
-    /// diagnosis has proposed has them
+    /// Test the effects of --effects on another recording, with the fitted amplitudes that the file holds (as --proposals writes
+    /// them)
     #[arg(long, requires = "effects")]
     frozen: bool,
     /// Write the formulas that are proposed where no effect explains the gap, as a file for --effects

@@ -47,7 +47,7 @@ pub(super) struct Arguments {
     /// One CSV, Parquet or MAT-file, log or folder of EuRoC, or the accelerometer's and the gyroscope's file of imu_tk
     #[arg(required = true, num_args = 1..=2)]
     files: Vec<PathBuf>,
-    /// Their layout; without it that of so many files
+    /// Layout of the files; without it, their number decides
     #[arg(long, value_enum)]
     from: Option<Layout>,
     /// What the samples are: a recording's TOML with units, site and sensor; needed for imu_tk

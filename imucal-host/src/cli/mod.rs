@@ -47,7 +47,7 @@ mod verify;
 #[derive(Debug, Parser)]
 #[command(name = "imucal", version, about, max_term_width = 80)]
 struct Cli {
-    /// Print errors, refusals and what was asked for as a document only
+    /// Print only errors, refusals, and a document that was asked for with `-`
     #[arg(long, short, global = true, conflicts_with = "verbose", help_heading = "How much is printed")]
     quiet: bool,
     /// Print each stage of the work and when it began
@@ -81,7 +81,7 @@ enum Command {
     Check(check::Arguments),
     /// Compare two calibrations of a unit: how far each parameter has moved, and what that means
     Compare(compare::Arguments),
-    /// Make one calibration of the one in use and of a new one, made of what the device has corrected by it
+    /// Combine the calibration in use with a new one that was made from the device's corrected output
     Compose(compose::Arguments),
     /// Print a calibration, its quality, and whether it is intact.
     Inspect(inspect::Arguments),
@@ -97,7 +97,7 @@ enum Command {
     Noise(noise::Arguments),
     /// Write a calibration and a unit's noise for another program, and list what that program cannot say.
     Export(export::Arguments),
-    /// Make of an ideal stream what a calibrated unit would have read.
+    /// Add the errors of a calibrated unit to an ideal stream.
     Corrupt(corrupt::Arguments),
     /// Run every step on a simulated sensor: record, calibrate, pack, apply, verify, diagnose.
     Demo(demo::Arguments),

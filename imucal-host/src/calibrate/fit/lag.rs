@@ -55,7 +55,10 @@ impl Lag {
         match self {
             Self::Found(lag) => {
                 let words = if lag < 0.0 { "ahead of" } else { "behind" };
-                format!("the sensor is {:.1} ms {words} the reference; taken out", 1e3 * lag.abs())
+                format!(
+                    "the sensor is {:.1} ms {words} the reference; the fit corrects for it",
+                    1e3 * lag.abs()
+                )
             }
             Self::OutOfReach => {
                 format!("no lag within {REACH} s of the reference fits best; none is taken out")

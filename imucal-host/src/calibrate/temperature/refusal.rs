@@ -92,7 +92,7 @@ impl fmt::Display for TemperatureRefusal {
         match self {
             Self::NotMeasured { have, of } => write!(f, "{have} of {of} observations have a temperature"),
             Self::Narrow { span, need } => {
-                write!(f, "temperatures span {span:.1} K, {need:.0} K needed")
+                write!(f, "temperatures span {span:.2} K, {need:.0} K needed")
             }
             Self::Stuck { from, duration, usual } => write!(
                 f,

@@ -274,7 +274,10 @@ fn leave_out_passage(finding: &Finding, time: &[f64], usable: &mut [bool]) {
 fn shortcomings(recording: &Recording) -> Vec<String> {
     let mut remarks = Vec::new();
     if recording.temperature.is_none() {
-        remarks.push("there is no temperature: what follows it looks like drift".to_owned());
+        remarks.push(
+            "no temperature was recorded: an effect of temperature cannot be distinguished from drift"
+                .to_owned(),
+        );
     }
     if recording.manifest.site.gravity().is_none() && recording.acc.is_some() {
         remarks.push(
