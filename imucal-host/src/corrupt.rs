@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The constants are those of the device's record, the arithmetic is in `f64`: corrected by the core in `f32` the stream is
-//! the ideal one again but for rounding. Noise is drawn by the coefficients that were seen: N, and a bias that forgets where its
+//! the ideal one again but for rounding. Noise is drawn by the coefficients that were seen: N, and a Gauss–Markov bias where its
 //! correlation time is known, B and K otherwise. Not modelled: quantisation, saturation, bandwidth.
 
 use imucal_core::{

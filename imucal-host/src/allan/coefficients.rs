@@ -68,9 +68,9 @@ pub enum NotSeen {
         /// Length of the recording, s.
         duration: f64,
     },
-    /// The bias forgets what it was.
+    /// The bias is a Gauss–Markov process.
     #[error(
-        "the bias forgets what it was within {time:.3} s: it neither walks nor falls as 1/f (deviance less by {by:.0})"
+        "the bias has a correlation time of {time:.3} s: it neither walks nor falls as 1/f (deviance less by {by:.0})"
     )]
     Forgets {
         /// Correlation time, s.
@@ -78,10 +78,9 @@ pub enum NotSeen {
         /// By how much that fits better.
         by: f64,
     },
-    /// The bias does not forget within the recording.
+    /// The correlation time is too long for the recording.
     #[error(
-        "the bias does not forget what it was within the recording: the correlation time is longer than {least:.0} s; \
-         record for more than {advised:.0} s"
+        "the correlation time is longer than {least:.0} s; a recording of more than {advised:.0} s would show it"
     )]
     Remembers {
         /// The shortest correlation time that fits, s.
@@ -123,7 +122,7 @@ pub struct Axis {
     pub random_walk: Coefficient,
     /// T, s.
     pub correlation_time: Coefficient,
-    /// Standard deviation of a bias that forgets, unit.
+    /// Standard deviation of a Gauss–Markov bias, unit.
     pub bias_std: Coefficient,
     /// The least Allan deviation, unit, and its averaging time, s.
     pub least: (f64, f64),

@@ -1,4 +1,4 @@
-//! The correlation time of a bias that forgets: a Gauss–Markov process, by a scan of times.
+//! The correlation time of a Gauss–Markov bias, by a scan of times.
 //!
 //! For each time the sizes are fitted as in [`fit`]; the interval is where χ² rises by 3.84, χ² of one degree of freedom.
 
@@ -65,7 +65,7 @@ impl Scan {
         Self(times(first, last, RATIO).map(products).collect())
     }
 
-    /// The best time of one axis' variances from the `first` length on; `None` where no bias that forgets is there.
+    /// The best time of one axis' variances from the `first` length on; `None` where no Gauss–Markov bias is there.
     pub fn correlation(&self, variances: &[f64], first: usize, quantised: bool) -> Option<Correlation> {
         let fitted = |(at, (time, products)): (usize, &(f64, Products))| {
             let kinds = &products.kinds()[usize::from(!quantised)..];

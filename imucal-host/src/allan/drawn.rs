@@ -22,7 +22,7 @@ pub struct Drawn {
     pub flicker: f64,
     /// K.
     pub walk: f64,
-    /// σ and T of a bias that forgets.
+    /// σ and T of a Gauss–Markov bias.
     pub markov: Option<(f64, f64)>,
 }
 

@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! samples ─► clock ─► cascade ─► variances ─┬─► fit, by the covariance of the variances ─► coefficients
-//!              gaps     stillness             └─► correlation: a bias that forgets
+//!              gaps     stillness             └─► correlation: a Gauss–Markov bias
 //! ```
 //!
 //! Sources: W. J. Riley, Handbook of Frequency Stability Analysis, NIST SP 1065 (2008); C. A. Greenhall & W. J. Riley (PTTI

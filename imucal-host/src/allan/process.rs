@@ -10,7 +10,7 @@
 //! | white noise | N | −N² \|t\|/2 |
 //! | bias instability, a spectrum that falls as 1/f | B | B² t² ln\|t\|/(2π) |
 //! | random walk of the bias | K | K² \|t\|³/12 |
-//! | a bias that forgets: Gauss–Markov of correlation time T | σ | −σ² T (\|t\| − T (1 − e^(−\|t\|/T))) |
+//! | Gauss–Markov bias of correlation time T | σ | −σ² T (\|t\| − T (1 − e^(−\|t\|/T))) |
 //!
 //! The sum x of the samples has no covariance of its own; second differences have one, which s gives: for numbers c with
 //! Σ c = Σ c·t = 0, the variance of Σ c x(t) is Σ Σ c c' s(t − t'). Sources: C. A. Greenhall & W. J. Riley, Uncertainty of

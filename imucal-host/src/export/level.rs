@@ -63,7 +63,7 @@ pub(super) fn rate(inputs: &Inputs<'_>, sensor: &NoiseOfSensor) -> Result<f64, E
     if rate.is_finite() && rate > 0.0 { Ok(rate) } else { Err(ExportError::Rate { found: rate }) }
 }
 
-/// Density of the steps of a bias that forgets, for a standard deviation in the long run: σ = d·√(T/2).
+/// Density of the steps of a Gauss–Markov bias, for a standard deviation in the long run: σ = d·√(T/2).
 pub(super) fn step_density(std: f64, correlation_time: f64) -> f64 {
     std * (2.0 / correlation_time).sqrt()
 }

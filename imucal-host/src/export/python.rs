@@ -104,7 +104,7 @@ fn of_noise(text: &mut String, kind: SensorKind, noise: &NoiseOfSensor, cannot: 
         std::array::from_fn(|at| noise.axes[at].as_ref().map_or(0.0, of))
     };
     let forgets = |axis: &NoiseOfAxis| axis.bias_std.value.zip(axis.correlation_time.value);
-    // A bias that forgets has its own process, and no further walk.
+    // A Gauss–Markov bias has its own process, and no further walk.
     let walk = |axis: &NoiseOfAxis| {
         if forgets(axis).is_some() { 0.0 } else { axis.random_walk.value.unwrap_or(0.0) }
     };
@@ -120,7 +120,7 @@ fn of_noise(text: &mut String, kind: SensorKind, noise: &NoiseOfSensor, cannot: 
         (
             "bias_std",
             each(&|axis| forgets(axis).map_or(0.0, |(std, _)| std)),
-            format!("of a bias that forgets, {unit}"),
+            format!("of a Gauss–Markov bias, {unit}"),
         ),
         (
             "correlation_time",

@@ -58,7 +58,7 @@ pub(crate) const FIGURES: [Row; 6] = [
     ("K random walk", |axis| &axis.random_walk),
     ("Q quantisation", |axis| &axis.quantisation),
     ("T correlation time", |axis| &axis.correlation_time),
-    ("bias that forgets", |axis| &axis.bias_std),
+    ("Gauss–Markov bias", |axis| &axis.bias_std),
 ];
 
 /// A value with its interval, or the most that it may be.

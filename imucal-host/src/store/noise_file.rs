@@ -75,9 +75,9 @@ pub struct NoiseOfAxis {
     pub random_walk: Figure,
     /// Q, unit·s.
     pub quantisation: Figure,
-    /// T of a bias that forgets, s.
+    /// T of a Gauss–Markov bias, s.
     pub correlation_time: Figure,
-    /// σ of a bias that forgets, unit.
+    /// σ of a Gauss–Markov bias, unit.
     pub bias_std: Figure,
     /// The least Allan deviation, unit.
     pub least_deviation: f64,
