@@ -15,8 +15,8 @@ use imucal_core::{
 };
 use nalgebra::Vector3;
 
-use super::windowed;
-use crate::recording::{median, order_statistics::MEDIAN_SIZE};
+use super::windowed::{Window, windows};
+use crate::recording::{Series, median, order_statistics::MEDIAN_SIZE};
 
 /// Window of the variance, s: long against vibration, short against a rest.
 pub const WINDOW: f64 = 1.0;
@@ -61,8 +61,8 @@ pub struct RestDetector<'a> {
     samples: Samples<'a>,
     /// Variance of the window around each row, (m/s²)²; infinite where too little of it is usable.
     variance: Vec<f64>,
-    /// Mean rate of the window around each row, rad/s, and its variance there, (rad/s)².
-    rate: Option<(Vec<Vector3<f64>>, Vec<f64>)>,
+    /// Rates of the window around each row, rad/s.
+    rate: Option<Vec<Window>>,
     /// Variance of the reference rest, (m/s²)².
     noise: f64,
     /// The reference is the initial rest, not the quietest stretch.
@@ -87,16 +87,10 @@ impl<'a> RestDetector<'a> {
     /// Looks at a recording with the given usual interval, s.
     pub fn new(samples: Samples<'a>, interval: f64) -> Self {
         let half = ((WINDOW / 2.0 / interval).round() as usize).max(1);
+        let series = |values| Series { time: samples.time, values, usable: samples.usable, interval };
         let (variance, rate) = rayon::join(
-            || windowed::variance(samples, half, GAP * interval),
-            || {
-                let gyr = samples.gyr?;
-                let of_rate = Samples { acc: gyr, ..samples };
-                Some((
-                    windowed::mean(gyr, samples.usable, half),
-                    windowed::variance(of_rate, half, GAP * interval),
-                ))
-            },
+            || windows(series(samples.acc), half, GAP * interval, |window| window.variance),
+            || samples.gyr.map(|gyr| windows(series(gyr), half, GAP * interval, |window| window)),
         );
         let (noise, from_initial) = reference_noise(&variance, (INITIAL / interval).round() as usize, half);
         Self { samples, variance, rate, noise, from_initial, interval, half }
@@ -126,7 +120,7 @@ impl<'a> RestDetector<'a> {
     fn runs(&self, threshold: f64) -> Vec<Range<usize>> {
         let quiet: Vec<bool> = self.variance.iter().map(|v| *v <= threshold).collect();
         let quiet = match &self.rate {
-            Some((rate, swing)) => without_turning(without_swings(quiet, swing, self.half), rate),
+            Some(rate) => without_turning(without_swings(quiet, rate, self.half), rate),
             None => quiet,
         };
         let mut rests = Vec::new();
@@ -208,12 +202,12 @@ fn mean_of_measured(values: &[f64]) -> f64 {
 
 /// Cuts out what swings about the vertical and comes back within a window. Less than a window of it is where a motion begins or ends.
 /// A gyroscope may be so noisy that it always seems to swing.
-fn without_swings(mut quiet: Vec<bool>, swing: &[f64], half: usize) -> Vec<bool> {
-    let at_rest = quiet.iter().zip(swing).filter(|(still, _)| **still);
-    let usual = median(at_rest.map(|(_, variance)| *variance).step_by(10).collect());
+fn without_swings(mut quiet: Vec<bool>, rate: &[Window], half: usize) -> Vec<bool> {
+    let at_rest = quiet.iter().zip(rate).filter(|(still, _)| **still);
+    let usual = median(at_rest.map(|(_, window)| window.variance).step_by(10).collect());
     let limit = (SWINGING * SWINGING).max(NOISY * usual.unwrap_or(0.0));
     let swings: Vec<bool> =
-        quiet.iter().zip(swing).map(|(still, variance)| *still && *variance > limit).collect();
+        quiet.iter().zip(rate).map(|(still, window)| *still && window.variance > limit).collect();
     let mut row = 0;
     for alike in swings.chunk_by(|a, b| a == b) {
         let rows = row..row + alike.len();
@@ -226,16 +220,16 @@ fn without_swings(mut quiet: Vec<bool>, swing: &[f64], half: usize) -> Vec<bool>
 }
 
 /// Cuts out what turns so smoothly that the accelerometer does not notice: about the vertical, or creeping.
-fn without_turning(quiet: Vec<bool>, rate: &[Vector3<f64>]) -> Vec<bool> {
+fn without_turning(quiet: Vec<bool>, rate: &[Window]) -> Vec<bool> {
     // Windows overlap, so every tenth says as much as all.
     let chosen: Vec<&Vector3<f64>> =
-        quiet.iter().zip(rate).filter(|(still, _)| **still).map(|(_, w)| w).step_by(10).collect();
+        quiet.iter().zip(rate).filter(|(still, _)| **still).map(|(_, w)| &w.mean).step_by(10).collect();
     let of_axis = |value: &dyn Fn(&Vector3<f64>) -> f64| median(chosen.iter().map(|w| value(w)).collect());
     let bias = Vector3::from_fn(|axis, _| of_axis(&|w| w[axis]).unwrap_or(0.0));
     let spread = of_axis(&|w| (w - bias).norm()).unwrap_or(0.0) / MEDIAN_SIZE;
     let limit = (TURNING * spread).clamp(TURNING_LIMITS.0, TURNING_LIMITS.1);
     let limit = limit * limit;
-    quiet.iter().zip(rate).map(|(still, w)| *still && (w - bias).norm_squared() <= limit).collect()
+    quiet.iter().zip(rate).map(|(still, w)| *still && (w.mean - bias).norm_squared() <= limit).collect()
 }
 
 /// Variance of the initial rest, or of the quietest tenth where the recording does not begin at rest.

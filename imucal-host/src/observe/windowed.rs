@@ -1,4 +1,4 @@
-//! Variance and mean of the window around each row.
+//! Mean and variance of the window around each row.
 //!
 //! Two running sums follow the ends of the window by the same additions; their difference is the window's sum. Nothing is kept of the
 //! rows between.
@@ -7,10 +7,19 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::rest::Samples;
+use crate::recording::Series;
 
 /// A window is used while this share of its rows is usable: dropouts are common, clipping is long.
 const USABLE_SHARE: f64 = 0.8;
+
+/// What the usable rows of a window come to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Window {
+    /// Their mean; zero where there is none.
+    pub mean: Vector3<f64>,
+    /// Their variance, sum over the axes; infinite where too few rows are usable, or time jumps.
+    pub variance: f64,
+}
 
 /// Rows around each row that its window holds.
 fn window(k: usize, half: usize, rows: usize) -> Range<usize> {
@@ -20,8 +29,8 @@ fn window(k: usize, half: usize, rows: usize) -> Range<usize> {
 /// Sums of the usable rows before one, and of the gaps. `origin` is a value near the data, so that differences of sums lose no digits
 /// that matter.
 #[derive(Clone, Copy)]
-struct RunningSquares<'a> {
-    samples: Samples<'a>,
+struct RunningSums<'a> {
+    series: Series<'a>,
     origin: Vector3<f64>,
     longest_gap: f64,
     row: usize,
@@ -31,23 +40,23 @@ struct RunningSquares<'a> {
     gaps: u32,
 }
 
-impl<'a> RunningSquares<'a> {
-    fn new(samples: Samples<'a>, longest_gap: f64) -> Self {
-        let first_usable = samples.acc.iter().zip(samples.usable).find(|(_, usable)| **usable);
+impl<'a> RunningSums<'a> {
+    fn new(series: Series<'a>, longest_gap: f64) -> Self {
+        let first_usable = series.values.iter().zip(series.usable).find(|(_, usable)| **usable);
         let origin = first_usable.map(|(value, _)| *value).unwrap_or_default();
         let sum = Vector3::zeros();
-        Self { samples, origin, longest_gap, row: 0, sum, square: 0.0, count: 0, gaps: 0 }
+        Self { series, origin, longest_gap, row: 0, sum, square: 0.0, count: 0, gaps: 0 }
     }
 
     /// Takes the rows up to `row`, which it does not hold itself.
     fn advance(&mut self, row: usize) {
-        let Samples { time, acc, usable, .. } = self.samples;
+        let Series { time, values, usable, .. } = self.series;
         for k in self.row..row {
             if k > 0 && time[k] - time[k - 1] > self.longest_gap {
                 self.gaps += 1;
             }
             if usable[k] {
-                let x = acc[k] - self.origin;
+                let x = values[k] - self.origin;
                 self.sum += x;
                 self.square += x.norm_squared();
                 self.count += 1;
@@ -57,58 +66,29 @@ impl<'a> RunningSquares<'a> {
     }
 }
 
-/// Variance of the usable rows around each row, sum over the axes; infinite where too few of them are, or time jumps.
-pub(super) fn variance(samples: Samples<'_>, half: usize, longest_gap: f64) -> Vec<f64> {
-    let rows = samples.acc.len();
-    let mut from = RunningSquares::new(samples, longest_gap);
+/// Something of the window of so many rows to each side of each row; a time above `longest_gap`, s, is a jump.
+pub(super) fn windows<T>(
+    series: Series<'_>,
+    half: usize,
+    longest_gap: f64,
+    of: impl Fn(Window) -> T,
+) -> Vec<T> {
+    let rows = series.values.len();
+    let mut from = RunningSums::new(series, longest_gap);
     let mut to = from;
     (0..rows)
         .map(|k| {
-            let w = window(k, half, rows);
-            from.advance(w.start);
-            to.advance(w.end);
+            let held = window(k, half, rows);
+            from.advance(held.start);
+            to.advance(held.end);
             let n = f64::from(to.count - from.count);
-            if to.gaps > from.gaps || n < USABLE_SHARE * w.len() as f64 {
-                return f64::INFINITY;
+            if n == 0.0 {
+                return of(Window { mean: Vector3::zeros(), variance: f64::INFINITY });
             }
             let mean = (to.sum - from.sum) / n;
-            ((to.square - from.square) / n - mean.norm_squared()).max(0.0)
-        })
-        .collect()
-}
-
-/// Sum of the usable rows before one.
-#[derive(Clone, Copy)]
-struct RunningSum<'a> {
-    values: &'a [Vector3<f64>],
-    usable: &'a [bool],
-    row: usize,
-    sum: Vector3<f64>,
-    count: u32,
-}
-
-impl RunningSum<'_> {
-    /// Takes the rows up to `row`, which it does not hold itself.
-    fn advance(&mut self, row: usize) {
-        for k in (self.row..row).filter(|k| self.usable[*k]) {
-            self.sum += self.values[k];
-            self.count += 1;
-        }
-        self.row = row;
-    }
-}
-
-/// Mean of the usable rows around each row; zero where there is none.
-pub(super) fn mean(values: &[Vector3<f64>], usable: &[bool], half: usize) -> Vec<Vector3<f64>> {
-    let rows = values.len();
-    let mut from = RunningSum { values, usable, row: 0, sum: Vector3::zeros(), count: 0 };
-    let mut to = from;
-    (0..rows)
-        .map(|k| {
-            let w = window(k, half, rows);
-            from.advance(w.start);
-            to.advance(w.end);
-            (to.sum - from.sum) / f64::from((to.count - from.count).max(1))
+            let broken = to.gaps > from.gaps || n < USABLE_SHARE * held.len() as f64;
+            let variance = ((to.square - from.square) / n - mean.norm_squared()).max(0.0);
+            of(Window { mean: mean + to.origin, variance: if broken { f64::INFINITY } else { variance } })
         })
         .collect()
 }
@@ -123,23 +103,23 @@ mod tests {
         let values: Vec<Vector3<f64>> =
             time.iter().map(|t| Vector3::new((3.0 * t).sin(), 9.8 + 0.1 * t, (7.0 * t).cos())).collect();
         let usable: Vec<bool> = (0..60).map(|k| k % 17 != 5 && !(20..25).contains(&k)).collect();
-        let samples = Samples { time: &time, acc: &values, gyr: None, temperature: None, usable: &usable };
+        let series = Series { time: &time, values: &values, usable: &usable, interval: 0.1 };
         let (half, rows) = (5, values.len());
-        let (variances, means) = (variance(samples, half, 1.0), mean(&values, &usable, half));
+        let found = windows(series, half, 1.0, |window| window);
         let mut infinite = 0;
-        for k in 0..rows {
+        for (k, found) in found.iter().enumerate() {
             let w = window(k, half, rows);
             let held: Vec<&Vector3<f64>> = w.clone().filter(|k| usable[*k]).map(|k| &values[k]).collect();
             let count = held.len() as f64;
             let centre = held.iter().copied().sum::<Vector3<f64>>() / count;
-            assert!((means[k] - centre).norm() < 1e-12, "{k}");
+            assert!((found.mean - centre).norm() < 1e-12, "{k}");
             // A gap counts at the row behind it.
             if w.contains(&40) || count < USABLE_SHARE * w.len() as f64 {
                 infinite += 1;
-                assert_eq!(variances[k], f64::INFINITY, "{k}");
+                assert_eq!(found.variance, f64::INFINITY, "{k}");
             } else {
                 let squares: f64 = held.iter().map(|value| (*value - centre).norm_squared()).sum();
-                assert!((variances[k] - squares / count).abs() < 1e-12, "{k}");
+                assert!((found.variance - squares / count).abs() < 1e-12, "{k}");
             }
         }
         assert!(infinite > 10 && infinite < rows, "{infinite}");
