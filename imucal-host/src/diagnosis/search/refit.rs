@@ -61,8 +61,8 @@ impl Fit {
     ///
     /// As [`Self::of`].
     pub fn with(self, scene: &ForwardModel<'_>, doses: Vec<Dose>) -> Result<Self, DiagnosisError> {
-        let acting = |doses: &'_ [Dose]| doses.iter().filter(|dose| dose.acts()).cloned().collect::<Vec<_>>();
-        if acting(&self.doses) == acting(&doses) {
+        let (before, now) = (self.doses.iter(), doses.iter());
+        if before.filter(|dose| dose.acts()).eq(now.filter(|dose| dose.acts())) {
             return Ok(Self { doses, ..self });
         }
         Self::of(scene, doses)
