@@ -93,8 +93,15 @@ pub enum Evidence {
     },
     /// Poses on a rig and their fit.
     Gimbals(Poses, Box<RigFit>),
-    /// Samples along a reference and their fit.
-    Reference(Vec<ReferencePose<f64>>, Box<RigFit>),
+    /// Samples along a reference.
+    Reference {
+        /// Samples used.
+        poses: Vec<ReferencePose<f64>>,
+        /// The row of each.
+        rows: Vec<usize>,
+        /// Their fit.
+        fit: Box<RigFit>,
+    },
 }
 
 /// A turn and the directions at its ends, calibrated axes.

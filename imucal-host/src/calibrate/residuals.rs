@@ -70,8 +70,8 @@ pub fn of(
             let at = poses.spans.iter().map(|span| 0.5 * (span.start + span.end));
             of_lengths(values, at, &fit.triad)
         }
-        Evidence::Reference(poses, _) => {
-            of_lengths(poses.iter().map(|pose| pose.value), (0..).map(f64::from), &fit.triad)
+        Evidence::Reference { poses, rows, .. } => {
+            of_lengths(poses.iter().map(|pose| pose.value), rows.iter().map(|row| time(*row)), &fit.triad)
         }
     }
 }

@@ -16,6 +16,10 @@ pub enum Follows {
     Direction,
     /// The rate of rotation.
     Rate,
+    /// The specific force.
+    Force,
+    /// The attitude that encoders show.
+    Attitude,
     /// Single observations that disagree with their neighbours.
     Neighbours,
     /// The clock of the samples.
@@ -35,6 +39,8 @@ impl Follows {
             Self::Temperature => "temperature",
             Self::Direction => "direction",
             Self::Rate => "rate",
+            Self::Force => "force",
+            Self::Attitude => "attitude",
             Self::Neighbours => "neighbours",
             Self::Clock => "clock",
             Self::Field => "field",

@@ -71,7 +71,7 @@ impl BoardFit {
             Evidence::Shell { .. }
             | Evidence::Motions { .. }
             | Evidence::Gimbals(..)
-            | Evidence::Reference(..) => None,
+            | Evidence::Reference { .. } => None,
             Evidence::Turns(turns) => {
                 let mut known: Vec<KnownTurn> = turns.iter().map(KnownTurn::of).collect();
                 while known.iter().map(|turn| turn.blocks.len()).sum::<usize>() > usize::from(room.blocks) {

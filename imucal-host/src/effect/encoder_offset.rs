@@ -1,9 +1,7 @@
 //! The encoders' zeros are off: `rig.encoder_offset`.
 
 use super::{Act, Effect, Machine, Needs, Parameter, Words};
-
-/// Names of the gimbals, outermost first.
-const GIMBALS: [&str; 3] = ["outer", "middle", "inner"];
+use crate::recording::GIMBALS;
 
 pub(super) fn effect() -> Effect {
     let words = Words {

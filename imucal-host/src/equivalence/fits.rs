@@ -48,7 +48,7 @@ pub fn compare(recording: &Recording, outcome: &SensorOutcome) -> Option<FitEqui
             _ => attitude(data, fit, FULL_WITH_SENSITIVITY),
         },
         Evidence::Gimbals(poses, fit) => known_attitudes::on_gimbals(outcome.kind, poses, fit),
-        Evidence::Reference(poses, fit) => known_attitudes::along_reference(outcome.kind, poses, fit),
+        Evidence::Reference { poses, fit, .. } => known_attitudes::along_reference(outcome.kind, poses, fit),
     }
 }
 

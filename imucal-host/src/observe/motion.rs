@@ -136,6 +136,15 @@ impl MotionData {
         self
     }
 
+    /// The same motion with each of its rates altered.
+    #[must_use]
+    pub fn altered(&self, rate: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
+        let size = self.samples.iter().take_while(|sample| sample.block == 0).count();
+        let samples = self.samples.iter().map(|sample| (rate(&sample.rate), sample.held));
+        let (blocks, _) = compression::blocks(samples, size as u16, |_| ());
+        Self { blocks, ..self.clone() }
+    }
+
     /// The motion as the model takes it.
     pub fn motion(&self) -> Motion<'_, f64> {
         Motion {

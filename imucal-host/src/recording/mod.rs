@@ -43,7 +43,7 @@ pub use self::{
     parts::Source,
     place::Place,
     read_error::ReadError,
-    samples::Samples,
+    samples::{GIMBALS, Samples},
     sensor_kind::SensorKind,
     series::Series,
     simulated::{Simulated, Stream},

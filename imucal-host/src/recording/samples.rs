@@ -19,6 +19,9 @@ use super::{
     warning::Warning,
 };
 
+/// A rig's gimbals, outermost first.
+pub const GIMBALS: [&str; 3] = ["outer", "middle", "inner"];
+
 /// Samples in the units of a manifest, as the columns of a file are; all that are there have as many rows as `time`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Samples {

@@ -16,7 +16,7 @@ use crate::{
         Calibration, FitSummary, SegmentationReport, SensorOutcome, fit::compare::Comparison,
         outcome::RigFindings,
     },
-    recording::{SensorKind, unit::STANDARD_GRAVITY},
+    recording::{GIMBALS, SensorKind, unit::STANDARD_GRAVITY},
     store::StoredNonlinearity,
 };
 
@@ -258,7 +258,7 @@ fn write_rig(text: &mut String, rig: &RigFindings) -> fmt::Result {
         let about = |k: usize| measured_degrees(tilt[k], std[k]);
         writeln!(text, "  of the rig: base tilted by {} about x and {} about y", about(0), about(1))?;
     }
-    for (name, (source, std)) in ["outer", "middle"].into_iter().zip(rig.sources.iter().flatten()) {
+    for (name, (source, std)) in GIMBALS.into_iter().zip(rig.sources.iter().flatten()) {
         let parts: Vec<String> = (0..3).map(|k| measure(source[k], std[k])).collect();
         writeln!(text, "  of the rig: hard iron on the {name} gimbal {} uT", parts.join(", "))?;
     }

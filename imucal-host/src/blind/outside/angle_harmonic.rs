@@ -7,11 +7,10 @@
 use super::{amplitudes, mechanism, of, vector};
 use crate::{
     effect::{Act, Effect, Truth},
-    recording::SensorKind,
+    recording::{GIMBALS, SensorKind},
 };
 
 const NAMES: [&str; 6] = ["x_c", "y_c", "z_c", "x_s", "y_s", "z_s"];
-const GIMBALS: [&str; 3] = ["outer", "middle", "inner"];
 
 /// Alters the truth of a row.
 type Alter = fn(&[f64], &mut Truth);

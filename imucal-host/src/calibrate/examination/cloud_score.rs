@@ -10,18 +10,9 @@ use nalgebra::{DMatrix, DVector, SVector};
 use super::{
     norm_residual::{Shape, Shell, Term, terms},
     residual_driver::Course,
-    tested::Tested,
+    tested::{Tested, least_of_many},
 };
-use crate::calibrate::{
-    fit::blocked_score::{BlockedScore, Rows},
-    suspicion::Follows,
-};
-
-/// Share of a cloud's squared residual below which nothing is said: of so many points any slow noise passes a test, and
-/// what follows time is slow; what follows direction comes back with it.
-fn least_explained(follows: Follows) -> f64 {
-    if follows == Follows::Direction { 0.015 } else { 0.04 }
-}
+use crate::calibrate::fit::blocked_score::{BlockedScore, Rows};
 
 /// All tests of a cloud's residual that say something; none where the fit's derivatives are not of full rank.
 pub(super) fn tested<const P: usize>(
@@ -37,12 +28,12 @@ pub(super) fn tested<const P: usize>(
     let made = |of: Range<usize>| rows(shell, form, &columns, of);
     let Some(score) = BlockedScore::new(samples, independent, &made) else { return Vec::new() };
     let test = |term: &Term<'_>| {
-        let (index, least) = (columns.index(term)?, least_explained(term.follows));
+        let (index, least) = (columns.index(term)?, least_of_many(term.follows));
         let score = match term.course.and_then(Course::as_step) {
             Some(step) => score.test_step(index, step.part, least),
             None => score.test(index, least),
         };
-        Some(Tested { follows: term.follows, name: term.name.clone(), score: score? })
+        Some(Tested::new(term.follows, term.name.clone(), score?))
     };
     terms.iter().filter_map(test).collect()
 }

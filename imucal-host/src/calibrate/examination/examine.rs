@@ -25,7 +25,9 @@ use rayon::prelude::*;
 use super::{
     cloud_score, gyr_residual,
     gyr_residual::Columns,
+    motion_residual,
     norm_residual::{Shell, terms},
+    pose_score,
     residual_driver::Course,
     tested::{Tested, judged},
     turning_rest::Turning,
@@ -33,14 +35,19 @@ use super::{
 use crate::{
     calibrate::{
         fit::{
+            gyr_rig_fit::MotionFit,
+            rig_fit::RigFit,
             rows::Rows,
             score_test::{Score, ScoreTest, upper_tail},
         },
-        outcome::{Calibration, Evidence, FitSummary, KnownTurn, SensorOutcome},
+        outcome::{Calibration, Evidence, FitSummary, KnownTurn, SensorOutcome, entry_name},
         suspicion::{Follows, Status, Suspicion},
     },
+    noise::Span,
     observe::{
         held,
+        motion::MotionData,
+        pose::Poses,
         quantum::ConverterSteps,
         rest_halves::{self, MeanVariance},
     },
@@ -140,7 +147,12 @@ impl Scene<'_> {
                 }
             }
             Some(Evidence::Turns(turns)) => self.of_turns(turns, fit, accelerometer_rms),
-            _ => Vec::new(),
+            Some(Evidence::Motions { data, fit: of_motions }) => self.of_motions(data, of_motions, fit),
+            Some(Evidence::Gimbals(poses, of_poses)) => self.of_poses((outcome.kind, poses, of_poses), fit),
+            Some(Evidence::Reference { poses, rows, fit }) => {
+                pose_score::along_reference((outcome.kind, poses, fit), &self.courses(rows))
+            }
+            None => Vec::new(),
         }
     }
 
@@ -158,6 +170,21 @@ impl Scene<'_> {
         Course::all(at(&self.recording.time), self.recording.temperature.as_deref().map(at))
     }
 
+    fn of_poses(&self, of: (SensorKind, &Poses, &RigFit), fit: &FitSummary) -> Vec<Suspicion> {
+        let time = &self.recording.time;
+        let middle = |span: &Span| time.partition_point(|t| *t < 0.5 * (span.start + span.end));
+        let at: Vec<usize> = of.1.spans.iter().map(middle).collect();
+        let name = |pose: usize| format!("the pose at {:.0} s", time[at[pose]]);
+        pose_score::of_rig(of, fit.warm_parameters(), &self.courses(&at), &name)
+    }
+
+    fn of_motions(&self, data: &[MotionData], of: &MotionFit, fit: &FitSummary) -> Vec<Suspicion> {
+        let at: Vec<usize> = data.iter().map(|motion| motion.rows.start.midpoint(motion.rows.end)).collect();
+        let name = |motion: usize| format!("the motion at {:.0} s", self.recording.time[at[motion]]);
+        let on_rig = self.recording.gimbal.is_some();
+        motion_residual::examine((data, of), fit, &self.courses(&at), on_rig.then_some(&name))
+    }
+
     fn of_norm<const P: usize>(
         &self,
         kind: SensorKind,
@@ -170,7 +197,10 @@ impl Scene<'_> {
         };
         let std: Vec<f64> =
             form.entries().iter().map(|entry| entry_of(&shell.std.gain, &shell.std.bias, *entry)).collect();
-        judged(tests, form.entries(), &std).into_iter().chain(further.into_iter().flatten()).collect()
+        judged(tests, form.entries(), &std, entry_name)
+            .into_iter()
+            .chain(further.into_iter().flatten())
+            .collect()
     }
 
     /// Score tests of an accelerometer's rests, and what else speaks against them.
@@ -193,34 +223,15 @@ impl Scene<'_> {
             .filter_map(|term| {
                 let columns = term.columns(0, &directions);
                 let score = test.test(&columns, columns.ncols())?;
-                Some(Tested { follows: term.follows, name: term.name, score })
+                Some(Tested::new(term.follows, term.name, score))
             })
             .collect();
         let name = |rest: usize| format!("the rest at {:.0} s", self.recording.time[at[rest]]);
-        tests.extend(self.single(&test, 1, count, &name));
+        tests.extend(Tested::alone(&test, 1, 1, count, &name));
         let excess = self.excess_of_rests(shell, &directions, &rows.residuals, P + shell.warm);
         let turning =
             self.turning(shell.norm).and_then(|t| t.of_accelerometer(shell.std.gain.diagonal().min()));
         Some((tests, [excess, turning]))
-    }
-
-    /// Each observation of so many residuals against all others.
-    fn single(
-        &self,
-        test: &ScoreTest,
-        each: usize,
-        residuals: usize,
-        name: &dyn Fn(usize) -> String,
-    ) -> Vec<Tested> {
-        let count = residuals / each;
-        // A direction has two residuals though its chord has three.
-        let rank = if each == 3 { 2 } else { each };
-        let alone = |k: usize| {
-            let score = test.test_alone(each * k..each * (k + 1), rank)?;
-            let name = format!("{} alone, against its neighbours", name(k));
-            Some(Tested { follows: Follows::Neighbours, name, score })
-        };
-        (0..count).filter_map(alone).collect()
     }
 
     fn excess_of_rests(
@@ -319,13 +330,18 @@ impl Scene<'_> {
             .map(|(columns, score)| Tested::of(columns, score.clone()))
             .collect();
         let name = |k: usize| format!("the turn at {:.0} s", self.recording.time[at[k]]);
-        tests.extend(self.single(&test, 3, count, &name));
+        // A direction has two residuals though its chord has three.
+        tests.extend(Tested::alone(&test, 3, 2, count, &name));
         let std: Vec<f64> =
             FULL_GAIN.entries().iter().map(|entry| entry_of(&fit.gain_std, &fit.bias_std, *entry)).collect();
         let excess = self.excess_of_turns(turns, fit, &rows.residuals, accelerometer_rms);
         let turning =
             self.turning(STANDARD_GRAVITY).and_then(|turning| turning.of_gyroscope(fit.bias_std.min()));
-        judged(tests, FULL_GAIN.entries(), &std).into_iter().chain(excess).chain(turning).collect()
+        judged(tests, FULL_GAIN.entries(), &std, entry_name)
+            .into_iter()
+            .chain(excess)
+            .chain(turning)
+            .collect()
     }
 
     /// How well rests determine the bias: no better than a step of the converter allows, rad/s.

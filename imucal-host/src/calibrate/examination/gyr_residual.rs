@@ -47,13 +47,13 @@ pub struct Columns {
 }
 
 /// A function of a rate, and what a residual with it follows.
-type Alteration = (&'static str, fn(f64) -> f64);
+pub(super) type Alteration = (&'static str, fn(f64) -> f64);
 
 /// Name of the columns of a bias that is another in motion.
 pub const MOTION: &str = "motion, as a bias makes it that is another at rest";
 
 /// See the module's equation.
-const ALTERATIONS: [Alteration; 4] = [
+pub(super) const ALTERATIONS: [Alteration; 4] = [
     ("rate, as cubic terms or soft saturation make it", |w| w * w * w),
     ("rate, as quadratic terms or rectified vibration make it", |w| w * w),
     ("rate, as gains make it that differ by sign", f64::abs),

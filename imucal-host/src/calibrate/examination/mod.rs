@@ -10,7 +10,10 @@
 mod cloud_score;
 pub mod examine;
 pub mod gyr_residual;
+pub mod motion_residual;
 pub mod norm_residual;
+pub mod pose_residual;
+mod pose_score;
 pub mod residual_driver;
 mod tested;
 pub mod turning_rest;

@@ -52,6 +52,8 @@ pub struct ReferenceFit {
     pub fit: RigFit,
     /// Samples used.
     pub kept: Vec<ReferencePose<f64>>,
+    /// Their indices.
+    pub used: Vec<usize>,
     /// Indices left out, with their size in robust standard deviations.
     pub left_out: Vec<(usize, f64)>,
 }
@@ -112,7 +114,7 @@ pub fn fit<const P: usize>(
     let by_lag: Vec<_> = used.iter().filter_map(|k| tracked.by_lag.get(*k).copied()).collect();
     let model = UnifiedModel { poses: &kept, axes: (), base, terms, held };
     let fit = summarise(&Solved { model, solver, gauge }, &by_lag);
-    ReferenceFit { fit, kept, left_out }
+    ReferenceFit { fit, kept, used, left_out }
 }
 
 /// Rms residual of an axis at the plain fit.

@@ -210,7 +210,13 @@ impl RigFit {
         self.report.step(name, adds, &self.entries)
     }
 
-    /// Parameters that were estimated and not held.
+    /// Entries that were estimated and not held.
+    pub fn free_entries(&self) -> Vec<u8> {
+        let held = |entry: &u8| self.held.iter().any(|(held, _)| held == entry);
+        self.entries.iter().copied().filter(|entry| !held(entry)).collect()
+    }
+
+    /// How many these are.
     pub fn free(&self) -> usize {
         self.report.parameters
     }

@@ -25,6 +25,8 @@ use super::rows::{inverse, parts};
 
 /// A column is distinguished from the model's own where this share of its length is left by their projection.
 const LEAST_LEFT: f64 = 1e-4;
+/// One of several is distinguished from all others where this share of its square is left: of less, noise makes anything.
+const LEAST_DISTINCT: f64 = 1e-4;
 
 /// A fit's residuals and derivatives, made ready for tests.
 #[derive(Clone, Debug)]
@@ -66,6 +68,26 @@ impl ScoreTest {
     /// model has them already, or too few residuals are left.
     pub fn test(&self, columns: &DMatrix<f64>, rank: usize) -> Option<Score> {
         self.judged(&self.optimum.regress(&self.products(columns))?, rank)
+    }
+
+    /// Those of some columns that neither the model has nor others of them.
+    pub fn distinct(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let Products { own, model, .. } = self.products(columns);
+        let mut left = &own - model.tr_mul(&(&self.optimum.inverse * &model));
+        let mut kept = Vec::new();
+        // The column that has most left is taken, and what is like it goes from the others.
+        while let Some((_, next)) = (0..columns.ncols())
+            .filter(|k| !kept.contains(k) && own[(*k, *k)] > 0.0)
+            .map(|k| (left[(k, k)] / own[(k, k)], k))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .filter(|(share, _)| *share > LEAST_DISTINCT)
+        {
+            let along = left.column(next) / left[(next, next)];
+            left -= along * left.row(next).into_owned();
+            kept.push(next);
+        }
+        kept.sort_unstable();
+        columns.select_columns(&kept)
     }
 
     /// Tests whether some residuals, which lie next to each other, follow nothing but themselves: a column for each.
@@ -250,6 +272,21 @@ mod tests {
         let (alone, by_columns) = (test.test_alone(30..32, 2).unwrap(), test.test(&columns, 2).unwrap());
         assert!((alone.p / by_columns.p - 1.0).abs() < 1e-9, "{alone:?} {by_columns:?}");
         assert!((alone.shift - by_columns.shift).amax() < 1e-12);
+    }
+
+    #[test]
+    fn of_columns_that_are_alike_one_is_kept_and_of_the_model_s_own_none() {
+        let (test, parabola) = parabola(0.0, 0.0, 1);
+        let columns = DMatrix::from_fn(ROWS, 4, |row, k| match k {
+            0 => 3.0,
+            1 => 0.0,
+            2 => parabola[(row, 0)],
+            _ => 2.0 * parabola[(row, 0)] + 1.0,
+        });
+        let kept = test.distinct(&columns);
+        assert_eq!(kept.ncols(), 1);
+        assert!(test.test(&kept, 1).is_some());
+        assert_eq!(test.distinct(&columns.columns(0, 2).into_owned()).ncols(), 0);
     }
 
     #[test]

@@ -30,6 +30,7 @@ use crate::{
     calibrate::{
         fit::reference_fit,
         outcome::{Calibration, Evidence, FitSummary, Refused, SensorOutcome},
+        suspicion::{Follows, Suspicion},
     },
     effect::axis_swap::{columns, nearest, signed_permutation},
     observe::{motion, pose},
@@ -113,7 +114,8 @@ fn wrong_unit(recording: &Recording, calibration: &mut Calibration, factor: f64)
 fn undone(calibration: &mut Calibration) {
     for kind in SensorKind::ALL {
         // Along a reference the field's direction is determined with the gain, up to both reversed: see `along_reference`.
-        let directed = |outcome: &&SensorOutcome| !matches!(outcome.evidence, Some(Evidence::Reference(..)));
+        let directed =
+            |outcome: &&SensorOutcome| !matches!(outcome.evidence, Some(Evidence::Reference { .. }));
         let fit = calibration.sensor(kind).filter(directed).and_then(SensorOutcome::passed);
         let Some((code, _)) = fit.filter(|fit| fit.rig.is_some()).map(order).filter(|(code, _)| *code != 0)
         else {
@@ -121,11 +123,31 @@ fn undone(calibration: &mut Calibration) {
         };
         let mirrored = signed_permutation(code).is_some_and(|p| p.determinant() < 0.0);
         let cause = if mirrored { "it is mirrored" } else { "or the unit sits turned on the table" };
-        calibration.warnings.push(format!(
-            "{kind}.axis_swap: {}, {cause}; the gain, determined from the rig's attitudes, corrects it",
-            columns(kind, code)
-        ));
+        let order = format!("{kind}.axis_swap: {}, {cause}", columns(kind, code));
+        let others = refused_along_encoders(calibration, kind);
+        if others.is_empty() {
+            let warning = format!("{order}; the gain, determined from the rig's attitudes, corrects it");
+            calibration.warnings.push(warning);
+        } else if let Some(outcome) = calibration.sensors.iter_mut().find(|outcome| outcome.kind == kind) {
+            let detail = format!(
+                "{order}, or the encoders are read wrongly: {others} is refused along the same encoders; check [rig] axes, \
+                 and the order, signs and unit of the encoders"
+            );
+            outcome.suspicions.push(Suspicion { follows: Follows::Attitude, detail });
+        }
     }
+}
+
+/// The others that were fitted along the rig's encoders, where all are refused.
+fn refused_along_encoders(calibration: &Calibration, kind: SensorKind) -> String {
+    let along = |outcome: &&SensorOutcome| {
+        outcome.kind != kind && outcome.fit.as_ref().is_some_and(|fit| fit.rig.is_some())
+    };
+    let others: Vec<&SensorOutcome> = calibration.sensors.iter().filter(along).collect();
+    if others.iter().any(|outcome| outcome.verdict.is_ok()) {
+        return String::new();
+    }
+    others.iter().map(|outcome| outcome.kind.to_string()).collect::<Vec<_>>().join(", ")
 }
 
 /// What a sensor's columns hold by its gain, and the angle to it.
@@ -185,7 +207,8 @@ fn aligned(recording: &Recording, calibration: &Calibration) -> Option<Aligned> 
 /// on its body: each fit takes its sensor for right-handed, and gives its axes and the direction of what it measures.
 fn along_reference(recording: &Recording, calibration: &Calibration) -> Option<Aligned> {
     let outcome = calibration.sensor(SensorKind::Mag)?;
-    let (fit, Evidence::Reference(_, found)) = (outcome.passed()?, outcome.evidence.as_ref()?) else {
+    let (fit, Evidence::Reference { fit: found, .. }) = (outcome.passed()?, outcome.evidence.as_ref()?)
+    else {
         return None;
     };
     let force = force_along_reference(recording)?;
@@ -331,7 +354,7 @@ fn unchecked(calibration: &mut Calibration, turned: bool, aligned: bool) {
         match evidence {
             // On gimbals the site's field is known.
             Some(Evidence::Gimbals(..)) => {}
-            Some(Evidence::Reference(..)) => {
+            Some(Evidence::Reference { .. }) => {
                 alone.push((SensorKind::Mag, "an accelerometer and [site] latitude_deg"));
             }
             _ => alone.push((

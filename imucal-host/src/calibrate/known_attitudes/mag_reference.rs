@@ -48,6 +48,8 @@ const FOR_LAG: usize = 1500;
 /// What a magnetometer is calibrated from.
 struct Samples {
     tracked: Tracked,
+    /// The row of each.
+    rows: Vec<usize>,
     /// Distinct usable samples, with or without a reference.
     all: usize,
     notes: Vec<String>,
@@ -121,7 +123,7 @@ fn samples(recording: &Recording, sensor: &Triple, usable: &[bool], attitudes: &
     let step = (rows.len() / FOR_LAG).max(1);
     let some = |lag: f64| at(lag).into_iter().step_by(step).collect::<Vec<_>>();
     let lag = Lag::of(|lag| rms(&some(lag)), |lag| rms(&at(lag)));
-    let tracked = match lag {
+    let (tracked, rows) = match lag {
         Lag::Found(lag) => {
             let [before, now, after] = [-ASIDE, 0.0, ASIDE].map(|aside| later(lag + aside));
             let (found, rows) = pose::along_reference(&sensor.values, usable, &now);
@@ -130,11 +132,11 @@ fn samples(recording: &Recording, sensor: &Triple, usable: &[bool], attitudes: &
                 let moved = c_p_t(&after, *row).zip(c_p_t(&before, *row));
                 moved.map_or_else(Matrix3::zeros, |(after, before)| (after - before) / (2.0 * ASIDE))
             };
-            Tracked { poses: found, by_lag: rows.iter().map(slope).collect() }
+            (Tracked { poses: found, by_lag: rows.iter().map(slope).collect() }, rows)
         }
-        Lag::OutOfReach => Tracked { poses: plain, by_lag: Vec::new() },
+        Lag::OutOfReach => (Tracked { poses: plain, by_lag: Vec::new() }, rows),
     };
-    Samples { tracked, all, notes: vec![lag.note()] }
+    Samples { tracked, rows, all, notes: vec![lag.note()] }
 }
 
 fn outcome(
@@ -163,7 +165,11 @@ fn outcome(
             model: name,
             verdict: Ok(()),
             fit: Some(summary),
-            evidence: Some(Evidence::Reference(found.kept.clone(), Box::new(found.fit.clone()))),
+            evidence: Some(Evidence::Reference {
+                poses: found.kept.clone(),
+                rows: found.used.iter().map(|k| samples.rows[*k]).collect(),
+                fit: Box::new(found.fit.clone()),
+            }),
         },
         Err(refusal) => refused(name, refusal, Some(summary)),
     }

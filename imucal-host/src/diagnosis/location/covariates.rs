@@ -15,7 +15,7 @@ use super::{
 use crate::{
     diagnosis::residual::{block::Block, forward_model::ForwardModel},
     effect::Swing,
-    recording::SensorKind,
+    recording::{GIMBALS, SensorKind},
 };
 
 /// Harmonics of a gimbal's angle.
@@ -88,7 +88,7 @@ pub fn drivers(scene: &ForwardModel<'_>, given: &[Vec<Vector3<f64>>; 3]) -> Vec<
 /// Angles, rates, accelerations and directions of approach of a rig's gimbals, block by block.
 fn of_gimbals(swings: &[[Swing; 3]]) -> Vec<Covariate> {
     let mut drivers = Vec::new();
-    for (gimbal, name) in ["outer", "middle", "inner"].iter().enumerate() {
+    for (gimbal, name) in GIMBALS.iter().enumerate() {
         let mut functions = Vec::new();
         for (order, harmonic) in HARMONICS.iter().enumerate() {
             let angle = |s: &[Swing; 3]| (order + 1) as f64 * s[gimbal].angle;
@@ -118,7 +118,7 @@ type OfSwing = fn(&Swing) -> f64;
 
 fn per_gimbal(name: &str, swings: &[[Swing; 3]], of: &[(&str, OfSwing)]) -> Covariate {
     let mut functions = Vec::new();
-    for (gimbal, which) in ["outer", "middle", "inner"].iter().enumerate() {
+    for (gimbal, which) in GIMBALS.iter().enumerate() {
         for (detail, value) in of {
             let values = swings.iter().map(|s| value(&s[gimbal])).collect();
             functions.push(Function::new(format!("{which} gimbal, {detail}"), values));
@@ -129,7 +129,7 @@ fn per_gimbal(name: &str, swings: &[[Swing; 3]], of: &[(&str, OfSwing)]) -> Cova
 
 /// The direction from which each gimbal came to where it stands.
 fn approach(swings: &[[Swing; 3]]) -> Covariate {
-    let functions = ["outer", "middle", "inner"].iter().enumerate().map(|(gimbal, which)| {
+    let functions = GIMBALS.iter().enumerate().map(|(gimbal, which)| {
         let mut last = 0.0;
         let values = swings
             .iter()

@@ -14,7 +14,7 @@
 use super::term::{Driver, Formulated, Shape};
 use crate::{
     effect::{XYZ, si},
-    recording::SensorKind,
+    recording::{GIMBALS, SensorKind},
 };
 
 /// Periods a turn of a sinusoid in an angle.
@@ -73,7 +73,7 @@ pub fn formulas(kind: SensorKind, held: Held, taken: &dyn Fn(&Driver) -> Taken) 
         of_temperature(mean, &[vectors, components].concat(), &mut all);
     }
     if held.gimbals {
-        for gimbal in ["outer", "middle", "inner"] {
+        for gimbal in GIMBALS {
             of_gimbal(gimbal, taken, &mut all);
         }
     }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::pairs::Pairs;
 use crate::{
     effect::{Machine, Truth},
-    recording::{Recording, SensorKind, check::integrity::Integrity, manifest::Axis},
+    recording::{GIMBALS, Recording, SensorKind, check::integrity::Integrity, manifest::Axis},
     simulator::{Motion, gimbal::direction, programme::wrap, recent::Recent, truth::on_rig},
 };
 
@@ -93,17 +93,16 @@ impl Reading {
             };
             parts.push(format!("[rig] axes = [{}]", self.axes.each_ref().map(name).join(", ")));
         }
-        let names = ["outer", "middle", "inner"];
         if self.columns != [0, 1, 2] {
-            let read: Vec<String> = names
+            let read: Vec<String> = GIMBALS
                 .iter()
                 .zip(self.columns)
-                .map(|(to, from)| format!("{to} from gimbal_{}", names[from]))
+                .map(|(to, from)| format!("{to} from gimbal_{}", GIMBALS[from]))
                 .collect();
             parts.push(format!("columns {}", read.join(", ")));
         }
         let reversed: Vec<&str> =
-            names.iter().zip(self.signs).filter(|(_, sign)| *sign < 0.0).map(|(name, _)| *name).collect();
+            GIMBALS.iter().zip(self.signs).filter(|(_, sign)| *sign < 0.0).map(|(name, _)| *name).collect();
         if !reversed.is_empty() {
             parts.push(format!("{} reversed", reversed.join(" and ")));
         }

@@ -1,0 +1,130 @@
+//! Score tests of fits to known attitudes: poses on a rig one by one, samples along a reference by blocks of neighbours.
+
+use std::ops::Range;
+
+use imucal_core::model::{
+    rig::{GimbalPose, ReferencePose},
+    unified::UNIFIED,
+};
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use super::{
+    pose_residual::{PoseFit, of_courses, of_direction},
+    residual_driver::Course,
+    tested::{Tested, least_of_many},
+};
+use crate::{
+    calibrate::{
+        fit::{
+            blocked_score::{BlockedScore, Rows},
+            rig_fit::RigFit,
+            rows as residual,
+            score_test::ScoreTest,
+        },
+        known_attitudes::rig::unified_name,
+        suspicion::{Follows, Suspicion},
+    },
+    observe::pose::Poses,
+    recording::{GIMBALS, SensorKind},
+};
+
+/// What speaks against a fit to poses on a rig. `warm` parameters of temperature were estimated with it; `name` says which
+/// pose it is.
+pub(super) fn of_rig(
+    (kind, poses, fit): (SensorKind, &Poses, &RigFit),
+    warm: usize,
+    courses: &[Course],
+    name: &dyn Fn(usize) -> String,
+) -> Vec<Suspicion> {
+    let of = PoseFit { poses: &poses.poses, axes: poses.axes, parameters: &fit.parameters };
+    let count = poses.poses.len();
+    let (rows, free) = (of.rows(0..count), fit.free_entries());
+    let jacobian = rows.derivatives(3 * count, &indices(&free));
+    let Some(test) = ScoreTest::new(&rows.residuals, jacobian, (3 * count).saturating_sub(warm)) else {
+        return Vec::new();
+    };
+    let terms: Vec<_> = of_direction().chain(of_courses(kind, courses)).collect();
+    let mut tests: Vec<Tested> = terms
+        .into_par_iter()
+        .filter_map(|term| {
+            let columns = of.columns(&term, 0..count, &rows);
+            let score = test.test(&columns, columns.ncols())?;
+            Some(Tested::new(term.follows, term.name, score))
+        })
+        .collect();
+    tests.extend(of_machine((kind, &of), &test, &rows));
+    tests.extend(Tested::alone(&test, 3, 3, 3 * count, name));
+    judged(tests, fit, &free)
+}
+
+/// Places of entries in the unified model.
+fn indices(entries: &[u8]) -> Vec<usize> {
+    entries.iter().map(|entry| usize::from(*entry)).collect()
+}
+
+/// Tests of what belongs to the rig, as far as the model has nothing like it.
+fn of_machine(
+    (kind, fit): (SensorKind, &PoseFit<'_, GimbalPose<f64>>),
+    test: &ScoreTest,
+    rows: &residual::Rows<UNIFIED>,
+) -> Vec<Tested> {
+    let encoder = |gimbal: usize| {
+        let name = "encoder's angle, as an error of its zero or one of a period a turn makes it";
+        (format!("the {} {name}", GIMBALS[gimbal]), fit.encoder(gimbal))
+    };
+    let joint = |gimbal: usize| {
+        let (parent, own) = (GIMBALS[gimbal - 1], GIMBALS[gimbal]);
+        let name = format!("attitude, as axes of the {parent} and the {own} gimbal make it that are oblique");
+        Some((name, fit.oblique(gimbal)?))
+    };
+    let iron = |gimbal: usize| {
+        let name = format!("attitude, as soft iron on the {} gimbal makes it", GIMBALS[gimbal]);
+        (name, fit.soft_iron(gimbal, rows))
+    };
+    let iron = (0..2).filter(|_| kind == SensorKind::Mag).map(iron);
+    let all = (0..3).map(encoder).chain((1..3).filter_map(joint)).chain(iron);
+    all.filter_map(|(name, columns)| {
+        let columns = test.distinct(&columns);
+        let score = (columns.ncols() > 0).then(|| test.test(&columns, columns.ncols()))??;
+        Some(Tested::new(Follows::Attitude, name, score))
+    })
+    .collect()
+}
+
+/// What speaks against a magnetometer's fit along a reference: what changes with time or temperature. Direction is not tested, since a
+/// reference's own errors and the field of a room depend on attitude and place.
+pub(super) fn along_reference(
+    (kind, poses, fit): (SensorKind, &[ReferencePose<f64>], &RigFit),
+    courses: &[Course],
+) -> Vec<Suspicion> {
+    let of_poses = PoseFit { poses, axes: (), parameters: &fit.parameters };
+    let free = fit.free_entries();
+    let entries = indices(&free);
+    let terms = of_courses(kind, courses);
+    let made = |of: Range<usize>| {
+        let rows = of_poses.rows(of.clone());
+        let count = rows.residuals.len();
+        Rows {
+            columns: terms.iter().map(|term| of_poses.columns(term, of.clone(), &rows)).collect(),
+            jacobian: rows.derivatives(count, &entries),
+            residual: DVector::from_vec(rows.residuals),
+        }
+    };
+    let Some(score) = BlockedScore::new(poses.len(), 3 * poses.len(), &made) else { return Vec::new() };
+    let tests = terms.iter().enumerate().filter_map(|(index, term)| {
+        let score = score.test(index, least_of_many(term.follows))?;
+        let change = of_poses.change(term, score.coefficients.as_slice());
+        let change = change.map(|all| DVector::from_iterator(free.len(), entries.iter().map(|k| all[*k])));
+        Some(Tested { change, ..Tested::new(term.follows, term.name.clone(), score) })
+    });
+    judged(tests.collect(), fit, &free)
+}
+
+/// Those of the sensor's own entries: what belongs to the rig is not its calibration.
+fn judged(tests: Vec<Tested>, fit: &RigFit, free: &[u8]) -> Vec<Suspicion> {
+    let of_sensor = |entry: &u8| matches!(entry, 0..12 | 23..);
+    let std = |entry: &u8| fit.std(*entry).filter(|_| of_sensor(entry)).unwrap_or(0.0);
+    let std: Vec<f64> = free.iter().map(std).collect();
+    super::tested::judged(tests, free, &std, unified_name)
+}
