@@ -123,7 +123,7 @@ fn alignment(found: &Alignment) -> Value {
         "dip_std": found.dip.1,
         "dip_rms": found.rms,
         "dip_held_out_rms": found.held_out_rms,
-        "rests": found.rests,
+        "rests": found.rests.len(),
         "unit": "rad",
     })
 }

@@ -11,21 +11,16 @@
 
 use std::{ops::Range, sync::OnceLock};
 
-use imucal_core::{
-    model::{
-        Parameterisation,
-        norm::NormModel,
-        parameterisation::{DIAGONAL, FULL_GAIN, UPPER_TRIANGULAR},
-    },
-    triad::Triad,
+use imucal_core::model::{
+    Parameterisation,
+    norm::NormModel,
+    parameterisation::{DIAGONAL, UPPER_TRIANGULAR},
 };
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::{
-    cloud_score, gyr_residual,
-    gyr_residual::Columns,
-    motion_residual,
+    cloud_score, dip_residual, motion_residual,
     norm_residual::{Shell, terms},
     pose_score,
     residual_driver::Course,
@@ -35,12 +30,13 @@ use super::{
 use crate::{
     calibrate::{
         fit::{
+            alignment::Alignment,
             gyr_rig_fit::MotionFit,
             rig_fit::RigFit,
             rows::Rows,
-            score_test::{Score, ScoreTest, upper_tail},
+            score_test::{ScoreTest, upper_tail},
         },
-        outcome::{Calibration, Evidence, FitSummary, KnownTurn, SensorOutcome, entry_name},
+        outcome::{Calibration, Evidence, FitSummary, SensorOutcome, entry_name},
         suspicion::{Follows, Status, Suspicion},
     },
     noise::Span,
@@ -51,7 +47,7 @@ use crate::{
         quantum::ConverterSteps,
         rest_halves::{self, MeanVariance},
     },
-    recording::{Recording, SensorKind, Series, check::integrity::Integrity, unit::STANDARD_GRAVITY},
+    recording::{Recording, SensorKind, check::integrity::Integrity},
 };
 
 /// Probability that a sensor with white noise is suspected by score tests.
@@ -60,14 +56,10 @@ pub const CHANCE: f64 = 5e-4;
 pub const CHANCE_OF_EXCESS: f64 = 5e-3;
 /// Standard errors by which an entry moves where it matters.
 pub const MATERIAL: f64 = 2.5;
-/// Standard errors of the bias by which it may differ in motion from that at rest.
-const BIAS_ERRORS: f64 = 3.0;
 /// Variance between rests over that within them, as 1/f noise has it over a hundred rests' time: log₂ of that is 7.
-const SLOWER: f64 = 8.0;
+pub(super) const SLOWER: f64 = 8.0;
 /// Share of the rows in motion that repeat the row before, above which samples are held.
 pub const HELD: f64 = 0.47;
-/// Earth's rotation, which a bias from rests takes for one direction, rad/s.
-const EARTH_RATE: f64 = 7.29e-5;
 
 /// Fills the suspicions of each fit that keeps its limits.
 pub fn examine(
@@ -118,17 +110,17 @@ pub fn examine(
 }
 
 /// What all examinations look at.
-struct Scene<'a> {
-    recording: &'a Recording,
+pub(super) struct Scene<'a> {
+    pub(super) recording: &'a Recording,
     integrity: &'a Integrity,
     steps: &'a ConverterSteps<'a>,
-    rests: &'a [Range<usize>],
+    pub(super) rests: &'a [Range<usize>],
     /// How well the means of rests are known, by sensor.
     at_rest: [OnceLock<Option<MeanVariance>>; 3],
 }
 
 impl Scene<'_> {
-    fn at_rest(&self, kind: SensorKind) -> Option<MeanVariance> {
+    pub(super) fn at_rest(&self, kind: SensorKind) -> Option<MeanVariance> {
         *self.at_rest[kind as usize].get_or_init(|| {
             let values = &self.recording.sensor(kind)?.values;
             rest_halves::mean_variance(values, self.usable(kind), self.rests, &self.steps.of(kind))
@@ -140,11 +132,13 @@ impl Scene<'_> {
         match &outcome.evidence {
             Some(Evidence::Shell { points, places, norm, diagonal, triad, std }) => {
                 let shell = Shell { points, places, norm: *norm, triad, std, warm: fit.warm_parameters() };
-                if *diagonal {
+                let mut found = if *diagonal {
                     self.of_norm(outcome.kind, &shell, DIAGONAL)
                 } else {
                     self.of_norm(outcome.kind, &shell, UPPER_TRIANGULAR)
-                }
+                };
+                found.extend(fit.alignment.iter().flat_map(|alignment| self.of_alignment(alignment)));
+                found
             }
             Some(Evidence::Turns(turns)) => self.of_turns(turns, fit, accelerometer_rms),
             Some(Evidence::Motions { data, fit: of_motions }) => self.of_motions(data, of_motions, fit),
@@ -156,7 +150,7 @@ impl Scene<'_> {
         }
     }
 
-    fn usable(&self, kind: SensorKind) -> &[bool] {
+    pub(super) fn usable(&self, kind: SensorKind) -> &[bool] {
         self.integrity.sensor(kind).map_or(&[], |sensor| sensor.usable.as_slice())
     }
 
@@ -165,7 +159,7 @@ impl Scene<'_> {
         self.rests.get(rest).map_or(0, |rows| rows.start.midpoint(rows.end))
     }
 
-    fn courses(&self, rows: &[usize]) -> Vec<Course> {
+    pub(super) fn courses(&self, rows: &[usize]) -> Vec<Course> {
         let at = |values: &[f64]| rows.iter().map(|row| values[*row]).collect::<Vec<f64>>();
         Course::all(at(&self.recording.time), self.recording.temperature.as_deref().map(at))
     }
@@ -183,6 +177,12 @@ impl Scene<'_> {
         let name = |motion: usize| format!("the motion at {:.0} s", self.recording.time[at[motion]]);
         let on_rig = self.recording.gimbal.is_some();
         motion_residual::examine((data, of), fit, &self.courses(&at), on_rig.then_some(&name))
+    }
+
+    fn of_alignment(&self, alignment: &Alignment) -> Vec<Suspicion> {
+        let at: Vec<usize> = alignment.rests.iter().map(|rest| self.middle(*rest)).collect();
+        let name = |rest: usize| format!("the rest at {:.0} s", self.recording.time[at[rest]]);
+        dip_residual::examine(alignment, &self.courses(&at), &name)
     }
 
     fn of_norm<const P: usize>(
@@ -260,7 +260,7 @@ impl Scene<'_> {
     }
 
     /// What the accelerometer says of rests that turn.
-    fn turning(&self, gravity: f64) -> Option<Turning> {
+    pub(super) fn turning(&self, gravity: f64) -> Option<Turning> {
         let values = &self.recording.acc.as_ref()?.values;
         let differences =
             |parts| rest_halves::differences(values, self.usable(SensorKind::Acc), self.rests, parts);
@@ -289,108 +289,12 @@ impl Scene<'_> {
         })
     }
 
-    fn of_turns(
-        &self,
-        turns: &[KnownTurn],
-        fit: &FitSummary,
-        accelerometer_rms: Option<f64>,
-    ) -> Vec<Suspicion> {
-        let Some(gyr) = &self.recording.gyr else { return Vec::new() };
-        let theta = FULL_GAIN.theta(&Triad { gain: fit.triad.gain, bias: Vector3::zeros() });
-        let rates = Series {
-            time: &self.recording.time,
-            values: &gyr.values,
-            usable: self.usable(SensorKind::Gyr),
-            interval: self.recording.median_interval().unwrap_or(1.0),
-        };
-        let rows = gyr_residual::rows(turns, &theta);
-        let count = rows.residuals.len();
-        let all: Vec<usize> = (0..9).collect();
-        let independent = (2 * turns.len()).saturating_sub(fit.parameters.saturating_sub(9));
-        let Some(test) = ScoreTest::new(&rows.residuals, rows.derivatives(count, &all), independent) else {
-            return Vec::new();
-        };
-        let at: Vec<usize> =
-            turns.iter().map(|turn| turn.data.rows.start.midpoint(turn.data.rows.end)).collect();
-        let columns = gyr_residual::columns(turns, rates, &theta, &rows, &self.courses(&at));
-        let at_rest = self.bias_errors(fit);
-        let scores: Vec<(&Columns, Score)> =
-            columns.iter().filter_map(|columns| Some((columns, test.test(&columns.values, 3)?))).collect();
-        // What the bias' own error explains, other columns explain in part.
-        let explained = scores.iter().find(|(columns, score)| {
-            columns.name == gyr_residual::MOTION
-                && (0..3).all(|axis| score.coefficients[axis].abs() < BIAS_ERRORS * at_rest[axis])
-        });
-        let most = explained.map_or(1.0, |(_, score)| score.p);
-        let mut tests: Vec<Tested> = scores
-            .iter()
-            .filter(|(columns, score)| {
-                explained.is_none() || (columns.name != gyr_residual::MOTION && score.p < most)
-            })
-            .map(|(columns, score)| Tested::of(columns, score.clone()))
-            .collect();
-        let name = |k: usize| format!("the turn at {:.0} s", self.recording.time[at[k]]);
-        // A direction has two residuals though its chord has three.
-        tests.extend(Tested::alone(&test, 3, 2, count, &name));
-        let std: Vec<f64> =
-            FULL_GAIN.entries().iter().map(|entry| entry_of(&fit.gain_std, &fit.bias_std, *entry)).collect();
-        let excess = self.excess_of_turns(turns, fit, &rows.residuals, accelerometer_rms);
-        let turning =
-            self.turning(STANDARD_GRAVITY).and_then(|turning| turning.of_gyroscope(fit.bias_std.min()));
-        judged(tests, FULL_GAIN.entries(), &std, entry_name)
-            .into_iter()
-            .chain(excess)
-            .chain(turning)
-            .collect()
-    }
-
-    /// How well rests determine the bias: no better than a step of the converter allows, rad/s.
-    fn bias_errors(&self, fit: &FitSummary) -> Vector3<f64> {
-        let noise = self.at_rest(SensorKind::Gyr);
-        let of_mean = noise.map_or_else(Vector3::zeros, |noise| noise.with_slower(1.0));
-        fit.bias_std
-            .zip_map(&of_mean, |std, variance| (std * std + variance + EARTH_RATE * EARTH_RATE).sqrt())
-    }
-
-    /// Against the noise of the rates over each turn, the wander of the bias, and the directions of the rests.
-    fn excess_of_turns(
-        &self,
-        turns: &[KnownTurn],
-        fit: &FitSummary,
-        residuals: &[f64],
-        accelerometer_rms: Option<f64>,
-    ) -> Option<Suspicion> {
-        let (acc, gyr) = (self.at_rest(SensorKind::Acc)?, self.at_rest(SensorKind::Gyr)?);
-        let [of_mean, of_rate] = [acc, gyr].map(|at_rest| at_rest.with_slower(1.0));
-        let g = STANDARD_GRAVITY;
-        let direction = of_mean.mean().max(accelerometer_rms.unwrap_or(0.0).powi(2)) / (g * g);
-        let long = self.rests.iter().map(|r| self.duration(r)).sum::<f64>() / self.rests.len() as f64;
-        let wander = fit.bias_wander.map_or(0.0, |wander| wander.spread.norm_squared() / 3.0);
-        // A rate's mean over a rest has its noise over the rest's duration; an angle has it times its own.
-        let expected = turns.iter().map(|turn| {
-            let t = self.duration(&turn.data.rows);
-            2.0 * direction + of_rate.mean() * long * t + (wander + EARTH_RATE * EARTH_RATE) * t * t
-        });
-        let expected = expected.sum::<f64>() / turns.len() as f64;
-        let freedom = 2.0 * turns.len() as f64 - 9.0;
-        let square = residuals.iter().map(|r| r * r).sum::<f64>() / freedom;
-        let chance = upper_tail(square / (SLOWER * expected), freedom, 2.0 * acc.count as f64)?;
-        (chance < CHANCE_OF_EXCESS).then(|| Suspicion {
-            follows: Follows::Excess,
-            detail: format!(
-                "its turns end {:.3}° off where noise of rates and directions explains {:.3}°",
-                square.sqrt().to_degrees(),
-                expected.sqrt().to_degrees()
-            ),
-        })
-    }
-
-    fn duration(&self, rows: &Range<usize>) -> f64 {
+    pub(super) fn duration(&self, rows: &Range<usize>) -> f64 {
         self.recording.time[rows.end - 1] - self.recording.time[rows.start]
     }
 }
 
-fn entry_of(gain: &Matrix3<f64>, bias: &Vector3<f64>, entry: u8) -> f64 {
+pub(super) fn entry_of(gain: &Matrix3<f64>, bias: &Vector3<f64>, entry: u8) -> f64 {
     let entry = usize::from(entry);
     if entry < 9 { gain[(entry / 3, entry % 3)] } else { bias[entry - 9] }
 }

@@ -8,6 +8,7 @@
 //! of tests counted; a suspicion that changes no parameter by much is left out.
 
 mod cloud_score;
+mod dip_residual;
 pub mod examine;
 pub mod gyr_residual;
 pub mod motion_residual;
@@ -16,4 +17,5 @@ pub mod pose_residual;
 mod pose_score;
 pub mod residual_driver;
 mod tested;
+mod turn_score;
 pub mod turning_rest;

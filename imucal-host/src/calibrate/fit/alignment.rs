@@ -23,7 +23,7 @@ use crate::noise::interval::{Parts, Scale};
 const RATIOS: [(f64, f64); 4] = [(1.0, 0.5), (4.0, 0.2), (16.0, 0.2), (64.0, 0.1)];
 
 /// Where the magnetometer's axes lie against the accelerometer's.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Alignment {
     /// Rotation from the magnetometer's axes to the accelerometer's, with the covariance of the directions' own errors.
     pub axes: alignment::Alignment<f64>,
@@ -35,8 +35,10 @@ pub struct Alignment {
     pub rms: f64,
     /// The same for rests left out in turn.
     pub held_out_rms: Option<f64>,
-    /// Rests used.
-    pub rests: usize,
+    /// Directions at each rest used.
+    pub pairs: Vec<DirectionPair<f64>>,
+    /// Index of each rest.
+    pub rests: Vec<usize>,
 }
 
 /// A magnetometer at rest.
@@ -59,6 +61,7 @@ pub fn align_at_rests(
 ) -> Option<Alignment> {
     let pairs: Vec<_> =
         at_rest.iter().map(|seen| (directions.calibrated(seen.rest), triad.correct(&seen.mean))).collect();
+    let rests: Vec<usize> = at_rest.iter().map(|seen| seen.rest).collect();
     if pairs.len() < LEAST_POSES || pairs.iter().any(|(f, b)| !(f + b).iter().all(|x| x.is_finite())) {
         return None;
     }
@@ -83,26 +86,28 @@ pub fn align_at_rests(
         let errors = parts.errors(&residuals, &jacobian, &influence(&jacobian)?)?;
         Some(SMatrix::from_fn(|i, j| errors.covariance[(i, j)]))
     };
-    align_with(&pairs, &errors)
+    align_with(&pairs, rests, &errors)
 }
 
 /// Finds the rotation from calibrated pairs (specific force, field) alone, each as good as the next; `None` where the
 /// rests cannot determine it.
 pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Alignment> {
-    align_with(pairs, &|_, _| None)
+    align_with(pairs, (0..pairs.len()).collect(), &|_, _| None)
 }
 
 /// Covariance of a fit's four parameters; `None` for that of residuals that are independent and alike.
 type Covariance<'a> = &'a dyn Fn(&DipModel<'_, f64>, &SVector<f64, 4>) -> Option<SMatrix<f64, 4, 4>>;
 
-fn align_with(pairs: &[(Vector3<f64>, Vector3<f64>)], errors: Covariance<'_>) -> Option<Alignment> {
+fn align_with(
+    pairs: &[(Vector3<f64>, Vector3<f64>)],
+    rests: Vec<usize>,
+    errors: Covariance<'_>,
+) -> Option<Alignment> {
     let field = pairs.iter().map(|(_, b)| b.norm()).sum::<f64>() / pairs.len() as f64;
-    let pairs: Vec<DirectionPair<f64>> = pairs
-        .iter()
-        .map(|(f, b)| DirectionPair { u_f: f.normalize(), u_b: b.normalize() })
-        .filter(|pair| pair.u_f.iter().chain(pair.u_b.iter()).all(|x| x.is_finite()))
-        .collect();
-    if pairs.len() < LEAST_POSES {
+    let pairs: Vec<DirectionPair<f64>> =
+        pairs.iter().map(|(f, b)| DirectionPair { u_f: f.normalize(), u_b: b.normalize() }).collect();
+    let finite = |pair: &DirectionPair<f64>| pair.u_f.iter().chain(pair.u_b.iter()).all(|x| x.is_finite());
+    if pairs.len() < LEAST_POSES || !pairs.iter().all(finite) {
         return None;
     }
     let model = DipModel { pairs: &pairs };
@@ -117,13 +122,15 @@ fn align_with(pairs: &[(Vector3<f64>, Vector3<f64>)], errors: Covariance<'_>) ->
     let cos = solver.theta().w.clamp(-1.0, 1.0);
     // An error of the cosine is one of the angle, by the sine between gravity and field.
     let per_angle = (1.0 - cos * cos).sqrt().max(1e-3);
+    let held_out_rms = held_out(&model, solver.theta()).map(|rms| rms / per_angle);
     Some(Alignment {
         axes,
         phi: solver.theta().xyz(),
         dip: ((-cos).asin(), covariance[(3, 3)].sqrt() / per_angle),
         rms: solver.variance()?.sqrt() / per_angle,
-        held_out_rms: held_out(&model, solver.theta()).map(|rms| rms / per_angle),
-        rests: pairs.len(),
+        held_out_rms,
+        pairs,
+        rests,
     })
 }
 
@@ -157,6 +164,11 @@ fn held_out(model: &DipModel<'_, f64>, theta: &SVector<f64, 4>) -> Option<f64> {
 }
 
 impl Alignment {
+    /// Parameters of the fit: φ and the cosine of the angle between both.
+    pub fn theta(&self) -> SVector<f64, 4> {
+        SVector::<f64, 4>::new(self.phi.x, self.phi.y, self.phi.z, -self.dip.0.sin())
+    }
+
     /// The triad in the accelerometer's axes, and the covariance of its twelve entries (gain by rows, bias).
     /// `covariance` is that of the entries `of` before.
     pub fn turn(
