@@ -3,10 +3,11 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use imucal_host::{
-    calibrate::{Calibration, Options, calibrate},
-    recording::SensorKind,
+    calibrate::{Calibration, Options, calibrate, outcome::SensorOutcome},
+    recording::{SensorKind, Triple},
     simulator::{SimulatedUnit, Tumble, record},
 };
+use imucal_tests::simulated;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// First rest, other rests and turns, s.
@@ -95,6 +96,44 @@ fn a_sensor_that_is_never_touched_has_no_motion() {
     // has to say it; what it says depends on the noise.
     let mag = calibration.sensor(SensorKind::Mag).expect("recorded");
     assert!(mag.verdict.is_err(), "{mag:?}");
+}
+
+#[test]
+fn a_gyroscope_that_is_stuck_at_rest_is_refused_and_leaves_the_accelerometer_its_rests() {
+    let mut recording = simulated::tumbled(24, 60);
+    let still = calibrate(&recording, &Options::default(), &|_| {}).segmentation.expect("rests").rests;
+    let gyr = recording.gyr.as_mut().expect("recorded");
+    // A dead band: whatever is slower than 5 °/s is none.
+    gyr.values.iter_mut().for_each(|rate| *rate = rate.map(|w| if w.abs() < 0.09 { 0.0 } else { w }));
+    let calibration = calibrate(&recording, &Options::default(), &|_| {});
+    assert!(calibration.sensor(SensorKind::Acc).expect("recorded").accepted().is_some());
+    assert_eq!(calibration.segmentation.as_ref().expect("rests").rests.len(), still.len());
+    assert_eq!(reason(&calibration, SensorKind::Gyr), "no-rest");
+    let gyr = calibration.sensor(SensorKind::Gyr).expect("recorded");
+    assert!(gyr.verdict.as_ref().expect_err("refused").advice.contains("dead band"));
+}
+
+#[test]
+fn sensors_that_are_measured_in_turns_calibrate_with_the_errors_of_their_fewer_samples() {
+    let mut recording = simulated::tumbled(30, 61);
+    let whole = calibrate(&recording, &Options::default(), &|_| {});
+    let missing = |triple: &mut Option<Triple>, kept: usize| {
+        let values = triple.as_mut().expect("recorded").values.iter_mut();
+        values.enumerate().filter(|(row, _)| row % 2 != kept).for_each(|(_, value)| value.fill(f64::NAN));
+    };
+    missing(&mut recording.acc, 0);
+    missing(&mut recording.gyr, 1);
+    let half = calibrate(&recording, &Options::default(), &|_| {});
+    for kind in [SensorKind::Acc, SensorKind::Gyr] {
+        let [half, whole] =
+            [&half, &whole].map(|all| all.sensor(kind).and_then(SensorOutcome::accepted).expect("accepted"));
+        let difference = half.triad.gain - whole.triad.gain;
+        let std = half.gain_std.map(|std| if std > 0.0 { std } else { 1.0 });
+        assert!(difference.component_div(&std).amax() < 4.0, "{kind}: {difference}");
+        // Half of the samples: the square root of two, by what else the errors hold.
+        let ratio = half.gain_std.norm() / whole.gain_std.norm();
+        assert!((1.0..2.0).contains(&ratio), "{kind}: {ratio}");
+    }
 }
 
 /// Each axis up and down.

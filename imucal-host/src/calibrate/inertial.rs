@@ -62,8 +62,14 @@ pub(crate) fn calibrate(
     };
     progress("finding rests");
     let gravity = gravity(recording, calibration);
-    let at_rest =
-        Rests { thermometry: thermometry.as_ref(), ..Rests::new(recording, acc, integrity, gravity) };
+    let at_rest = Rests {
+        recording,
+        acc,
+        usable: usable(integrity, SensorKind::Acc, recording.rows()),
+        usable_gyr: &usable_gyr,
+        gravity,
+        thermometry: thermometry.as_ref(),
+    };
     let detector = at_rest.detector();
     let cuts = segmentation::cuts(&detector, &options.multipliers, at_rest.gravity);
     let (_, from_initial_rest) = detector.noise();
@@ -87,7 +93,7 @@ pub(crate) fn calibrate(
     let shared = GyrShared {
         recording,
         usable: &usable_gyr,
-        interval: at_rest.interval,
+        interval: recording.sample_interval(SensorKind::Gyr).unwrap_or(1.0),
         step: gyr_step,
         directions: directions.as_ref(),
         thermometry: thermometry.as_ref(),
@@ -146,38 +152,33 @@ fn vertical_rate(recording: &Recording) -> f64 {
 struct Rests<'a> {
     recording: &'a Recording,
     acc: &'a Triple,
-    /// Rows that both accelerometer and gyroscope can use.
+    /// Rows in which the accelerometer is usable.
     usable: Vec<bool>,
-    interval: f64,
+    /// Rows in which the gyroscope is.
+    usable_gyr: &'a [bool],
     gravity: f64,
     thermometry: Option<&'a Thermometry<'a>>,
 }
 
 impl<'a> Rests<'a> {
-    fn new(recording: &'a Recording, acc: &'a Triple, integrity: &Integrity, gravity: f64) -> Self {
-        let of = |kind: SensorKind| usable(integrity, kind, recording.rows());
-        let both = of(SensorKind::Acc).into_iter().zip(of(SensorKind::Gyr));
-        let usable = both.map(|(acc, gyr)| acc && gyr).collect();
-        let interval = recording.median_interval().unwrap_or(1.0);
-        Self { recording, acc, usable, interval, gravity, thermometry: None }
+    fn detector(&self) -> RestDetector<'_> {
+        let Self { recording, usable_gyr, .. } = self;
+        let samples = Samples {
+            acc: self.series(),
+            gyr: recording.series(SensorKind::Gyr, usable_gyr),
+            temperature: recording.temperature.as_deref(),
+        };
+        RestDetector::new(samples, recording.median_interval().unwrap_or(1.0))
     }
 
-    fn detector(&self) -> RestDetector<'_> {
-        let samples = Samples {
-            time: &self.recording.time,
-            acc: &self.acc.values,
-            gyr: self.recording.gyr.as_ref().map(|gyr| gyr.values.as_slice()),
-            temperature: self.recording.temperature.as_deref(),
-            usable: &self.usable,
-        };
-        RestDetector::new(samples, self.interval)
+    fn series(&self) -> Series<'_> {
+        let Self { recording, acc, usable, .. } = self;
+        let interval = recording.sample_interval(SensorKind::Acc).unwrap_or(1.0);
+        Series { time: &recording.time, values: &acc.values, usable, interval }
     }
 
     fn noise(&self, chosen: &Cut, step: Vector3<f64>) -> RestNoise {
-        let Self { recording: Recording { time, .. }, acc: Triple { values, .. }, usable, interval, .. } =
-            self;
-        let series = Series { time, values, usable, interval: *interval };
-        AtRest { series, rows: &chosen.rows, step }.noise()
+        AtRest { series: self.series(), rows: &chosen.rows, step }.noise()
     }
 
     /// The accelerometer's outcome, on a rig or by its rests.
@@ -254,6 +255,11 @@ struct GyrShared<'a> {
     thermometry: Option<&'a Thermometry<'a>>,
 }
 
+/// The gyroscope has usable samples in every rest.
+fn known_at_rest(cut: &Cut) -> bool {
+    cut.rests.iter().all(|rest| rest.gyr.count() > 0)
+}
+
 impl GyrShared<'_> {
     fn input<'b>(
         &'b self,
@@ -290,6 +296,9 @@ impl GyrShared<'_> {
         acc: &WarmTriad,
         used: &[usize],
     ) -> Option<Triad<f64>> {
+        if !known_at_rest(cut) {
+            return None;
+        }
         let count = cut.rows.partition_point(|rest| rest.end <= row);
         let used: Vec<usize> = used.iter().copied().filter(|k| *k < count).collect();
         let whole = self.input(gyr, cut, acc, &used);
@@ -311,6 +320,9 @@ impl GyrShared<'_> {
             (Err(refused), _) => return without_accelerometer(refused.refusal),
             (Ok(()), None) => return without_accelerometer(Refusal::NoRest),
         };
+        if !known_at_rest(chosen) {
+            return gyr::turns::unknown_at_rest();
+        }
         let input = gyr::observed_turns::GyrInput {
             directions: self.directions,
             thermometry: self.thermometry,
@@ -331,7 +343,7 @@ impl GyrShared<'_> {
                     Some((triad, _)) if acc.terms.is_none() => WarmTriad { triad, terms: None },
                     _ => acc,
                 };
-                gyr::turns::trial(&self.input(gyr, cut, &own, &all), &start)
+                known_at_rest(cut).then(|| gyr::turns::trial(&self.input(gyr, cut, &own, &all), &start))?
             })
             .collect();
         for (trial, gain) in trials.iter_mut().zip(&gains) {

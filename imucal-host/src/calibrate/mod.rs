@@ -17,6 +17,7 @@ pub mod fit;
 pub mod gyr;
 pub mod handedness;
 pub(crate) mod inertial;
+mod integrity_warning;
 pub mod known_attitudes;
 pub mod mag;
 pub mod nonlinear_terms;
@@ -88,7 +89,7 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
         warnings: Vec::new(),
         read_warnings: recording.warnings.iter().map(ToString::to_string).collect(),
     };
-    integrity_warnings(&integrity, &mut calibration.warnings);
+    calibration.warnings.extend(integrity_warning::of(&integrity, recording.rows()));
     let steps = ConverterSteps::new(recording, &integrity);
     let known = (&integrity, &steps);
     let directions = inertial::calibrate(recording, known, options, progress, &mut calibration);
@@ -186,29 +187,6 @@ fn align(
 }
 
 /// What was found wrong with the samples and left out, in words.
-fn integrity_warnings(integrity: &Integrity, warnings: &mut Vec<String>) {
-    for gap in &integrity.gaps {
-        warnings.push(format!(
-            "gap of {:.3} s before row {} (after t = {:.3} s)",
-            gap.duration, gap.row, gap.start
-        ));
-    }
-    for sensor in &integrity.sensors {
-        let prefix = sensor.sensor.prefix();
-        if sensor.missing > 0 {
-            warnings.push(format!("{prefix}: {} rows not measured", sensor.missing));
-        }
-        for stretch in &sensor.saturated {
-            let axis = ["x", "y", "z"][stretch.axis % 3];
-            let (from, to) = (stretch.rows.start, stretch.rows.end);
-            warnings.push(format!("{prefix}_{axis}: clipped in rows {from} to {to}; left out"));
-        }
-        for rows in &sensor.stuck {
-            warnings.push(format!("{prefix}: stuck in rows {} to {}; left out", rows.start, rows.end));
-        }
-    }
-}
-
 /// Rows in which a sensor is measured, not clipped and not stuck; all rows where there is no such sensor.
 fn usable(integrity: &Integrity, kind: SensorKind, rows: usize) -> Vec<bool> {
     integrity.sensor(kind).map_or_else(|| vec![true; rows], |sensor| sensor.usable.clone())

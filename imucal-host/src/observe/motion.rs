@@ -14,8 +14,8 @@ use nalgebra::{Matrix3, Quaternion, Vector3};
 
 use super::{
     compression,
-    compression::{Sample, jump},
-    turn::TurnGap,
+    compression::Sample,
+    turn::{TurnGap, measured},
 };
 use crate::{
     noise::Span,
@@ -230,14 +230,8 @@ impl MotionInput<'_> {
         ends: [&Matrix3<f64>; 2],
         wander: &dyn Fn(f64) -> Vector3<f64>,
     ) -> Result<MotionData, TurnGap> {
-        let Series { time, values, usable, interval } = self.rates;
-        if let Some(row) = rows.clone().find(|k| !usable[*k]) {
-            return Err(TurnGap::Unusable { row });
-        }
-        let all: Vec<usize> = rows.clone().collect();
-        if let Some(row) = jump(time, &all, interval) {
-            return Err(TurnGap::Jump { row });
-        }
+        let Series { time, values, interval, .. } = self.rates;
+        let all = measured(self.rates, &rows)?;
         let size = (BLOCK / interval).round().clamp(1.0, MOST_SAMPLES) as u16;
         let rate = |k: usize| values[k] - wander(time[k]);
         let mut samples = Vec::with_capacity(all.len());

@@ -15,7 +15,7 @@ use imucal_core::{
 };
 use nalgebra::Vector3;
 
-use super::windowed::{Window, windows};
+use super::windowed::{USABLE_SHARE, Window, density, windows};
 use crate::recording::{Series, median, order_statistics::MEDIAN_SIZE};
 
 /// Window of the variance, s: long against vibration, short against a rest.
@@ -34,25 +34,19 @@ const INITIAL_EXCESS: f64 = 8.0;
 const NOISY: f64 = 4.0;
 /// Rows further apart than this are single shots, each a rest of its own, s.
 const SHOT_INTERVAL: f64 = 0.2;
-/// A gap longer than this many usual intervals ends a rest.
-const GAP: f64 = 5.0;
 /// At an end of the recording a motion shows where the mean of some last rows is this many of its standard deviations
 /// from that of the rest: one row in 10⁵ of white noise.
 const MOVES: f64 = 3.0;
 
-/// What rest detection looks at; all of equal length.
+/// What rest detection looks at; all of equal length, with one time.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples<'a> {
-    /// Time, s.
-    pub time: &'a [f64],
     /// Accelerometer, nominal m/s².
-    pub acc: &'a [Vector3<f64>],
+    pub acc: Series<'a>,
     /// Gyroscope, nominal rad/s.
-    pub gyr: Option<&'a [Vector3<f64>]>,
+    pub gyr: Option<Series<'a>>,
     /// Temperature, °C.
     pub temperature: Option<&'a [f64]>,
-    /// Rows in which every sensor above is usable.
-    pub usable: &'a [bool],
 }
 
 /// Windowed variances of a recording and the noise of its initial rest: made once, cut at any threshold.
@@ -87,10 +81,15 @@ impl<'a> RestDetector<'a> {
     /// Looks at a recording with the given usual interval, s.
     pub fn new(samples: Samples<'a>, interval: f64) -> Self {
         let half = ((WINDOW / 2.0 / interval).round() as usize).max(1);
-        let series = |values| Series { time: samples.time, values, usable: samples.usable, interval };
+        let rates = |gyr: Series<'_>| {
+            // What is clipped turns, and what is stuck shows no turn: both say so.
+            let usable: Vec<bool> =
+                gyr.values.iter().map(|rate| rate.iter().all(|x| x.is_finite())).collect();
+            windows(Series { usable: &usable, ..gyr }, half, interval, |window| window)
+        };
         let (variance, rate) = rayon::join(
-            || windows(series(samples.acc), half, GAP * interval, |window| window.variance),
-            || samples.gyr.map(|gyr| windows(series(gyr), half, GAP * interval, |window| window)),
+            || windows(samples.acc, half, interval, |window| window.variance),
+            || samples.gyr.map(rates),
         );
         let (noise, from_initial) = reference_noise(&variance, (INITIAL / interval).round() as usize, half);
         Self { samples, variance, rate, noise, from_initial, interval, half }
@@ -109,20 +108,34 @@ impl<'a> RestDetector<'a> {
     /// The rests at a multiple of the reference variance.
     pub fn cut(&self, multiplier: f64) -> Segmentation {
         let threshold = (multiplier * self.noise).min(NOISIEST);
-        let rests = if self.is_shots() { self.shots() } else { self.runs(threshold) };
+        let rests = if self.is_shots() { self.shots() } else { self.of_both(self.runs(threshold)) };
         Segmentation { multiplier, threshold, rests }
     }
 
     fn shots(&self) -> Vec<Range<usize>> {
-        (0..self.samples.time.len()).filter(|k| self.samples.usable[*k]).map(|k| k..k + 1).collect()
+        let Samples { acc, gyr, .. } = self.samples;
+        let usable = |k: &usize| acc.usable[*k] && gyr.is_none_or(|gyr| gyr.usable[*k]);
+        (0..acc.time.len()).filter(usable).map(|k| k..k + 1).collect()
+    }
+
+    /// Those in which the gyroscope is usable; all where it is in none.
+    fn of_both(&self, rests: Vec<Range<usize>>) -> Vec<Range<usize>> {
+        let Some(gyr) = self.samples.gyr else { return rests };
+        let least = USABLE_SHARE * density(gyr, self.interval);
+        let measured = |rest: &&Range<usize>| {
+            let usable = gyr.usable[(*rest).clone()].iter().filter(|usable| **usable).count();
+            usable as f64 >= least * rest.len() as f64
+        };
+        let both: Vec<_> = rests.iter().filter(measured).cloned().collect();
+        if both.is_empty() { rests } else { both }
     }
 
     fn runs(&self, threshold: f64) -> Vec<Range<usize>> {
-        let quiet: Vec<bool> = self.variance.iter().map(|v| *v <= threshold).collect();
-        let quiet = match &self.rate {
-            Some(rate) => without_turning(without_swings(quiet, rate, self.half), rate),
-            None => quiet,
-        };
+        let mut quiet: Vec<bool> = self.variance.iter().map(|v| *v <= threshold).collect();
+        if let Some(rate) = &self.rate {
+            quiet.iter_mut().zip(rate).for_each(|(still, window)| *still &= window.variance.is_finite());
+            quiet = without_turning(without_swings(quiet, rate, self.half), rate);
+        }
         let mut rests = Vec::new();
         let mut begin = None;
         for k in 0..=quiet.len() {
@@ -132,7 +145,7 @@ impl<'a> RestDetector<'a> {
                 (false, Some(first)) => {
                     begin = None;
                     let rest = self.without_cut_motion(first..k);
-                    if self.samples.time[rest.end - 1] - self.samples.time[rest.start] >= SHORTEST {
+                    if self.time(rest.end - 1) - self.time(rest.start) >= SHORTEST {
                         rests.push(rest);
                     }
                 }
@@ -146,7 +159,7 @@ impl<'a> RestDetector<'a> {
     /// cut short, and too few rows of it are in them to show.
     fn without_cut_motion(&self, rest: Range<usize>) -> Range<usize> {
         let Range { mut start, mut end } = rest;
-        if end == self.samples.time.len() && end - start > 2 * self.half {
+        if end == self.samples.acc.time.len() && end - start > 2 * self.half {
             let (inside, last) = (start..end - self.half, (end - self.half..end).rev());
             if self.departs(inside.clone(), last) {
                 end = inside.end;
@@ -164,33 +177,40 @@ impl<'a> RestDetector<'a> {
     /// The mean of the outermost of some rows, however many, is not that of the rows `inside`; `from_end` are those rows
     /// from the outermost inwards.
     fn departs(&self, inside: Range<usize>, from_end: impl Iterator<Item = usize> + Clone) -> bool {
-        let usable = |row: &usize| self.samples.usable[*row];
-        [Some(self.samples.acc), self.samples.gyr].into_iter().flatten().any(|values| {
-            let mut still = Moments::default();
-            inside.clone().filter(usable).for_each(|row| still.push(&values[row]));
-            let (mean, variance, rows) = (still.mean(), still.variance().sum(), f64::from(still.count()));
-            let (mut sum, mut count) = (Vector3::zeros(), 0.0);
-            from_end.clone().filter(usable).any(|row| {
-                (sum, count) = (sum + (values[row] - mean), count + 1.0);
-                (sum / count).norm_squared() > MOVES * MOVES * variance * (1.0 / count + 1.0 / rows)
-            })
-        })
+        [Some(self.samples.acc), self.samples.gyr].into_iter().flatten().any(
+            |Series { values, usable, .. }| {
+                let usable = |row: &usize| usable[*row];
+                let mut still = Moments::default();
+                inside.clone().filter(usable).for_each(|row| still.push(&values[row]));
+                let (mean, variance, rows) = (still.mean(), still.variance().sum(), f64::from(still.count()));
+                let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+                from_end.clone().filter(usable).any(|row| {
+                    (sum, count) = (sum + (values[row] - mean), count + 1.0);
+                    (sum / count).norm_squared() > MOVES * MOVES * variance * (1.0 / count + 1.0 / rows)
+                })
+            },
+        )
     }
 
     /// Moments of a rest.
     pub fn rest(&self, rows: &Range<usize>) -> Rest<f64> {
         let mut rest = Rest {
-            time: 0.5 * (self.samples.time[rows.start] + self.samples.time[rows.end - 1]),
+            time: 0.5 * (self.time(rows.start) + self.time(rows.end - 1)),
             temperature: self.samples.temperature.map_or(f64::NAN, |t| mean_of_measured(&t[rows.clone()])),
             ..Rest::default()
         };
-        for k in rows.clone().filter(|k| self.samples.usable[*k]) {
-            rest.acc.push(&self.samples.acc[k]);
-            if let Some(gyr) = self.samples.gyr {
-                rest.gyr.push(&gyr[k]);
-            }
+        let of = |Series { values, usable, .. }: Series<'_>, moments: &mut Moments<f64>| {
+            rows.clone().filter(|k| usable[*k]).for_each(|k| moments.push(&values[k]));
+        };
+        of(self.samples.acc, &mut rest.acc);
+        if let Some(gyr) = self.samples.gyr {
+            of(gyr, &mut rest.gyr);
         }
         rest
+    }
+
+    fn time(&self, row: usize) -> f64 {
+        self.samples.acc.time[row]
     }
 }
 
@@ -257,6 +277,16 @@ mod tests {
 
     const DT: f64 = 0.01;
 
+    fn samples<'a>(
+        time: &'a [f64],
+        acc: &'a [Vector3<f64>],
+        gyr: Option<&'a [Vector3<f64>]>,
+        usable: &'a [bool],
+    ) -> Samples<'a> {
+        let series = |values| Series { time, values, usable, interval: DT };
+        Samples { acc: series(acc), gyr: gyr.map(series), temperature: None }
+    }
+
     /// 4 s at rest, 2 s of shaking, 4 s at rest.
     fn shaken() -> (Vec<f64>, Vec<Vector3<f64>>) {
         (0..1000)
@@ -272,7 +302,7 @@ mod tests {
     fn two_rests_around_a_motion_are_found_and_hold_none_of_it() {
         let (time, acc) = shaken();
         let usable = vec![true; time.len()];
-        let samples = Samples { time: &time, acc: &acc, gyr: None, temperature: None, usable: &usable };
+        let samples = samples(&time, &acc, None, &usable);
         let cut = RestDetector::new(samples, DT).cut(4.0);
         assert_eq!(cut.rests.len(), 2, "{cut:?}");
         assert!(cut.rests[0].end <= 400 && cut.rests[1].start >= 600);
@@ -291,8 +321,7 @@ mod tests {
         let time: Vec<f64> = (0..600).map(|k| k as f64 * DT).collect();
         let usable = vec![true; 600];
         let rests = |gyr: &[Vector3<f64>]| {
-            let samples =
-                Samples { time: &time, acc: &acc, gyr: Some(gyr), temperature: None, usable: &usable };
+            let samples = samples(&time, &acc, Some(gyr), &usable);
             RestDetector::new(samples, DT).cut(4.0).rests
         };
         assert_eq!(rests(&still), std::slice::from_ref(&(0..600)));
@@ -319,7 +348,7 @@ mod tests {
             })
             .collect();
         let usable = vec![true; time.len()];
-        let samples = Samples { time: &time, acc: &acc, gyr: Some(&gyr), temperature: None, usable: &usable };
+        let samples = samples(&time, &acc, Some(&gyr), &usable);
         let cut = RestDetector::new(samples, DT).cut(4.0);
         assert_eq!(cut.rests.len(), 2, "{cut:?}");
     }
@@ -334,8 +363,7 @@ mod tests {
         let usable = vec![true; 1200];
         let rests = |rate: &dyn Fn(usize) -> f64| {
             let gyr: Vec<_> = (0..1200).map(|k| Vector3::new(0.1, 0.1, 0.1 + rate(k))).collect();
-            let samples =
-                Samples { time: &time, acc: &acc, gyr: Some(&gyr), temperature: None, usable: &usable };
+            let samples = samples(&time, &acc, Some(&gyr), &usable);
             RestDetector::new(samples, DT).cut(4.0).rests
         };
         // Once a second: its mean over a window is that of a rest.
@@ -359,7 +387,7 @@ mod tests {
             usable[k] = false;
             acc[k] = Vector3::repeat(f64::NAN);
         }
-        let samples = Samples { time: &time, acc: &acc, gyr: None, temperature: None, usable: &usable };
+        let samples = samples(&time, &acc, None, &usable);
         let cut = RestDetector::new(samples, DT).cut(4.0);
         assert!(cut.rests.iter().any(|rows| [10, 50, 90].iter().all(|k| rows.contains(k))), "{cut:?}");
         assert!(cut.rests.iter().all(|rows| !rows.contains(&800)));

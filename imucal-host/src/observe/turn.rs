@@ -134,11 +134,11 @@ pub fn compress(
     Ok(TurnData { rest_before, rest_after, rows, bias: *bias, blocks, durations })
 }
 
-/// The samples of a turn that are integrated: those of a dropout are bridged by their neighbours.
+/// The samples of some rows that are integrated: those of a dropout are bridged by their neighbours.
 ///
 /// # Errors
 /// [`TurnGap`], with the row, where the motion was not wholly recorded.
-fn measured(rates: Series<'_>, rows: &Range<usize>) -> Result<Vec<usize>, TurnGap> {
+pub(super) fn measured(rates: Series<'_>, rows: &Range<usize>) -> Result<Vec<usize>, TurnGap> {
     let Series { time, values, usable, interval } = rates;
     let mut measured = Vec::with_capacity(rows.len());
     let mut jumped = None;

@@ -9,8 +9,16 @@ use nalgebra::Vector3;
 
 use crate::recording::Series;
 
-/// A window is used while this share of its rows is usable: dropouts are common, clipping is long.
-const USABLE_SHARE: f64 = 0.8;
+/// A window is used while this share of its samples is usable: dropouts are common, clipping is long.
+pub(super) const USABLE_SHARE: f64 = 0.8;
+
+/// A gap longer than this many usual intervals ends a rest.
+const GAP: f64 = 5.0;
+
+/// Samples a row, where rows are `interval` s apart: below one where other sensors are measured between them.
+pub(super) fn density(series: Series<'_>, interval: f64) -> f64 {
+    (interval / series.interval).min(1.0)
+}
 
 /// What the usable rows of a window come to.
 #[derive(Clone, Copy, Debug)]
@@ -66,15 +74,11 @@ impl<'a> RunningSums<'a> {
     }
 }
 
-/// Something of the window of so many rows to each side of each row; a time above `longest_gap`, s, is a jump.
-pub(super) fn windows<T>(
-    series: Series<'_>,
-    half: usize,
-    longest_gap: f64,
-    of: impl Fn(Window) -> T,
-) -> Vec<T> {
+/// Something of the window of so many rows, `interval` s apart, to each side of each row; more of `GAP` intervals are a jump.
+pub(super) fn windows<T>(series: Series<'_>, half: usize, interval: f64, of: impl Fn(Window) -> T) -> Vec<T> {
     let rows = series.values.len();
-    let mut from = RunningSums::new(series, longest_gap);
+    let mut from = RunningSums::new(series, GAP * interval);
+    let least = USABLE_SHARE * density(series, interval);
     let mut to = from;
     (0..rows)
         .map(|k| {
@@ -86,7 +90,7 @@ pub(super) fn windows<T>(
                 return of(Window { mean: Vector3::zeros(), variance: f64::INFINITY });
             }
             let mean = (to.sum - from.sum) / n;
-            let broken = to.gaps > from.gaps || n < USABLE_SHARE * held.len() as f64;
+            let broken = to.gaps > from.gaps || n < least * held.len() as f64;
             let variance = ((to.square - from.square) / n - mean.norm_squared()).max(0.0);
             of(Window { mean: mean + to.origin, variance: if broken { f64::INFINITY } else { variance } })
         })
@@ -105,7 +109,7 @@ mod tests {
         let usable: Vec<bool> = (0..60).map(|k| k % 17 != 5 && !(20..25).contains(&k)).collect();
         let series = Series { time: &time, values: &values, usable: &usable, interval: 0.1 };
         let (half, rows) = (5, values.len());
-        let found = windows(series, half, 1.0, |window| window);
+        let found = windows(series, half, 0.2, |window| window);
         let mut infinite = 0;
         for (k, found) in found.iter().enumerate() {
             let w = window(k, half, rows);
@@ -123,5 +127,18 @@ mod tests {
             }
         }
         assert!(infinite > 10 && infinite < rows, "{infinite}");
+    }
+
+    #[test]
+    fn samples_between_those_of_another_sensor_fill_a_window() {
+        let time: Vec<f64> = (0..40).map(|k| 0.1 * f64::from(k)).collect();
+        let values = vec![Vector3::z(); 40];
+        let usable: Vec<bool> = (0..40).map(|k| k % 2 == 0).collect();
+        let of = |interval| {
+            let series = Series { time: &time, values: &values, usable: &usable, interval };
+            windows(series, 5, 0.1, |window| window.variance)
+        };
+        assert!(of(0.1)[20].is_infinite());
+        assert_eq!(of(0.2)[20], 0.0);
     }
 }

@@ -289,6 +289,23 @@ impl Recording {
         median(self.time.windows(2).map(|pair| pair[1] - pair[0]).collect())
     }
 
+    /// Median of the intervals between a sensor's samples, s: longer than that between rows where others are measured between them;
+    /// `None` below two samples.
+    #[must_use]
+    pub fn sample_interval(&self, kind: SensorKind) -> Option<f64> {
+        let values = &self.sensor(kind)?.values;
+        let measured = |row: &usize| values[*row].iter().all(|component| component.is_finite());
+        let times: Vec<f64> = (0..values.len()).filter(measured).map(|row| self.time[row]).collect();
+        median(times.windows(2).map(|pair| pair[1] - pair[0]).collect())
+    }
+
+    /// A sensor's samples in time, if it was recorded.
+    #[must_use]
+    pub fn series<'a>(&'a self, kind: SensorKind, usable: &'a [bool]) -> Option<Series<'a>> {
+        let interval = self.sample_interval(kind).unwrap_or(1.0);
+        Some(Series { time: &self.time, values: &self.sensor(kind)?.values, usable, interval })
+    }
+
     /// The samples of a sensor, if it was recorded.
     #[must_use]
     pub fn sensor(&self, kind: SensorKind) -> Option<&Triple> {

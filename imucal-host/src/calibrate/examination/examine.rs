@@ -52,6 +52,8 @@ use crate::{
 
 /// Probability that a sensor with white noise is suspected by score tests.
 pub const CHANCE: f64 = 5e-4;
+/// The same of a magnetometer along a reference, whose own errors wander, too, and are not known.
+pub const CHANCE_ALONG_REFERENCE: f64 = 1e-9;
 /// Probability that 1/f noise as strong as `SLOWER` exceeds what rests say.
 pub const CHANCE_OF_EXCESS: f64 = 5e-3;
 /// Standard errors by which an entry moves where it matters.

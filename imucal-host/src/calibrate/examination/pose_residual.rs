@@ -85,6 +85,13 @@ pub struct Term<'a> {
     course: Option<&'a Course>,
 }
 
+impl Term<'_> {
+    /// A higher rung of the accelerometer's ladder has it.
+    pub fn is_of_ladder(&self) -> bool {
+        matches!(self.alteration, Alteration::Quadratic | Alteration::Cubic | Alteration::CrossProduct)
+    }
+}
+
 /// What depends on direction alone, in words.
 const OF_DIRECTION: [(Alteration, &str); 5] = [
     (Alteration::Cubic, "direction, as cubic terms make it"),

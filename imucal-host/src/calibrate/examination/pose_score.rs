@@ -10,9 +10,10 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::{
-    pose_residual::{PoseFit, of_courses, of_direction},
+    examine::{CHANCE, CHANCE_ALONG_REFERENCE},
+    pose_residual::{PoseFit, Term, of_courses, of_direction},
     residual_driver::Course,
-    tested::{Tested, least_of_many},
+    tested::{Tested, judged_by, least_of_many},
 };
 use crate::{
     calibrate::{
@@ -31,6 +32,10 @@ use crate::{
 
 /// What speaks against a fit to poses on a rig. `warm` parameters of temperature were estimated with it; `name` says which
 /// pose it is.
+///
+/// Terms that a higher rung of the accelerometer's ladder has are no suspicion: a warning names that rung
+/// ([`rig::accelerometer`](crate::calibrate::known_attitudes::rig::accelerometer)). Where they explain most, all else is tested as if
+/// they were estimated.
 pub(super) fn of_rig(
     (kind, poses, fit): (SensorKind, &Poses, &RigFit),
     warm: usize,
@@ -40,22 +45,32 @@ pub(super) fn of_rig(
     let of = PoseFit { poses: &poses.poses, axes: poses.axes, parameters: &fit.parameters };
     let count = poses.poses.len();
     let (rows, free) = (of.rows(0..count), fit.free_entries());
-    let jacobian = rows.derivatives(3 * count, &indices(&free));
-    let Some(test) = ScoreTest::new(&rows.residuals, jacobian, (3 * count).saturating_sub(warm)) else {
-        return Vec::new();
+    let (of_ladder, others): (Vec<_>, Vec<_>) =
+        of_direction().partition(|term| kind == SensorKind::Acc && term.is_of_ladder());
+    let others: Vec<_> = others.into_iter().chain(of_courses(kind, courses)).collect();
+    let score = |test: &ScoreTest, term: &Term<'_>| {
+        let columns = of.columns(term, 0..count, &rows);
+        Some(Tested::new(term.follows, term.name.clone(), test.test(&columns, columns.ncols())?))
     };
-    let terms: Vec<_> = of_direction().chain(of_courses(kind, courses)).collect();
-    let mut tests: Vec<Tested> = terms
-        .into_par_iter()
-        .filter_map(|term| {
-            let columns = of.columns(&term, 0..count, &rows);
-            let score = test.test(&columns, columns.ncols())?;
-            Some(Tested::new(term.follows, term.name, score))
-        })
-        .collect();
-    tests.extend(of_machine((kind, &of), &test, &rows));
-    tests.extend(Tested::alone(&test, 3, 3, 3 * count, name));
-    judged(tests, fit, &free)
+    let tests_of = |free: &[u8]| {
+        let jacobian = rows.derivatives(3 * count, &indices(free));
+        let test = ScoreTest::new(&rows.residuals, jacobian, (3 * count).saturating_sub(warm))?;
+        let mut tests: Vec<Tested> = others.par_iter().filter_map(|term| score(&test, term)).collect();
+        tests.extend(of_machine((kind, &of), &test, &rows));
+        tests.extend(Tested::alone(&test, 3, 3, 3 * count, name));
+        Some((test, tests))
+    };
+    let Some((test, tests)) = tests_of(&free) else { return Vec::new() };
+    let larger = of_ladder.iter().filter_map(|term| Some(score(&test, term)?.score.p)).fold(1.0, f64::min);
+    let other = tests.iter().map(|tested| tested.score.p).fold(1.0, f64::min);
+    if larger * (of_ladder.len() as f64) < CHANCE && larger <= other {
+        let entries = (23..UNIFIED as u8).filter(|entry| !fit.entries.contains(entry));
+        let free: Vec<u8> = free.iter().copied().chain(entries).collect();
+        if let Some((_, tests)) = tests_of(&free) {
+            return judged(CHANCE, tests, fit, &free);
+        }
+    }
+    judged(CHANCE, tests, fit, &free)
 }
 
 /// Places of entries in the unified model.
@@ -118,13 +133,13 @@ pub(super) fn along_reference(
         let change = change.map(|all| DVector::from_iterator(free.len(), entries.iter().map(|k| all[*k])));
         Some(Tested { change, ..Tested::new(term.follows, term.name.clone(), score) })
     });
-    judged(tests.collect(), fit, &free)
+    judged(CHANCE_ALONG_REFERENCE, tests.collect(), fit, &free)
 }
 
 /// Those of the sensor's own entries: what belongs to the rig is not its calibration.
-fn judged(tests: Vec<Tested>, fit: &RigFit, free: &[u8]) -> Vec<Suspicion> {
+fn judged(chance: f64, tests: Vec<Tested>, fit: &RigFit, free: &[u8]) -> Vec<Suspicion> {
     let of_sensor = |entry: &u8| matches!(entry, 0..12 | 23..);
     let std = |entry: &u8| fit.std(*entry).filter(|_| of_sensor(entry)).unwrap_or(0.0);
     let std: Vec<f64> = free.iter().map(std).collect();
-    super::tested::judged(tests, free, &std, unified_name)
+    judged_by(chance, tests, free, &std, unified_name)
 }

@@ -66,6 +66,17 @@ impl Tested {
 
 /// Of each thing that is followed, the test that chance passes least, where it is material; `name` names an entry.
 pub(super) fn judged(
+    tests: Vec<Tested>,
+    entries: &[u8],
+    std: &[f64],
+    name: fn(u8) -> String,
+) -> Vec<Suspicion> {
+    judged_by(CHANCE, tests, entries, std, name)
+}
+
+/// The same by a probability of one's own.
+pub(super) fn judged_by(
+    most: f64,
     mut tests: Vec<Tested>,
     entries: &[u8],
     std: &[f64],
@@ -77,7 +88,7 @@ pub(super) fn judged(
     for test in tests {
         let chance = test.score.p * count;
         let Some((entry, shift, errors)) = test.furthest(entries, std) else { continue };
-        if chance >= CHANCE || errors < MATERIAL || found.iter().any(|s| s.follows == test.follows) {
+        if chance >= most || errors < MATERIAL || found.iter().any(|s| s.follows == test.follows) {
             continue;
         }
         found.push(Suspicion {

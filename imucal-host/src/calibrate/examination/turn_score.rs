@@ -15,7 +15,7 @@ use crate::{
         outcome::{FitSummary, KnownTurn, entry_name},
         suspicion::{Follows, Suspicion},
     },
-    recording::{SensorKind, Series, unit::STANDARD_GRAVITY},
+    recording::{SensorKind, unit::STANDARD_GRAVITY},
 };
 
 /// Standard errors of the bias by which it may differ in motion from that at rest.
@@ -30,13 +30,9 @@ impl Scene<'_> {
         fit: &FitSummary,
         accelerometer_rms: Option<f64>,
     ) -> Vec<Suspicion> {
-        let Some(gyr) = &self.recording.gyr else { return Vec::new() };
         let theta = FULL_GAIN.theta(&Triad { gain: fit.triad.gain, bias: Vector3::zeros() });
-        let rates = Series {
-            time: &self.recording.time,
-            values: &gyr.values,
-            usable: self.usable(SensorKind::Gyr),
-            interval: self.recording.median_interval().unwrap_or(1.0),
+        let Some(rates) = self.recording.series(SensorKind::Gyr, self.usable(SensorKind::Gyr)) else {
+            return Vec::new();
         };
         let rows = gyr_residual::rows(turns, &theta);
         let count = rows.residuals.len();

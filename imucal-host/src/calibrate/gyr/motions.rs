@@ -21,7 +21,7 @@ use crate::{
         pose,
         quantum::quantum,
     },
-    recording::{Recording, Series, Triple, unit::STANDARD_GRAVITY},
+    recording::{Recording, SensorKind, Series, Triple, unit::STANDARD_GRAVITY},
     simulator::place::EARTH_RATE,
 };
 
@@ -252,7 +252,7 @@ fn input<'a>(
             time: &recording.time,
             values: &sensor.values,
             usable,
-            interval: recording.median_interval().unwrap_or(1.0),
+            interval: recording.sample_interval(SensorKind::Gyr).unwrap_or(1.0),
         },
         attitudes,
         earth_p,

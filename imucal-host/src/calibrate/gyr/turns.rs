@@ -97,15 +97,28 @@ pub fn trial(input: &GyrInput<'_>, near: &Matrix3<f64>) -> Option<Vector3<f64>> 
 
 /// The outcome of a gyroscope whose accelerometer gives no directions.
 pub fn without_accelerometer(refusal: Refusal) -> SensorOutcome {
-    let advice =
-        "a gyroscope without a rig is calibrated from the directions that an accepted accelerometer gives \
-                  at rest; see the accelerometer's reason"
-            .into();
+    not_fitted(
+        refusal,
+        "a gyroscope without a rig is calibrated from the directions that an accepted accelerometer gives at rest; see the \
+         accelerometer's reason",
+    )
+}
+
+/// A gyroscope whose samples at rest are stuck or clipped, so that its bias is not known.
+pub fn unknown_at_rest() -> SensorOutcome {
+    not_fitted(
+        Refusal::NoRest,
+        "the gyroscope's values do not change at rest, so that its bias is not known; switch off the dead band or filter \
+         that holds them",
+    )
+}
+
+fn not_fitted(refusal: Refusal, advice: &str) -> SensorOutcome {
     SensorOutcome {
         suspicions: Vec::new(),
         kind: SensorKind::Gyr,
         model: MODEL,
-        verdict: Err(Refused { refusal, advice }),
+        verdict: Err(Refused { refusal, advice: advice.into() }),
         fit: None,
         evidence: None,
     }

@@ -34,7 +34,7 @@ use crate::{
         rest::{RestDetector, Samples},
         turn::{BiasPath, TurnData, compress},
     },
-    recording::{Recording, Series, median},
+    recording::{Recording, SensorKind, median},
 };
 
 /// Multiple of the initial rest's variance up to which the accelerometer alone is at rest.
@@ -57,8 +57,8 @@ pub fn rests_by_force(recording: &Recording) -> Vec<Range<usize>> {
         return Vec::new();
     };
     let usable: Vec<bool> = acc.values.iter().map(|force| force.iter().all(|x| x.is_finite())).collect();
-    let samples =
-        Samples { time: &recording.time, acc: &acc.values, gyr: None, temperature: None, usable: &usable };
+    let Some(acc) = recording.series(SensorKind::Acc, &usable) else { return Vec::new() };
+    let samples = Samples { acc, gyr: None, temperature: None };
     RestDetector::new(samples, interval).cut(MULTIPLIER).rests
 }
 
@@ -128,7 +128,6 @@ type Turns = (Vec<TurnData>, Vec<[Vector3<f64>; 2]>);
 fn turns(recording: &Recording, rests: &[Range<usize>], acc: &Triad<f64>) -> Option<Turns> {
     let (force, gyr) = (recording.acc.as_ref()?, recording.gyr.as_ref()?);
     let usable: Vec<bool> = gyr.values.iter().map(|rate| rate.iter().all(|x| x.is_finite())).collect();
-    let interval = recording.median_interval()?;
     let still: Vec<(Vector3<f64>, Vector3<f64>, f64)> = rests
         .iter()
         .map(|rows| {
@@ -143,7 +142,7 @@ fn turns(recording: &Recording, rests: &[Range<usize>], acc: &Triad<f64>) -> Opt
         })
         .collect();
     let step = moved.len().div_ceil(TURNS.1).max(1);
-    let rates = Series { time: &recording.time, values: &gyr.values, usable: &usable, interval };
+    let rates = recording.series(SensorKind::Gyr, &usable)?;
     let turns: Turns = moved
         .into_iter()
         .step_by(step)
