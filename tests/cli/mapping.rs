@@ -67,7 +67,7 @@ fn a_log_whose_times_are_dates_and_that_begins_with_comments_is_answered_with_th
         .run(&format!("{arguments} --json dated.json"))
         .with(0)
         .telling(&["comments before the header were passed over", "# or %: 2)"]);
-    assert!(!read.err.contains("leaves out t"), "{}", read.err);
+    assert!(!read.err.contains("assumed: t"), "{}", read.err);
     folder.write("log.csv", &plain);
     folder.run(&format!("calibrate log.csv {MAPPED} --json log.json")).with(0);
     // Equal times in other digits: the last ones of a fit differ.

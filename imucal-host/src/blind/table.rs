@@ -23,7 +23,7 @@ impl Score {
             let [must, aim] = CLOSED_BIAS.map(|bias| format!("≤ {bias}"));
             let aim = if mean.abs() > CLOSED_BIAS[0] { MISSED } else { &aim };
             text += &row(
-                "closed share, said less true",
+                "closed share, stated minus true",
                 &count.to_string(),
                 &format!("{mean:+.3}"),
                 &format!("± {error:.3}"),

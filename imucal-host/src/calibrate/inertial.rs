@@ -66,7 +66,8 @@ pub(crate) fn calibrate(
         recording,
         acc,
         usable: usable(integrity, SensorKind::Acc, recording.rows()),
-        usable_gyr: &usable_gyr,
+        interval: recording.sample_interval(SensorKind::Acc).unwrap_or(1.0),
+        rates: recording.series(SensorKind::Gyr, &usable_gyr),
         gravity,
         thermometry: thermometry.as_ref(),
     };
@@ -93,7 +94,7 @@ pub(crate) fn calibrate(
     let shared = GyrShared {
         recording,
         usable: &usable_gyr,
-        interval: recording.sample_interval(SensorKind::Gyr).unwrap_or(1.0),
+        interval: at_rest.rates.map_or(1.0, |rates| rates.interval),
         step: gyr_step,
         directions: directions.as_ref(),
         thermometry: thermometry.as_ref(),
@@ -152,29 +153,26 @@ fn vertical_rate(recording: &Recording) -> f64 {
 struct Rests<'a> {
     recording: &'a Recording,
     acc: &'a Triple,
-    /// Rows in which the accelerometer is usable.
+    /// Rows in which it is usable.
     usable: Vec<bool>,
-    /// Rows in which the gyroscope is.
-    usable_gyr: &'a [bool],
+    /// Between its samples, s.
+    interval: f64,
+    /// The gyroscope's samples.
+    rates: Option<Series<'a>>,
     gravity: f64,
     thermometry: Option<&'a Thermometry<'a>>,
 }
 
-impl<'a> Rests<'a> {
+impl Rests<'_> {
     fn detector(&self) -> RestDetector<'_> {
-        let Self { recording, usable_gyr, .. } = self;
-        let samples = Samples {
-            acc: self.series(),
-            gyr: recording.series(SensorKind::Gyr, usable_gyr),
-            temperature: recording.temperature.as_deref(),
-        };
-        RestDetector::new(samples, recording.median_interval().unwrap_or(1.0))
+        let temperature = self.recording.temperature.as_deref();
+        let samples = Samples { acc: self.series(), gyr: self.rates, temperature };
+        RestDetector::new(samples, self.recording.median_interval().unwrap_or(1.0))
     }
 
     fn series(&self) -> Series<'_> {
-        let Self { recording, acc, usable, .. } = self;
-        let interval = recording.sample_interval(SensorKind::Acc).unwrap_or(1.0);
-        Series { time: &recording.time, values: &acc.values, usable, interval }
+        let Self { recording, acc, usable, interval, .. } = self;
+        Series { time: &recording.time, values: &acc.values, usable, interval: *interval }
     }
 
     fn noise(&self, chosen: &Cut, step: Vector3<f64>) -> RestNoise {

@@ -295,8 +295,9 @@ impl Recording {
     pub fn sample_interval(&self, kind: SensorKind) -> Option<f64> {
         let values = &self.sensor(kind)?.values;
         let measured = |row: &usize| values[*row].iter().all(|component| component.is_finite());
-        let times: Vec<f64> = (0..values.len()).filter(measured).map(|row| self.time[row]).collect();
-        median(times.windows(2).map(|pair| pair[1] - pair[0]).collect())
+        let mut times = (0..values.len()).filter(measured).map(|row| self.time[row]);
+        let mut before = times.next()?;
+        median(times.map(|time| time - std::mem::replace(&mut before, time)).collect())
     }
 
     /// A sensor's samples in time, if it was recorded.

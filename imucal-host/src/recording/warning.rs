@@ -137,10 +137,9 @@ pub enum Warning {
     },
     /// Units that the manifest leaves out.
     #[error(
-        "{path}{}: [units] leaves out {}, which {} taken as said here; write the units the file is in",
+        "{path}{}: [units] does not state all units; assumed: {}; write those that the file is in",
         at_line(.line),
-        units(.assumed),
-        if .assumed.len() == 1 { "is" } else { "are" }
+        units(.assumed)
     )]
     UnitsAssumed {
         /// Manifest.

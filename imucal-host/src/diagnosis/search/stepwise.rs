@@ -55,17 +55,17 @@ pub fn search<'s>(
     let mut linear = Linearisation::fitted_alone(scene, candidates, &fit)?;
     let white = linear.weighing.white(&fit.residual);
     let mut none = linear.judge(&[], &white, &SensorKind::ALL, &FAR)?;
-    trace(&format!("none: {:.1} {:?}", none.log_evidence, none.noise));
+    trace(&format!("without an effect: log evidence {:.1}", none.log_evidence));
     // The first noise may hold much of the misfit that the first fit began with.
     for _ in 0..by.settling {
         fit = refit(scene, fit, Some(&none.noise))?;
         linear = Linearisation::fitted_alone(scene, candidates, &fit)?;
         let start = with_white(&none.noise, &linear.weighing.white(&fit.residual));
         none = linear.judge(&[], &start, &SensorKind::ALL, &FAR)?;
-        trace(&format!("none again: {:.1} {:?}", none.log_evidence, none.noise));
+        trace(&format!("the same with the noise estimated again: {:.1}", none.log_evidence));
     }
     linear = Linearisation::new(scene, candidates, &fit, &none.noise, None)?;
-    trace("shapes");
+    trace("shapes of the effects scanned");
     let mut at = Solution { best: none.clone(), none, fit, linear };
     let mut likeliest: Option<Solution<'s>> = None;
     let mut seen = vec![Vec::new()];
@@ -81,9 +81,10 @@ pub fn search<'s>(
         }
         seen.push(key(&to.set));
         let names: Vec<&str> = to.set.iter().map(|effect| effect.id.as_str()).collect();
-        trace(&format!("{:.1} → {:.1} {names:?}", at.best.log_evidence, to.log_evidence));
+        let (before, after) = (at.best.log_evidence, to.log_evidence);
+        trace(&format!("effects tried: {}; log evidence {before:.1} to {after:.1}", names.join(", ")));
         let next = at.advanced(found_in.as_ref().unwrap_or(&at.linear), to)?;
-        trace("refitted");
+        trace("fitted again with them");
         if comes_round {
             // The fit with one effect more would rather be without it: it has not kept what linear algebra promised.
             return next.settled();

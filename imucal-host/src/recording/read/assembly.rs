@@ -340,13 +340,10 @@ mod tests {
         let samples = "t,acc_x,acc_y,acc_z,mag_x,mag_y,mag_z\n0,0,0,9.8,40,0,0\n0.01,0,0,9.8,40,0,0\n";
         let assumed = |sections: &str| -> Vec<String> {
             let warnings = Fixture::new("run.csv", sections, samples).read().warnings;
-            warnings.iter().map(ToString::to_string).filter(|text| text.contains("leaves out")).collect()
+            warnings.iter().map(ToString::to_string).filter(|text| text.contains("does not state")).collect()
         };
         assert_says(&assumed("")[0], &["run.toml", "t = \"s\", acc = \"m/s^2\", mag = \"uT\""]);
-        assert_says(
-            &assumed("[units]\nt = \"s\"\nacc = \"m/s^2\"\n")[0],
-            &["leaves out mag = \"uT\", which is"],
-        );
+        assert_says(&assumed("[units]\nt = \"s\"\nacc = \"m/s^2\"\n")[0], &["assumed: mag = \"uT\";"]);
         assert!(assumed("[units]\nt = \"s\"\nacc = \"m/s^2\"\nmag = \"uT\"\n").is_empty());
     }
 
