@@ -15,11 +15,7 @@ pub const OTHER_TERMS: &str =
 
 /// All sensors; ends its lines.
 pub fn compared(comparison: &Comparison) -> String {
-    let mut text = match comparison.days {
-        0 => "both are of the same day\n".to_owned(),
-        1 => "one day from the first to the second\n".to_owned(),
-        days => format!("{days} days from the first to the second\n"),
-    };
+    let mut text = format!("{} days from the first to the second\n", comparison.days);
     for sensor in &comparison.sensors {
         text += &of_sensor(sensor);
     }
