@@ -7,7 +7,7 @@ use imucal_core::{
 };
 use imucal_host::{
     calibrate::{
-        Calibration, FitSummary, Options, calibrate,
+        Calibration, FitSummary, Follows, Options, Status, calibrate,
         fit::reference_fit,
         known_attitudes::mag_reference,
         mag::samples::{self, MagInput},
@@ -161,6 +161,31 @@ fn mounting_and_field_are_found_and_errors_are_as_large_as_stated() {
         let lag =
             notes.split("the sensor is ").nth(1).and_then(|rest| rest.split(' ').next()?.parse::<f64>().ok());
         assert!(lag.is_some_and(|lag| (lag - 20.0 * rows as f64).abs() < 0.3), "{notes}");
+    }
+}
+
+#[test]
+fn a_magnetometer_whose_reference_slips_or_whose_gain_steps_half_way_is_suspect() {
+    let slip = UnitQuaternion::from_scaled_axis(Vector3::new(0.6, 0.64, 0.48) * 2f64.to_radians());
+    let slipped = |recording: &mut Recording, half: usize| {
+        for [w, x, y, z] in &mut recording.reference.as_mut().expect("recorded")[half..] {
+            let q = nalgebra::Quaternion::new(*w, *x, *y, *z) * slip.into_inner();
+            [*w, *x, *y, *z] = [q.w, q.i, q.j, q.k];
+        }
+    };
+    let stepped = |recording: &mut Recording, half: usize| {
+        let values = &mut recording.mag.as_mut().expect("recorded").values;
+        values[half..].iter_mut().for_each(|value| *value *= 1.03);
+    };
+    let all: [&dyn Fn(&mut Recording, usize); 2] = [&slipped, &stepped];
+    for alter in all {
+        let mut recording = tracked(0);
+        let half = recording.rows() / 2;
+        alter(&mut recording, half);
+        let calibration = calibrate(&recording, &Options::default(), &|_| {});
+        let mag = calibration.sensor(SensorKind::Mag).expect("recorded");
+        let follows: Vec<_> = mag.suspicions.iter().map(|found| found.follows).collect();
+        assert_eq!((mag.status(), follows), (Status::Suspect, vec![Follows::Time]));
     }
 }
 
