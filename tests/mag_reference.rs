@@ -177,11 +177,11 @@ fn a_magnetometer_whose_reference_slips_or_whose_gain_steps_half_way_is_suspect(
         let values = &mut recording.mag.as_mut().expect("recorded").values;
         values[half..].iter_mut().for_each(|value| *value *= 1.03);
     };
-    let all: [&dyn Fn(&mut Recording, usize); 2] = [&slipped, &stepped];
-    for alter in all {
-        let mut recording = tracked(0);
-        let half = recording.rows() / 2;
-        alter(&mut recording, half);
+    let half = tracked(0).rows() / 2;
+    let [mut slips, mut steps] = [tracked(0), tracked(0)];
+    slipped(&mut slips, half);
+    stepped(&mut steps, half);
+    for recording in [slips, steps] {
         let calibration = calibrate(&recording, &Options::default(), &|_| {});
         let mag = calibration.sensor(SensorKind::Mag).expect("recorded");
         let follows: Vec<_> = mag.suspicions.iter().map(|found| found.follows).collect();
