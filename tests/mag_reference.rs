@@ -219,3 +219,31 @@ fn an_empty_reference_is_reported_once_and_field_forms_are_used() {
     let said = calibration.warnings.iter().filter(|w| w.contains("reference attitude is not used"));
     assert_eq!(said.count(), 1, "{:?}", calibration.warnings);
 }
+
+#[test]
+fn a_body_that_is_turned_against_the_accelerometer_is_named_with_the_angle() {
+    let mut draw = Draw::new(12);
+    let laid: Vec<UnitQuaternion<f64>> =
+        (0..26).map(|_| UnitQuaternion::from_rotation_matrix(&draw.attitude())).collect();
+    // 3 s of rest and 2 s of turning.
+    let attitude = |t: f64| {
+        let k = (t / 5.0) as usize;
+        let s = ((t - 5.0 * k as f64 - 3.0) / 2.0).clamp(0.0, 1.0);
+        laid[k].slerp(&laid[k + 1], s * s * (3.0 - 2.0 * s))
+    };
+    let mut recording = simulated::recorded(120.0, |t| {
+        let to_q = attitude(t).inverse();
+        let turned = (to_q * attitude(t + 1e-3)).scaled_axis() / 1e-3;
+        [to_q * Vector3::new(0.0, 0.0, -9.7997), turned, to_q * Vector3::new(25.3, 2.6, 40.1)]
+    });
+    let mounted = UnitQuaternion::from_scaled_axis(Vector3::z() * 20f64.to_radians());
+    let reference = recording.time.iter().map(|t| attitude(*t) * mounted);
+    recording.reference = Some(reference.map(|q| [q.w, q.i, q.j, q.k]).collect());
+    let calibration = calibrate(&recording, &Options::default(), &|_| {});
+    let found =
+        calibration.warnings.iter().find(|warning| warning.starts_with("acc: its axes are turned by"));
+    let degrees =
+        found.and_then(|warning| warning.split_whitespace().nth(6)?.strip_suffix('°')?.parse::<f64>().ok());
+    assert!(degrees.is_some_and(|degrees| (degrees - 20.0).abs() < 2.0), "{:?}", calibration.warnings);
+    assert!(found.is_some_and(|warning| warning.contains("in the body's axes: gyr, mag;")), "{found:?}");
+}

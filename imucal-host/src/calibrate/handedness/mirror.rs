@@ -25,7 +25,7 @@ use imucal_core::{
 };
 use nalgebra::Matrix3;
 
-use super::{gain_remark, turn_sense, turn_sense::Sense};
+use super::{body_axes, gain_remark, turn_sense, turn_sense::Sense};
 use crate::{
     calibrate::{
         fit::reference_fit,
@@ -60,6 +60,7 @@ pub fn check(recording: &Recording, calibration: &mut Calibration) {
     } else {
         by_hand(recording, calibration, turned);
     }
+    calibration.warnings.extend(body_axes::remark(recording, calibration));
     for outcome in &calibration.sensors {
         let by_gain =
             |refused: &Refused| matches!(refused.refusal, Refusal::Implausible { what: Quantity::Gain, .. });
@@ -220,7 +221,8 @@ fn along_reference(recording: &Recording, calibration: &Calibration) -> Option<A
     Some(Aligned { order, reversed: Some(down != (dip > 0.0)), dip })
 }
 
-fn force_along_reference(recording: &Recording) -> Option<UnifiedParameters<f64>> {
+/// The accelerometer along a reference, as its samples have it, roughly.
+pub(super) fn force_along_reference(recording: &Recording) -> Option<UnifiedParameters<f64>> {
     let (acc, reference) = (recording.acc.as_ref()?, recording.reference.as_ref()?);
     let usable: Vec<bool> = acc.values.iter().map(|force| force.iter().all(|x| x.is_finite())).collect();
     let (poses, _) = pose::along_reference(&acc.values, &usable, &motion::of_reference(reference));
