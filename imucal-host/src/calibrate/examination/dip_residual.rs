@@ -49,17 +49,16 @@ pub(super) fn examine(
         Tested { change, score: Score { shift, ..tested.score }, ..tested }
     };
     let of_course = |course: &Course| {
-        let largest = (0..count).map(|rest| course.value(rest).abs()).fold(0.0, f64::max);
         let test = |kind: &str, parameters: &[usize]| {
             let columns = DMatrix::from_fn(count, parameters.len(), |rest, k| {
                 rows.jacobian[rest][parameters[k]] * course.value(rest)
             });
             let score = test.test(&columns, parameters.len())?;
-            let name = format!("{}, as {kind} makes it that changes", course.name);
+            let name = course.changing(kind);
             let turns = parameters.len() == 3;
-            Some(turned(Tested::new(course.follows, name, score), turns.then_some(largest)))
+            Some(turned(Tested::new(course.follows, name, score), turns.then(|| course.largest(count))))
         };
-        [test("a mounting", &[0, 1, 2]), test("a field", &[3])]
+        [test("mounting", &[0, 1, 2]), test("field", &[3])]
     };
     let mut tests: Vec<Tested> = courses.iter().flat_map(of_course).flatten().collect();
     tests.extend(Tested::alone(&test, 1, 1, count, name).into_iter().map(|tested| turned(tested, None)));

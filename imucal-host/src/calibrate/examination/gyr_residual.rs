@@ -119,7 +119,7 @@ pub fn columns(
     let mut all = samples.map_or_else(|_| Vec::new(), |samples| altered(turns, &samples, theta));
     all.extend(courses.iter().map(|course| Columns {
         follows: course.follows,
-        name: format!("{}, as a gain makes it that changes", course.name),
+        name: course.changing("gain"),
         values: DMatrix::from_fn(count, 3, |row, axis| rows.jacobian[row][4 * axis] * course.value(row / 3)),
     }));
     all

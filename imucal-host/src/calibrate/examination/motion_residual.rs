@@ -168,7 +168,7 @@ fn of_parameters(rows: &Rows<GYROSCOPE_ENTRIES>, gain: &Matrix3<f64>, courses: &
     let of_course = |course: &Course| {
         let of_kind = |(kind, directions): &(&str, Vec<All>)| Columns {
             follows: course.follows,
-            name: format!("{}, as a {kind} makes it that changes", course.name),
+            name: course.changing(kind),
             values: along(rows, directions, &|motion| course.value(motion)),
         };
         kinds.iter().map(of_kind).collect::<Vec<_>>()

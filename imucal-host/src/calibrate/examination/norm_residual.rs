@@ -125,7 +125,7 @@ pub fn terms(observations: usize, courses: &[Course], memory: bool) -> Vec<Term<
     }
     for course in courses {
         for (shape, kind) in [(Shape::Bias, "bias"), (Shape::Gain, "gain")] {
-            let name = format!("{}, as a {kind} makes it that changes", course.name);
+            let name = course.changing(kind);
             all.push(Term { follows: course.follows, name, shape, course: Some(course) });
         }
     }

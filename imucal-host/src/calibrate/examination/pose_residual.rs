@@ -114,19 +114,19 @@ pub fn of_direction<'a>() -> impl Iterator<Item = Term<'a>> {
 /// What follows courses.
 pub fn of_courses(kind: SensorKind, courses: &[Course]) -> Vec<Term<'_>> {
     let surroundings = match kind {
-        SensorKind::Mag => (Alteration::Field, "a field makes it that changes"),
-        _ => (Alteration::Tilt, "a tilt of the base makes it that changes"),
+        SensorKind::Mag => (Alteration::Field, "field"),
+        _ => (Alteration::Tilt, "tilt of the base"),
     };
     let of_course = [
-        (Alteration::Bias, "a bias makes it that changes"),
-        (Alteration::Gain, "a gain makes it that changes"),
-        (Alteration::Mounting, "a mounting makes it that changes"),
+        (Alteration::Bias, "bias"),
+        (Alteration::Gain, "gain"),
+        (Alteration::Mounting, "mounting"),
         surroundings,
     ];
     let terms = courses.iter().flat_map(|course| {
         of_course.iter().map(move |(alteration, name)| Term {
             follows: course.follows,
-            name: format!("{}, as {name}", course.name),
+            name: course.changing(name),
             alteration: *alteration,
             course: Some(course),
         })
@@ -169,7 +169,7 @@ impl<G: Pose<f64>> PoseFit<'_, G> {
     pub fn change(&self, term: &Term<'_>, coefficients: &[f64]) -> Option<SVector<f64, UNIFIED>> {
         let course =
             term.course.filter(|_| matches!(term.alteration, Alteration::Gain | Alteration::Mounting))?;
-        let most = (0..self.poses.len()).map(|k| course.value(k).abs()).fold(0.0, f64::max);
+        let most = course.largest(self.poses.len());
         let along = directions(term.alteration, &self.parameters.sensitivity);
         Some(along.iter().zip(coefficients).map(|(along, c)| along * (*c * most)).sum())
     }

@@ -62,6 +62,16 @@ impl Course {
         }
     }
 
+    /// In words, of something that changes with it.
+    pub fn changing(&self, what: &str) -> String {
+        format!("{}, as a {what} makes it that changes", self.name)
+    }
+
+    /// Its largest value, of either sign, at so many observations.
+    pub fn largest(&self, observations: usize) -> f64 {
+        (0..observations).map(|k| self.value(k).abs()).fold(0.0, f64::max)
+    }
+
     /// The step that it is, if it is one.
     pub fn as_step(&self) -> Option<Step> {
         match self.shape {
