@@ -18,7 +18,7 @@ pub enum Follows {
     Rate,
     /// The specific force.
     Force,
-    /// The attitude that encoders show.
+    /// The attitude that encoders, or an accelerometer, show.
     Attitude,
     /// Single observations that disagree with their neighbours.
     Neighbours,

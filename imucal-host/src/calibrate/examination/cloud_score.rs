@@ -12,7 +12,14 @@ use super::{
     residual_driver::Course,
     tested::{Tested, least_of_many},
 };
-use crate::calibrate::fit::blocked_score::{BlockedScore, Rows};
+use crate::calibrate::{
+    fit::blocked_score::{BlockedScore, Rows},
+    suspicion::Follows,
+};
+
+/// A cloud's residual follows attitude where it is no likelier than this by chance, and takes this share of its square: while the
+/// unit rests its errors are one, and blocks of samples are not as independent of each other as the test takes them (`imucal study trust`: no healthy magnetometer is suspect for it).
+const ATTITUDE: (f64, f64) = (1e-9, 0.1);
 
 /// All tests of a cloud's residual that say something; none where the fit's derivatives are not of full rank.
 pub(super) fn tested<const P: usize>(
@@ -21,7 +28,7 @@ pub(super) fn tested<const P: usize>(
     courses: &[Course],
 ) -> Vec<Tested> {
     let samples = shell.points.len();
-    let terms = terms(samples, courses, false);
+    let terms = terms(samples, courses, shell.upward.as_deref(), false);
     let columns = Columns::of(&terms);
     // The residual has nothing of the terms of temperature left, and their freedom is gone.
     let independent = samples.saturating_sub(shell.warm);
@@ -33,7 +40,10 @@ pub(super) fn tested<const P: usize>(
             Some(step) => score.test_step(index, step.part, least),
             None => score.test(index, least),
         };
-        Some(Tested::new(term.follows, term.name.clone(), score?))
+        let score = score.filter(|score| {
+            term.follows != Follows::Attitude || (score.p < ATTITUDE.0 && score.explained > ATTITUDE.1)
+        })?;
+        Some(Tested::new(term.follows, term.name.clone(), score))
     };
     terms.iter().filter_map(test).collect()
 }
@@ -57,7 +67,7 @@ impl<'a> Columns<'a> {
     }
 
     fn index(&self, term: &Term<'a>) -> Option<usize> {
-        let key = |shape: Shape, course: Option<&'a Course>| (shape, course.map(std::ptr::from_ref));
+        let key = |shape: Shape<'a>, course: Option<&'a Course>| (shape, course.map(std::ptr::from_ref));
         let wanted = key(term.shape, Self::course(term));
         self.0.iter().position(|other| key(other.shape, other.course) == wanted)
     }

@@ -60,6 +60,8 @@ pub const CHANCE_OF_EXCESS: f64 = 5e-3;
 pub const MATERIAL: f64 = 2.5;
 /// Variance between rests over that within them, as 1/f noise has it over a hundred rests' time: log₂ of that is 7.
 pub(super) const SLOWER: f64 = 8.0;
+/// How old a sample of an accelerometer may be that shows where upward is, s.
+const AS_OF: f64 = 0.1;
 /// Share of the rows in motion that repeat the row before, above which samples are held.
 pub const HELD: f64 = 0.47;
 
@@ -133,7 +135,9 @@ impl Scene<'_> {
         let Some(fit) = &outcome.fit else { return Vec::new() };
         match &outcome.evidence {
             Some(Evidence::Shell { points, places, norm, diagonal, triad, std }) => {
-                let shell = Shell { points, places, norm: *norm, triad, std, warm: fit.warm_parameters() };
+                let upward = (outcome.kind == SensorKind::Mag).then(|| self.upward(places)).flatten();
+                let warm = fit.warm_parameters();
+                let shell = Shell { points, places, norm: *norm, triad, std, warm, upward };
                 let mut found = if *diagonal {
                     self.of_norm(outcome.kind, &shell, DIAGONAL)
                 } else {
@@ -154,6 +158,17 @@ impl Scene<'_> {
 
     pub(super) fn usable(&self, kind: SensorKind) -> &[bool] {
         self.integrity.sensor(kind).map_or(&[], |sensor| sensor.usable.as_slice())
+    }
+
+    /// Directions upward at some rows, in the axes of the accelerometer as it came; none where it has no sample near one.
+    fn upward(&self, rows: &[usize]) -> Option<Vec<Vector3<f64>>> {
+        let (values, time) = (&self.recording.acc.as_ref()?.values, &self.recording.time);
+        let upward = |row: &usize| {
+            let lately = |past: &usize| time[*row] - time[*past] < AS_OF;
+            let measured = |past: usize| values[past].try_normalize(0.0).filter(|up| up.x.is_finite());
+            (0..=*row).rev().take_while(lately).find_map(measured)
+        };
+        rows.iter().map(upward).collect()
     }
 
     /// Middle of a rest, a row.
@@ -220,7 +235,7 @@ impl Scene<'_> {
         let test = ScoreTest::new(&rows.residuals, rows.derivatives(count, &all), independent)?;
         let at: Vec<usize> = shell.places.iter().map(|rest| self.middle(*rest)).collect();
         let (directions, courses) = (shell.directions(shell.points), self.courses(&at));
-        let mut tests: Vec<Tested> = terms(count, &courses, true)
+        let mut tests: Vec<Tested> = terms(count, &courses, None, true)
             .into_par_iter()
             .filter_map(|term| {
                 let columns = term.columns(0, &directions);

@@ -6,10 +6,21 @@
 //! δ = e_j u_j φ     a gain that does
 //! δ = e_j u_j³, e_j u_j², e_j |u_j|     cubic and quadratic terms, and a gain that differs by sign
 //! δ = e_j u'_j            hysteresis; u': the direction at the rest before
+//! δ = Rᵀ G R ρ           a field that differs from place to place: r = ρᵀ Rᵀ G b
 //! ```
 //!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | R | rotation from the sensor's axes to the Earth's |
+//! | b, G | the field, and its gradient, Earth's axes |
+//! | ρ | from the point about which the unit was turned to the sensor, sensor's axes |
+//!
+//! The vector G b is fixed to the Earth. Its part along b is a bias of the sensor; the others have the columns e_j g_j and
+//! e_j (u × g)_j, where g points upward in the sensor's axes.
+//!
 //! and all spherical harmonics of degree 3 and 4 where there are observations enough; those of degree 0 to 2 are gain
-//! and bias. Source: ours, from the norm form. Not tested: what a norm is blind to, that is any rotation.
+//! and bias. Source: ours, from the norm form. Not tested: what a norm is blind to, that is any rotation, and a gradient
+//! along the field.
 
 use imucal_core::{observation::ShellPoint, triad::Triad};
 use nalgebra::{DMatrix, Vector3};
@@ -29,6 +40,8 @@ pub(super) struct Shell<'a> {
     pub std: &'a Triad<f64>,
     /// Parameters of temperature that were estimated with it.
     pub warm: usize,
+    /// Directions upward at each of a magnetometer's points, sensor's axes, where an accelerometer shows them.
+    pub upward: Option<Vec<Vector3<f64>>>,
 }
 
 impl Shell<'_> {
@@ -39,8 +52,8 @@ impl Shell<'_> {
 }
 
 /// What a residual does with its direction; see the module's equation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shape {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape<'a> {
     /// δ = e_j u_j³.
     Cubic,
     /// δ = e_j u_j².
@@ -53,15 +66,18 @@ pub enum Shape {
     Third,
     /// Harmonics of degree 4.
     Fourth,
+    /// δ = Rᵀ G R ρ, by the directions upward at all observations.
+    Gradient(&'a [Vector3<f64>]),
     /// δ = e_j.
     Bias,
     /// δ = e_j u_j.
     Gain,
 }
 
-impl Shape {
-    /// A row a direction, in the order of time; for hysteresis, whose first row has none before it, all directions at once.
-    pub fn columns(self, directions: &[Vector3<f64>]) -> DMatrix<f64> {
+impl Shape<'_> {
+    /// A row a direction, in the order of time, of observations that follow each other, the first of them `first`; for
+    /// hysteresis, whose first row has none before it, all directions at once.
+    pub fn columns(self, first: usize, directions: &[Vector3<f64>]) -> DMatrix<f64> {
         match self {
             Self::Cubic => by_axis(directions, |u| u * u * u * u),
             Self::Quadratic => by_axis(directions, |u| u * u * u),
@@ -71,6 +87,13 @@ impl Shape {
             }),
             Self::Third => harmonics(directions, third),
             Self::Fourth => harmonics(directions, fourth),
+            Self::Gradient(upward) => {
+                let upward = upward.get(first..).unwrap_or_default();
+                DMatrix::from_fn(directions.len(), 6, |row, column| {
+                    let (u, g) = (directions[row], upward.get(row).copied().unwrap_or_default());
+                    if column < 3 { g[column] } else { u.cross(&g)[column - 3] }
+                })
+            }
             Self::Bias => by_axis(directions, |u| u),
             Self::Gain => by_axis(directions, |u| u * u),
         }
@@ -85,7 +108,7 @@ pub struct Term<'a> {
     /// In words, after "follows".
     pub name: String,
     /// What it does with the direction.
-    pub shape: Shape,
+    pub shape: Shape<'a>,
     /// What it does with the observation.
     pub course: Option<&'a Course>,
 }
@@ -93,7 +116,7 @@ pub struct Term<'a> {
 impl Term<'_> {
     /// Its columns at observations that follow each other, the first of them `first`.
     pub fn columns(&self, first: usize, directions: &[Vector3<f64>]) -> DMatrix<f64> {
-        let mut columns = self.shape.columns(directions);
+        let mut columns = self.shape.columns(first, directions);
         if let Some(course) = self.course {
             for (row, mut values) in columns.row_iter_mut().enumerate() {
                 values *= course.value(first + row);
@@ -103,9 +126,15 @@ impl Term<'_> {
     }
 }
 
-/// All terms to test of so many observations. With `memory` the direction before is tested as well.
-pub fn terms(observations: usize, courses: &[Course], memory: bool) -> Vec<Term<'_>> {
-    let of_direction = |shape: Shape, name: &str| {
+/// All terms to test of so many observations. With `memory` the direction before is tested as well, with directions upward a
+/// magnetometer's field.
+pub fn terms<'a>(
+    observations: usize,
+    courses: &'a [Course],
+    upward: Option<&'a [Vector3<f64>]>,
+    memory: bool,
+) -> Vec<Term<'a>> {
+    let of_direction = |shape: Shape<'a>, name: &str| {
         let name = name.to_owned();
         Term { follows: Follows::Direction, name, shape, course: None }
     };
@@ -122,6 +151,11 @@ pub fn terms(observations: usize, courses: &[Course], memory: bool) -> Vec<Term<
         if observations >= EACH * (2 * degree + 1 + 9) {
             all.push(of_direction(shape, &format!("direction, by harmonics of degree {degree}")));
         }
+    }
+    if let Some(upward) = upward {
+        let name = "the attitude, as a field makes it that differs from place to place".to_owned();
+        let shape = Shape::Gradient(upward);
+        all.push(Term { follows: Follows::Attitude, name, shape, course: None });
     }
     for course in courses {
         for (shape, kind) in [(Shape::Bias, "bias"), (Shape::Gain, "gain")] {

@@ -121,6 +121,7 @@ pub const FAULTS: &[Fault] = &[
         hand.sense();
     }),
     inside("mag: a magnet comes near", &[Mag], magnet),
+    inside("mag: field differs from place to place", &[Mag], gradient),
     inside("mag: gain steps in the middle", &[Mag], |hand, random| {
         gain_step(hand, Mag, random.between(0.04, 0.1), random)
     }),
@@ -368,6 +369,21 @@ fn magnet(hand: &mut Hand, random: &mut Random) {
         let near = libm::pow(libm::sin(std::f64::consts::PI * share), 2.0);
         let towards = hand.input[row].f_q / G;
         hand.input[row].b_q += towards * (FIELD * size * near);
+    }
+    hand.sense();
+}
+
+/// The sensor is carried around the point about which the hand turns it, through a field whose gradient changes it by 2 to 6 %
+/// there. The gradient has no part along the field, which would be a bias of the sensor.
+fn gradient(hand: &mut Hand, random: &mut Random) {
+    let lever = random.normals().normalize();
+    let size = random.between(0.02, 0.06) * FIELD;
+    let heading = random.between(0.0, std::f64::consts::TAU);
+    for input in &mut hand.input {
+        let (along, upward) = (input.b_q.normalize(), input.f_q.normalize());
+        let east = along.cross(&upward).normalize();
+        let across = east * libm::cos(heading) + east.cross(&along) * libm::sin(heading);
+        input.b_q += (across * along.dot(&lever) + along * across.dot(&lever)) * size;
     }
     hand.sense();
 }

@@ -212,13 +212,14 @@ mod tests {
     }
 
     /// Each with what its sensor's residual follows, one of these; refused is as well.
-    const NAMED: [(&str, &[Follows]); 8] = [
+    const NAMED: [(&str, &[Follows]); 9] = [
         ("acc: warm-up, temperature recorded", &[Follows::Temperature, Follows::Time]),
         ("acc: a sixth of the rests off", &[Follows::Excess, Follows::Neighbours]),
         ("acc: clips before the noise", &[Follows::Direction]),
         ("acc: cubic", &[Follows::Direction]),
         ("mag: +5 µT for half the time", &[Follows::Time]),
         ("mag: cubic", &[Follows::Direction]),
+        ("mag: field differs from place to place", &[Follows::Attitude]),
         ("gyr: soft saturation", &[Follows::Rate]),
         ("samples lost under counted stamps", &[Follows::Neighbours, Follows::Excess]),
     ];
