@@ -2,7 +2,7 @@
 //! of one recording seldom differ.
 
 use imucal_host::{
-    calibrate::{self, calibrate},
+    calibrate::{self, Calibration, calibrate},
     diagnosis::{Diagnosis, Options, Verdict, diagnose, finding::Cause},
     observe::motion::of_reference,
     recording::{Recording, SensorKind},
@@ -44,8 +44,7 @@ fn model(recording: &Recording) -> StoredCalibration {
 
 /// A sensor by the full calibration, in the axes in which the accelerometer's K is symmetric, where it has one; `None`
 /// where its own is refused.
-fn calibrated(recording: &Recording, kind: SensorKind) -> Option<Calibrated> {
-    let calibration = calibrate(recording, &calibrate::Options::default(), &|_| ());
+fn calibrated(calibration: &Calibration, kind: SensorKind) -> Option<Calibrated> {
     let fit = |kind| calibration.sensor(kind).and_then(|outcome| outcome.accepted());
     let turn = fit(SensorKind::Acc).map_or_else(Matrix3::identity, |acc| {
         let svd = acc.triad.gain.try_inverse().expect("regular").svd(true, true);
@@ -65,8 +64,8 @@ struct Calibrated {
 }
 
 /// What a term is by the full calibration, component by component, with standard errors.
-fn expected(recording: &Recording, kind: SensorKind, term: &str) -> Option<Vec<(f64, f64)>> {
-    let Calibrated { k, bias, gain_std, bias_std } = calibrated(recording, kind)?;
+fn expected(calibration: &Calibration, kind: SensorKind, term: &str) -> Option<Vec<(f64, f64)>> {
+    let Calibrated { k, bias, gain_std, bias_std } = calibrated(calibration, kind)?;
     Some(match term {
         "bias" => (0..3).map(|axis| (bias[axis], bias_std[axis])).collect(),
         "scale" => (0..3).map(|axis| (k[(axis, axis)] - 1.0, gain_std[(axis, axis)])).collect(),
@@ -100,12 +99,13 @@ const SHOWING: [(&str, &[SensorKind]); 4] = [
 #[test]
 fn terms_removed_from_a_real_baseline_are_named_with_their_size() {
     let (mut named, mut sized, mut all) = (0, 0, 0);
-    let every = SHOWING.iter().flat_map(|(name, kinds)| kinds.iter().map(move |kind| (*name, *kind)));
-    for (name, kind) in every {
+    for (name, kinds) in SHOWING {
         let Some(recording) = read(name) else { return };
-        for term in ["bias", "scale", "misalignment"] {
+        let calibration = calibrate(&recording, &calibrate::Options::default(), &|_| ());
+        let terms = kinds.iter().flat_map(|kind| ["bias", "scale", "misalignment"].map(|term| (*kind, term)));
+        for (kind, term) in terms {
             let id = format!("{}.{term}", kind.prefix());
-            let Some(expected) = expected(&recording, kind, term) else {
+            let Some(expected) = expected(&calibration, kind, term) else {
                 println!("{name:<20} {id:<18} cannot be shown: nothing to calibrate it by");
                 continue;
             };
