@@ -3,8 +3,12 @@
 use std::{convert::Infallible, ops::RangeInclusive};
 
 mod stream;
+mod thermometer;
 
-pub use self::stream::{Applied, StreamError, stream};
+pub use self::{
+    stream::{Applied, StreamError, stream},
+    thermometer::Thermometer,
+};
 
 use imucal_core::{
     corrector::{Compensator, FullCorrector},
@@ -154,6 +158,7 @@ pub struct Correction<'a> {
     stored: &'a StoredCalibration,
     /// Of each sensor that is calibrated.
     cores: [Option<Compensator<f32, FullCorrector<f32>>>; 3],
+    thermometer: Thermometer,
 }
 
 impl<'a> Correction<'a> {
@@ -166,18 +171,25 @@ impl<'a> Correction<'a> {
         record: &CalibrationRecord<HigherOrder>,
     ) -> Result<Self, TooSteep> {
         let [acc, gyr, mag] = SensorKind::ALL.map(|kind| corrector(record, kind));
-        Ok(Self { stored, cores: [acc?, gyr?, mag?] })
+        Ok(Self { stored, cores: [acc?, gyr?, mag?], thermometer: Thermometer::new(stored) })
     }
 
     /// The next rows as [`apply`] gives them.
     #[must_use]
     pub fn correct(&mut self, part: Recording) -> Recording {
+        let warmth = self.thermometer.readings(&part);
         let cores = &mut self.cores;
-        let corrected = corrected_by(part, self.stored, |kind, raw, warmth| {
+        let corrected = corrected_by(part, self.stored, &warmth, |kind, raw, warmth| {
             let Some(core) = &mut cores[kind as usize] else { return Ok(raw.to_vec()) };
             Ok(raw.iter().zip(warmth).map(|(raw, warmth)| core.apply_at(raw, *warmth)).collect())
         });
         corrected.unwrap_or_else(|never: Infallible| match never {})
+    }
+
+    /// What of the temperatures so far is not as the calibration's terms want it, a sentence each.
+    #[must_use]
+    pub fn remarks(&self) -> Vec<String> {
+        self.thermometer.remarks()
     }
 }
 
@@ -194,7 +206,7 @@ pub fn corrector(
     Ok(Some(Compensator::new(FullCorrector::<f32>::try_from(triad)?)))
 }
 
-/// The same, corrected by whoever is called: with a sensor, its raw samples, and the temperature of each, °C or NaN.
+/// The same, corrected by whoever is called: with a sensor, its raw samples, and the temperature of each, °C, the last that was read, or NaN.
 ///
 /// # Errors
 /// Those of `correct`.
@@ -203,18 +215,16 @@ pub fn apply_by<E>(
     stored: &StoredCalibration,
     correct: impl FnMut(SensorKind, &[Vector3<f32>], &[f32]) -> Result<Vec<Vector3<f32>>, E>,
 ) -> Result<Recording, E> {
-    corrected_by(recording.clone(), stored, correct)
+    let warmth = Thermometer::new(stored).readings(recording);
+    corrected_by(recording.clone(), stored, &warmth, correct)
 }
 
 fn corrected_by<E>(
     mut corrected: Recording,
     stored: &StoredCalibration,
+    warmth: &[f32],
     mut correct: impl FnMut(SensorKind, &[Vector3<f32>], &[f32]) -> Result<Vec<Vector3<f32>>, E>,
 ) -> Result<Recording, E> {
-    let warmth: Vec<f32> = match &corrected.temperature {
-        Some(temperature) => temperature.iter().map(|t| *t as f32).collect(),
-        None => vec![f32::NAN; corrected.rows()],
-    };
     for kind in SensorKind::ALL {
         let Some(stored) = stored.triad(kind) else { continue };
         let triple = match kind {
@@ -225,7 +235,7 @@ fn corrected_by<E>(
         let Some(triple) = triple else { continue };
         let raw: Vec<_> = triple.raw_samples().collect();
         let nominal = nominal_out(stored, triple.nominal);
-        for (value, calibrated) in triple.values.iter_mut().zip(correct(kind, &raw, &warmth)?) {
+        for (value, calibrated) in triple.values.iter_mut().zip(correct(kind, &raw, warmth)?) {
             *value = calibrated.map(|x| nominal.to_si(f64::from(x)));
         }
         triple.unit = stored.unit_out;

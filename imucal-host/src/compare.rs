@@ -20,8 +20,8 @@
 //!
 //! Gain and bias are fitted together with nonlinear terms, so that calibrations which estimate other such terms are not compared.
 //!
-//! The biases are compared at B's reference temperature. Not looked at: correlations between parameters, and slopes of
-//! temperature.
+//! Gains and biases are compared at B's reference temperature, with what the errors of A's terms of temperature bring over the
+//! difference. Not looked at: correlations between parameters, and those terms themselves.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
@@ -226,10 +226,11 @@ fn of_sensor(
     if a.unit_in != b.unit_in {
         return Err(CompareFault::Units { sensor: kind, a: a.unit_in, b: b.unit_in });
     }
-    let bias_a = at_reference(a, b);
+    let at_reference = b.temperature.as_ref().map(|terms| a.at_temperature(terms.reference));
+    let a = at_reference.as_ref().unwrap_or(a);
     let (gain_a, gain_b) = (a.triad().gain, b.triad().gain);
     let inverse = gain_b.try_inverse().ok_or(CompareFault::Singular { sensor: kind })?;
-    let mut parameters = parameters(a, b, &bias_a, comparable);
+    let mut parameters = parameters(a, b, comparable);
     let chances = Normal::standard();
     let limit = -chances.inverse_cdf(0.5 * FALSE_ALARMS / parameters.len().max(1) as f64);
     parameters.iter_mut().for_each(|parameter| parameter.moved = parameter.z.abs() > limit);
@@ -238,7 +239,7 @@ fn of_sensor(
         unit: b.unit_out,
         parameters,
         limit,
-        bias_error: (gain_a * (Vector3::from(b.bias) - bias_a)).into(),
+        bias_error: (gain_a * (Vector3::from(b.bias) - Vector3::from(a.bias))).into(),
         gain: comparable.then(|| GainComparison::of(gain_a * inverse, a.field_norm.is_some())),
     })
 }
@@ -257,17 +258,8 @@ impl GainComparison {
     }
 }
 
-/// The first bias at the second's reference temperature, where both have one.
-fn at_reference(a: &StoredTriad, b: &StoredTriad) -> Vector3<f64> {
-    let bias = Vector3::from(a.bias);
-    match (&a.temperature, &b.temperature) {
-        (Some(own), Some(other)) => bias + Vector3::from(own.bias_slope) * (other.reference - own.reference),
-        _ => bias,
-    }
-}
-
 /// The parameters that both have estimated; without a verdict.
-fn parameters(a: &StoredTriad, b: &StoredTriad, bias_a: &Vector3<f64>, with_gains: bool) -> Vec<Moved> {
+fn parameters(a: &StoredTriad, b: &StoredTriad, with_gains: bool) -> Vec<Moved> {
     let of = |name: String, (a, a_std): (f64, f64), (b, b_std): (f64, f64)| {
         let std_error = a_std.hypot(b_std);
         (a_std > 0.0 && b_std > 0.0).then(|| Moved {
@@ -286,7 +278,7 @@ fn parameters(a: &StoredTriad, b: &StoredTriad, bias_a: &Vector3<f64>, with_gain
     });
     let biases = (0..3).filter_map(|axis| {
         let name = format!("bias_{}", AXES[axis]);
-        of(name, (bias_a[axis], a.bias_std[axis]), (b.bias[axis], b.bias_std[axis]))
+        of(name, (a.bias[axis], a.bias_std[axis]), (b.bias[axis], b.bias_std[axis]))
     });
     let (bent_a, bent_b) = (bent(a), bent(b));
     let terms = bent_a.into_iter().zip(bent_b).enumerate();
@@ -296,11 +288,14 @@ fn parameters(a: &StoredTriad, b: &StoredTriad, bias_a: &Vector3<f64>, with_gain
 
 #[cfg(test)]
 mod tests {
+    use imucal_core::temperature::TemperatureTerms;
+
     use super::*;
     use crate::{
         calibrate::{Options, calibrate},
         recording::unit::STANDARD_GRAVITY,
         simulator::{SimulatedUnit, Tumble, record},
+        store::StoredTemperature,
     };
 
     fn calibrated(seed: u64) -> StoredCalibration {
@@ -333,6 +328,37 @@ mod tests {
         let moved: Vec<&str> = acc.parameters.iter().filter(|p| p.moved).map(|p| p.name.as_str()).collect();
         assert_eq!(moved, ["bias_y"]);
         assert!((acc.bias_error[1] / STANDARD_GRAVITY - 5e-3).abs() < 1e-4, "{:?}", acc.bias_error);
+    }
+
+    #[test]
+    fn a_law_of_temperature_that_is_kept_at_two_references_has_not_moved() {
+        let mut before = calibrated(1);
+        let acc = before.acc.as_mut().expect("calibrated");
+        let linear = TemperatureTerms { reference: 20.0, bias_slope: [3e-3; 3], scale_slope: [-1.2e-3; 3] };
+        let stored = |linear: &TemperatureTerms<f64>| StoredTemperature {
+            reference: linear.reference,
+            bias_slope: linear.bias_slope,
+            scale_slope: linear.scale_slope,
+            quality: None,
+            curvature: None,
+        };
+        acc.temperature = Some(stored(&linear));
+        let mut after = before.clone();
+        let later = after.acc.as_mut().expect("calibrated");
+        let warm = linear.at(&later.triad(), 28.0);
+        later.bias = warm.bias.into();
+        later.gain = std::array::from_fn(|row| later.gain[row].map(|entry| warm.factor[row] * entry));
+        later.temperature = Some(stored(&linear.from_reference(28.0)));
+        let found = |other: &StoredCalibration| compare(&before, other, false).expect("of one unit").sensors;
+        let same = found(&after).remove(0);
+        assert!(same.parameters.iter().all(|parameter| parameter.z.abs() < 1e-6), "{same:?}");
+        let scale = same.gain.expect("the same axes").scale_error;
+        assert!(scale.iter().all(|error| error.abs() < 1e-12), "{scale:?}");
+        // One that has moved by a thousandth is found at the other temperature as well.
+        let later = after.acc.as_mut().expect("calibrated");
+        later.gain[0][0] *= 1.001;
+        let moved = found(&after).remove(0);
+        assert!((moved.gain.expect("the same axes").scale_error[0] + 1e-3).abs() < 1e-5, "{moved:?}");
     }
 
     #[test]

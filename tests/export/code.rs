@@ -39,16 +39,7 @@ fn corrected_in_c(folder: &Path, kind: SensorKind, samples: &[([f32; 3], f32)]) 
     let (source, program) = (folder.join(format!("{kind}.c")), folder.join(format!("{kind}-program")));
     fs::write(&source, main).expect("room");
     let compiled = Command::new("cc")
-        .args([
-            "-std=c99",
-            "-O2",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            "-Wno-unused-const-variable",
-            "-ffp-contract=off",
-            "-o",
-        ])
+        .args(["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", "-o"])
         .arg(&program)
         .arg(&source)
         .output()

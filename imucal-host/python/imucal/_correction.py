@@ -42,9 +42,9 @@ def apply(
     never copied.
     """
     if isinstance(samples, Recording):
-        corrected, warning = _native.apply(samples._native, calibration._native, other_serial)
-        if warning is not None:
-            warnings.warn(warning, ImucalWarning, stacklevel=2)
+        corrected, remarks = _native.apply(samples._native, calibration._native, other_serial)
+        for remark in remarks:
+            warnings.warn(remark, ImucalWarning, stacklevel=2)
         return Recording(corrected)
     arrays = {name: np.ascontiguousarray(values, dtype=np.float32) for name, values in samples.items()}
     temperature = arrays.pop("temperature", None)

@@ -2,7 +2,11 @@
 
 use std::{path::Path, sync::Arc};
 
-use imucal_host::apply::{apply as correct_all, check, corrector};
+use imucal_core::nonlinearity::TooSteep;
+use imucal_host::{
+    apply::{Correction, check, corrector},
+    recording::Recording as Recorded,
+};
 use nalgebra::Vector3;
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -17,20 +21,26 @@ use crate::{
 /// What messages call a calibration that is in memory.
 const NAME: &str = "the calibration";
 
-/// A recording with its calibrated sensors corrected, and a warning where nobody can know whether both belong together.
+/// A recording with its calibrated sensors corrected, and warnings: that nobody can know whether both belong together, and what is not
+/// as the calibration's terms of temperature want it.
 #[pyfunction]
 pub(crate) fn apply(
     py: Python<'_>,
     recording: &Recording,
     calibration: &Calibration,
     other_serial: bool,
-) -> PyResult<(Recording, Option<String>)> {
+) -> PyResult<(Recording, Vec<String>)> {
     let stored = calibration.stored();
     let record = stored.to_record(Path::new(NAME)).map_err(failure::mismatch)?;
     let recording = Arc::clone(&recording.0);
     let warning = check(&recording, &stored, &record, other_serial).map_err(failure::mismatch)?;
-    let corrected = work::run(py, move || correct_all(&recording, &stored, &record))?;
-    Ok((Recording::new(corrected.map_err(failure::mismatch)?), warning))
+    let corrected = work::run(py, move || {
+        let mut correction = Correction::new(&stored, &record)?;
+        let corrected = correction.correct(Recorded::clone(&recording));
+        Ok::<_, TooSteep>((corrected, correction.remarks()))
+    })?;
+    let (corrected, remarks) = corrected.map_err(failure::mismatch)?;
+    Ok((Recording::new(corrected), warning.into_iter().chain(remarks).collect()))
 }
 
 /// Raw samples of one sensor, corrected; `raw` is read where it is, and the result is not copied.

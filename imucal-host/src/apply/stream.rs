@@ -26,8 +26,8 @@ pub struct Applied {
     pub rows: usize,
     /// What was odd but harmless in it.
     pub warnings: Vec<Warning>,
-    /// That nobody can know whether it and the calibration belong together.
-    pub remark: Option<String>,
+    /// That nobody can know whether it and the calibration belong together, and what is not as its terms of temperature want it.
+    pub remarks: Vec<String>,
 }
 
 /// Why a file was not corrected.
@@ -78,13 +78,16 @@ pub fn stream(
     let (rows, warnings) = (transferred.rows, transferred.warnings);
     match first {
         Some((_, Err(refusal))) => Err(StreamError::Refused { refusal, warnings }),
-        Some((recording, Ok(remark))) => Ok(Applied { recording, rows, warnings, remark }),
+        Some((recording, Ok(remark))) => {
+            let remarks = remark.into_iter().chain(correction.remarks()).collect();
+            Ok(Applied { recording, rows, warnings, remarks })
+        }
         None => Err(ReadError::NoRows { path: source.path.to_path_buf() }.into()),
     }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::{fs, path::PathBuf};
 
     use super::*;
@@ -93,7 +96,7 @@ mod tests {
     const MANIFEST: &str = "format = \"imucal-recording/1\"\n[units]\nt = \"s\"\nacc = \"counts\"\n\
         [counts]\nacc = { offset = 32768.0, per_unit = 600.0 }\n";
     /// Temperature and nonlinear terms.
-    const CALIBRATION: &str = r#"
+    pub(in crate::apply) const CALIBRATION: &str = r#"
 format = "imucal-calibration/1"
 recording = "run.csv"
 date = "2026-11-26"
@@ -185,7 +188,7 @@ cross_std = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
         let manifest = |name: &str| fs::read_to_string(bench.path(name)).unwrap();
         assert_eq!(manifest("parts.toml"), manifest("whole.toml"));
         assert_eq!((applied.rows, &applied.warnings), (whole.rows(), &whole.warnings));
-        assert!(applied.remark.unwrap().contains("no serial"));
+        assert!(applied.remarks.len() == 1 && applied.remarks[0].contains("no serial"));
     }
 
     #[test]

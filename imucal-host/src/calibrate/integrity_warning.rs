@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::recording::check::integrity::{Gap, Integrity};
+use crate::recording::check::integrity::{Gap, Integrity, SensorIntegrity};
 
 /// As many of a kind are listed one by one.
 const LISTED: usize = 8;
@@ -23,9 +23,14 @@ pub(super) fn of(integrity: &Integrity, rows: usize) -> Vec<String> {
             let name = format!("{prefix}_{}", ["x", "y", "z"][axis]);
             warnings.extend(left_out(&name, "clipped", &stretches));
         }
-        warnings.extend(left_out(prefix, "stuck", &sensor.stuck));
+        warnings.extend(stuck(sensor));
     }
     warnings
+}
+
+/// Warnings of the stretches in which a sensor repeats itself.
+pub(crate) fn stuck(sensor: &SensorIntegrity) -> Vec<String> {
+    left_out(sensor.sensor.prefix(), "stuck", &sensor.stuck)
 }
 
 fn gaps(gaps: &[Gap], rows: usize) -> Vec<String> {

@@ -17,7 +17,7 @@ pub mod fit;
 pub mod gyr;
 pub mod handedness;
 pub(crate) mod inertial;
-mod integrity_warning;
+pub(crate) mod integrity_warning;
 pub mod known_attitudes;
 pub mod mag;
 pub mod nonlinear_terms;

@@ -71,7 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Err(error) => return Err(error.into()),
     };
     applied.warnings.iter().for_each(|warning| warn(warning));
-    applied.remark.iter().for_each(|remark| warn(remark));
+    applied.remarks.iter().for_each(|remark| warn(remark));
     files.commit()?;
     say!("{}: {} rows corrected into {}", applied.recording, applied.rows, out.display());
     Ok(Ending::Done)

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::Args;
 
 use super::{
     Ending,
     calibrate::today,
     columns::{self, Columns},
+    json::Json,
     load, output,
     overwrite::{Overwrite, Planned, files_of},
     reading::Reading,
@@ -34,9 +34,8 @@ pub(super) struct Arguments {
     /// Check a calibration made for another serial
     #[arg(long)]
     other_serial: bool,
-    /// Write the comparison with the recording's own calibration as JSON
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: Json,
     #[command(flatten)]
     overwrite: Overwrite,
     #[command(flatten)]
@@ -46,7 +45,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let outputs: Vec<Planned> = arguments.json.iter().map(Planned::new).collect();
+    let outputs: Vec<Planned> = arguments.json.planned().into_iter().collect();
     let mut inputs = files_of(&arguments.recording);
     inputs.push(arguments.calibration.clone());
     let mut files = arguments.overwrite.plan(&inputs, &outputs)?;
@@ -71,13 +70,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         }
         Err(fault) => return Ok(refuse(&fault)),
     };
-    output::text(&(verdicts(&comparison) + &unchecked(&stored, &calibration, &comparison.other_terms)))?;
-    output::text(&report::compare::compared(&comparison))?;
-    if let Some(path) = &arguments.json {
-        let json =
-            serde_json::to_string_pretty(&comparison).context("the comparison cannot be spelt as JSON")?;
-        files.add(path, (json + "\n").as_bytes())?;
-    }
+    let text = || {
+        let unchecked = unchecked(&stored, &calibration, &comparison.other_terms);
+        verdicts(&comparison) + &unchecked + &report::compare::compared(&comparison)
+    };
+    arguments.json.give(&mut files, &comparison, &text)?;
     files.commit()?;
     let fits = comparison.sensors.iter().all(|sensor| !sensor.has_moved());
     Ok(if fits { Ending::Done } else { Ending::Refused })

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use clap::Args;
 
 use super::{
     Ending,
     html::Html,
-    load, output,
+    json::Json,
+    load,
     overwrite::{Overwrite, Planned},
     reading::Reading,
     refuse,
@@ -25,9 +25,8 @@ pub(super) struct Arguments {
     /// Compare calibrations of two serials
     #[arg(long)]
     other_serial: bool,
-    /// Write the comparison as JSON
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: Json,
     #[command(flatten)]
     html: Html,
     #[command(flatten)]
@@ -38,7 +37,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let outputs: Vec<Planned> =
-        arguments.json.iter().map(Planned::new).chain(arguments.html.planned()).collect();
+        arguments.json.planned().into_iter().chain(arguments.html.planned()).collect();
     let inputs = [arguments.first.clone(), arguments.second.clone()];
     let mut files = arguments.overwrite.plan(&inputs, &outputs)?;
     let mut both = Vec::new();
@@ -52,13 +51,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Ok(comparison) => comparison,
         Err(fault) => return Ok(refuse(&fault)),
     };
-    output::text(&report::compare::compared(&comparison))?;
-    if let Some(path) = &arguments.json {
-        let json = serde_json::to_string_pretty(&comparison)
-            .context("the comparison cannot be spelt as JSON")?
-            + "\n";
-        files.add(path, json.as_bytes())?;
-    }
+    arguments.json.give(&mut files, &comparison, &|| report::compare::compared(&comparison))?;
     let title = format!("{} to {}", name(&arguments.first), name(&arguments.second));
     let inputs = [("first", arguments.first.as_path()), ("second", &arguments.second)];
     let facts = |provenance: page::Provenance| {

@@ -32,6 +32,7 @@ mod html;
 mod import;
 mod inspect;
 mod interrupt;
+mod json;
 mod manual;
 mod noise;
 mod output;

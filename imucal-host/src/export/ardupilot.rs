@@ -31,7 +31,7 @@ pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
             line(format!("INS_ACCSCAL_{axis}"), acc.gain[(at, at)], "no unit, after the offset");
         }
         cannot.push(format!(
-            "axes of acc that are not orthogonal: up to {:.2e} rad are left out",
+            "the gain of acc off its diagonal, up to {:.2e}: angles between its axes, and a turn of them all",
             skew(&acc.gain)
         ));
     }

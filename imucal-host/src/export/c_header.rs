@@ -66,7 +66,7 @@ fn of_triad(text: &mut String, kind: SensorKind, triad: &StoredTriad) -> Result<
     })?;
     let crossed = bent.is_some_and(|bent| bent.cross.as_flattened().iter().any(|entry| *entry as f32 != 0.0));
     let _ = writeln!(text, "\n/* {kind}: raw in {}, calibrated in {} */", triad.unit_in, triad.unit_out);
-    let _ = writeln!(text, "static const imucal_triad imucal_{kind} = {{");
+    let _ = writeln!(text, "static const imucal_triad imucal_{kind} IMUCAL_UNUSED = {{");
     // A bias of -0 is 0 in the core.
     let bias = triad.bias.map(|value| value + 0.0);
     let _ = writeln!(text, "    {}, /* gain, calibrated per raw unit, by rows */", matrix(&triad.gain));

@@ -33,7 +33,7 @@ pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
             line(format!("CAL_ACC0_{axis}SCALE"), acc.gain[(at, at)], "no unit, after the offset");
         }
         cannot.push(format!(
-            "axes of acc that are not orthogonal: up to {:.2e} rad are left out",
+            "the gain of acc off its diagonal, up to {:.2e}: angles between its axes, and a turn of them all",
             skew(&acc.gain)
         ));
     }
@@ -43,7 +43,7 @@ pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
         }
         let scale = gyr.gain.diagonal().iter().map(|entry| (entry - 1.0).abs()).fold(0.0, f64::max);
         cannot.push(format!(
-            "scale and axes of gyr: up to {:.2} % and {:.2e} rad are left out",
+            "the gain of gyr: up to {:.2} % of scale, and {:.2e} off its diagonal",
             100.0 * scale,
             skew(&gyr.gain)
         ));

@@ -69,10 +69,13 @@ pub struct Units {
     /// Of `t`.
     pub t: TimeUnit,
     /// Of the accelerometer.
+    #[serde(deserialize_with = "Unit::deserialize_acc")]
     pub acc: Unit,
     /// Of the gyroscope.
+    #[serde(deserialize_with = "Unit::deserialize_gyr")]
     pub gyr: Unit,
     /// Of the magnetometer.
+    #[serde(deserialize_with = "Unit::deserialize_mag")]
     pub mag: Unit,
     /// Of `temp`.
     pub temp: TemperatureUnit,

@@ -106,8 +106,15 @@ pub(super) fn opened(
     };
     let mut manifest = mapping.over(manifest);
     if format == Format::Log {
-        stamped(path, &mut manifest, &mut warnings);
+        stamped(path, TimeUnit::Nanosecond, &mut manifest, &mut warnings);
         warnings.extend(of_driver(path, &manifest, mapping));
+    }
+    #[cfg(feature = "parquet")]
+    if let Some(unit) = Some(path)
+        .filter(|_| format == Format::Parquet)
+        .and_then(|path| read::parquet::unit_of_stamps(path, mapping))
+    {
+        stamped(path, unit, &mut manifest, &mut warnings);
     }
     Ok((format, manifest, warnings))
 }
@@ -153,12 +160,19 @@ fn manifest_of_log(path: &Path, limits: &Limits) -> Result<(Manifest, Vec<Warnin
     }
 }
 
-/// Stamps are in nanoseconds, whatever a manifest says.
-pub(super) fn stamped(path: &Path, manifest: &mut Manifest, warnings: &mut Vec<Warning>) {
-    let unit = mem::replace(&mut manifest.units.t, TimeUnit::Nanosecond);
-    if unit != TimeUnit::Nanosecond && unit != Manifest::default().units.t {
-        warnings.push(Warning::UnitOfStamps { path: path.to_path_buf(), unit });
+/// Stamps are in a unit of the file's own, whatever a manifest says or leaves out.
+pub(super) fn stamped(path: &Path, found: TimeUnit, manifest: &mut Manifest, warnings: &mut Vec<Warning>) {
+    let unit = mem::replace(&mut manifest.units.t, found);
+    if unit != found && unit != Manifest::default().units.t {
+        warnings.push(Warning::UnitOfStamps { path: path.to_path_buf(), unit, found });
     }
+    warnings.retain_mut(|warning| match warning {
+        Warning::UnitsAssumed { assumed, .. } => {
+            assumed.retain(|(key, _)| *key != "t");
+            !assumed.is_empty()
+        }
+        _ => true,
+    });
 }
 
 /// Units that a driver uses in place of ROS's.

@@ -197,6 +197,11 @@ pub enum ReadError {
         expected: &'static str,
         suggestion: Unit,
     },
+    /// Columns of a Parquet file are compressed by what this program does not read.
+    #[error(
+        "{path}: found columns compressed by brotli or lzo, expected gzip, lz4, snappy, zstd or nothing; write it by one of these"
+    )]
+    Compression { path: PathBuf },
     /// The times cannot be in the unit the manifest says, or in none.
     #[error(
         "{path}, from {from} on, column `t`: the median interval is {found:e} s when read as `{unit}`, {lasting:.3} s in all, expected 2.5e-5 to 0.2 s and some minutes (up to 2 s without a gyroscope); {remedy}"

@@ -2,7 +2,7 @@
 
 use std::{f64::consts::PI, fmt, str::FromStr};
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, de::Error as _};
 
 use super::sensor_kind::SensorKind;
 
@@ -99,6 +99,26 @@ impl Unit {
     pub fn list(kind: SensorKind) -> String {
         let names: Vec<String> = Self::of(kind).iter().map(ToString::to_string).collect();
         names.join(", ")
+    }
+
+    /// From a file's text; that of no sensor is answered with the accelerometer's units.
+    pub(crate) fn deserialize_acc<'de, D: Deserializer<'de>>(text: D) -> Result<Self, D::Error> {
+        Self::deserialize_of(SensorKind::Acc, text)
+    }
+
+    /// The same of a gyroscope.
+    pub(crate) fn deserialize_gyr<'de, D: Deserializer<'de>>(text: D) -> Result<Self, D::Error> {
+        Self::deserialize_of(SensorKind::Gyr, text)
+    }
+
+    /// The same of a magnetometer.
+    pub(crate) fn deserialize_mag<'de, D: Deserializer<'de>>(text: D) -> Result<Self, D::Error> {
+        Self::deserialize_of(SensorKind::Mag, text)
+    }
+
+    fn deserialize_of<'de, D: Deserializer<'de>>(kind: SensorKind, text: D) -> Result<Self, D::Error> {
+        let of_sensor = |unknown| UnknownUnit { expected: Self::list(kind), ..unknown };
+        String::deserialize(text)?.parse().map_err(|unknown| D::Error::custom(of_sensor(unknown)))
     }
 
     /// How many of this unit make one of the SI side (m/s², rad/s, µT); `None` for counts, which only
@@ -248,6 +268,7 @@ impl fmt::Display for TimeUnit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recording::manifest::Units;
 
     #[test]
     fn every_unit_reads_back_what_it_prints() {
@@ -267,6 +288,15 @@ mod tests {
     fn an_unknown_unit_names_itself_and_the_units_there_are() {
         let message = "m/s2".parse::<Unit>().unwrap_err().to_string();
         assert!(message.contains("`m/s2`") && message.contains("m/s^2, g, mg, counts"), "{message}");
+    }
+
+    #[test]
+    fn an_unknown_unit_of_a_manifest_names_those_of_its_sensor() {
+        let fault = |line: &str| toml::from_str::<Units>(line).unwrap_err().to_string();
+        let message = fault("gyr = \"dps\"");
+        assert!(message.contains("unknown unit `dps`; expected rad/s, deg/s, counts;"), "{message}");
+        assert!(fault("mag = \"T\"").contains("expected uT, mG, G, nT, counts, a.u.;"));
+        assert!(fault("acc = 1").contains("expected a string"));
     }
 
     #[test]

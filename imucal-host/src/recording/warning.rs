@@ -233,12 +233,14 @@ pub enum Warning {
         usual: &'static str,
     },
     /// A unit of times that the file does not have.
-    #[error("{path}: t = \"{unit}\" is stated, where the stamps are in ns; it was ignored")]
+    #[error("{path}: t = \"{unit}\" is stated, where the stamps are in {found}; it was ignored")]
     UnitOfStamps {
         /// The file.
         path: PathBuf,
         /// The stated unit.
         unit: TimeUnit,
+        /// That of the stamps.
+        found: TimeUnit,
     },
     /// Samples that do not stand at the times of the rows.
     #[error(

@@ -14,7 +14,7 @@ use super::{
 use crate::calibrate::nonlinear_terms::NonlinearFinding;
 
 /// What temperature terms were found from, and how well; see [`TemperatureQuality`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StoredTemperatureQuality {
     /// Least and greatest temperature of the calibration, °C.
@@ -26,7 +26,7 @@ pub struct StoredTemperatureQuality {
 }
 
 /// Temperature to second order; see [`CurvatureRecord`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StoredCurvature {
     /// `unit_in` per kelvin².

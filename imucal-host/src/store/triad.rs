@@ -1,6 +1,10 @@
 //! One sensor of a stored calibration.
 
-use imucal_core::{record, triad::Triad};
+use imucal_core::{
+    record,
+    temperature::{TemperatureCurvature, TemperatureTerms, Warmth},
+    triad::Triad,
+};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -68,6 +72,37 @@ impl StoredTriad {
     }
 }
 
+impl StoredTriad {
+    /// As it is at another reference temperature, °C, without terms of temperature: gain and bias, with standard errors that those of
+    /// the terms bring over the difference. Correlations between entries and terms are not kept, and not taken into account.
+    #[must_use]
+    pub fn at_temperature(&self, temperature: f64) -> Self {
+        let Some(terms) = &self.temperature else { return self.clone() };
+        let Warmth { bias, factor } = terms.warmth(&self.triad(), temperature);
+        let change = temperature - terms.reference;
+        let brought = |slope: [f64; 3], square: [f64; 3]| -> [f64; 3] {
+            std::array::from_fn(|axis| (change * slope[axis]).hypot(change * change * square[axis]))
+        };
+        let (quality, curvature) = (terms.quality.unwrap_or_default(), terms.curvature.unwrap_or_default());
+        let by_bias = brought(quality.bias_slope_std, curvature.bias_std);
+        let by_scale = brought(quality.scale_slope_std, curvature.scale_std);
+        let entries = |of: &dyn Fn(usize, usize) -> f64| -> [[f64; 3]; 3] {
+            std::array::from_fn(|row| std::array::from_fn(|column| of(row, column)))
+        };
+        Self {
+            gain: entries(&|row, column| factor[row] * self.gain[row][column]),
+            bias: bias.into(),
+            gain_std: entries(&|row, column| match self.gain_std[row][column] {
+                std if std > 0.0 => (factor[row] * std).hypot(self.gain[row][column] * by_scale[row]),
+                not_estimated => not_estimated,
+            }),
+            bias_std: std::array::from_fn(|axis| self.bias_std[axis].hypot(by_bias[axis])),
+            temperature: None,
+            ..self.clone()
+        }
+    }
+}
+
 /// Where a triad comes from; see [`imucal_core::record::Provenance`].
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -96,4 +131,13 @@ pub struct StoredTemperature {
     /// The second order.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub curvature: Option<StoredCurvature>,
+}
+
+impl StoredTemperature {
+    fn warmth(&self, triad: &Triad<f64>, temperature: f64) -> Warmth<f64> {
+        let Self { reference, bias_slope, scale_slope, .. } = *self;
+        let curvature = self.curvature.unwrap_or_default();
+        let curvature = TemperatureCurvature { bias: curvature.bias, scale: curvature.scale };
+        TemperatureTerms { reference, bias_slope, scale_slope }.at_curved(&curvature, triad, temperature)
+    }
 }

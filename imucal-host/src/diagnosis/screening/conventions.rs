@@ -14,7 +14,7 @@ use crate::{
         Recording, SensorKind,
         check::integrity::{Integrity, SensorIntegrity},
     },
-    simulator::{Dose, Motion},
+    simulator::{Dose, Motion, Recorded},
 };
 
 mod axis_swap;
@@ -157,11 +157,15 @@ fn against_stream(
 pub fn check(
     recording: &Recording,
     integrity: &Integrity,
-    motion: &dyn Motion,
+    motion: &dyn Recorded,
     source: Provided,
 ) -> Conventions {
     let mut found = Conventions::default();
-    let rows = rows(recording);
+    let mut rows = rows(recording);
+    if source.followed {
+        // A stream may begin late or end early.
+        rows.retain(|row| motion.known()[*row]);
+    }
     let truth = truth(recording, motion, &rows, 0.0);
     // Without the heading there is no field to compare a magnetometer with.
     let is_compared = |kind: SensorKind| {

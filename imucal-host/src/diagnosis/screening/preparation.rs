@@ -12,6 +12,7 @@ use super::{
     pose_conventions, reference_offset, stream_conventions,
 };
 use crate::{
+    calibrate::integrity_warning,
     diagnosis::{
         error::DiagnosisError,
         reference::{
@@ -160,6 +161,7 @@ impl Preparation {
             return Err(DiagnosisError::Recording(why));
         }
         let mut remarks = conventions.remarks;
+        remarks.extend(integrity.sensors.iter().flat_map(integrity_warning::stuck));
         remarks.extend(repeated.flatten());
         remarks.extend(of_pose.remarks);
         remarks.extend(of_stream.remarks.iter().cloned());

@@ -87,7 +87,7 @@ pub fn search<'s>(
         trace("fitted again with them");
         if comes_round {
             // The fit with one effect more would rather be without it: it has not kept what linear algebra promised.
-            return next.settled();
+            return next.settled()?.without_idle();
         }
         let left = std::mem::replace(&mut at, next);
         if likeliest.as_ref().is_none_or(|most| left.is_likelier(most)) {
@@ -95,10 +95,26 @@ pub fn search<'s>(
         }
     }
     // What a move promises by linear algebra the fit through the simulator need not keep.
-    Ok(likeliest.filter(|most| most.is_likelier(&at)).unwrap_or(at))
+    likeliest.filter(|most| most.is_likelier(&at)).unwrap_or(at).without_idle()
 }
 
 impl<'s> Solution<'s> {
+    /// Without the effects that the fit has left at no size: what they would explain has the sign that they cannot have, and what
+    /// was fitted next to them has made room for them. Nothing takes their place, since it would be named for that room.
+    fn without_idle(mut self) -> Result<Self, DiagnosisError> {
+        loop {
+            let acts = |effect: &&'static Effect| {
+                !self.fit.doses.iter().any(|dose| dose.effect == *effect && !dose.acts())
+            };
+            let set: Vec<&'static Effect> = self.best.set.iter().copied().filter(acts).collect();
+            if set.len() == self.best.set.len() {
+                return Ok(self);
+            }
+            let rest = self.linear.judge(&set, &self.best.noise, &SensorKind::ALL, &FAR)?;
+            self = self.advanced(&self.linear, rest)?.settled()?;
+        }
+    }
+
     /// With the noise that suits its set.
     fn settled(mut self) -> Result<Self, DiagnosisError> {
         self.best = self.linear.judge(&self.best.set, &self.best.noise, &SensorKind::ALL, &FAR)?;

@@ -19,7 +19,7 @@ use crate::{
     file::{Limits, limits::Size},
     recording::{
         Recording, manifest::Manifest, parts::stamped, place::Place, read_error::ReadError,
-        sensor_kind::SensorKind, warning::Warning,
+        sensor_kind::SensorKind, unit::TimeUnit, warning::Warning,
     },
 };
 
@@ -47,7 +47,7 @@ pub fn read_folder(
     let mut warnings = Vec::new();
     let mut manifest = manifest.unwrap_or_default();
     manifest.check().map_err(|fault| ReadError::Manifest { path: folder.to_path_buf(), line: 1, fault })?;
-    stamped(folder, &mut manifest, &mut warnings);
+    stamped(folder, TimeUnit::Nanosecond, &mut manifest, &mut warnings);
     let imu = file_of(folder, "imu0");
     let [rate, force] = [SensorKind::Gyr, SensorKind::Acc].map(slot_of);
     let mut columns = read(&imu, &IMU, limits, &mut warnings)?;

@@ -22,6 +22,9 @@ const TOO_MANY: usize = 1000;
 /// So many samples last longer than this, s.
 const BRIEF: f64 = 1.0;
 
+/// What a gyroscope's times may be instead.
+const SELDOM: &str = "; if they are right, leave the gyroscope out: one that is read fewer than five times a second is not taken";
+
 /// Whether an interval, s, is one that a wrong unit would explain.
 pub(crate) fn is_unusual(seconds: f64) -> bool {
     !USUAL.contains(&seconds)
@@ -49,8 +52,11 @@ pub(crate) fn check(recording: &mut Recording, from: Place) -> Result<(), ReadEr
             remedy: suggestion.map_or_else(
                 || "correct the times, or t of [units] in the manifest".to_owned(),
                 |other| {
+                    // Nothing else is wrong with it: it may be true.
+                    let seldom = slow && !is_unusual(found) && !is_brief(&recording.time);
                     format!(
-                        "the times look like `{other}`: write t = \"{other}\" below [units] in the manifest"
+                        "the times look like `{other}`: write t = \"{other}\" below [units] in the manifest{}",
+                        if seldom { SELDOM } else { "" }
                     )
                 },
             ),
@@ -134,7 +140,7 @@ mod tests {
     fn a_gyroscope_read_once_a_second_is_in_another_unit() {
         let rows =
             (0..200).fold("t,gyr_x,gyr_y,gyr_z\n".to_owned(), |text, k| text + &format!("{k},0,0,1\n"));
-        assert_says(&csv(rows).error(), &["1e0 s", "t = \"ms\""]);
+        assert_says(&csv(rows).error(), &["1e0 s", "t = \"ms\"", "leave the gyroscope out"]);
         assert!(csv(samples(200, |k| k as f64)).warnings().is_empty());
     }
 

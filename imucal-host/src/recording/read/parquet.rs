@@ -7,7 +7,7 @@ use std::{
 };
 
 use ::parquet::{
-    basic::ConvertedType,
+    basic::{ConvertedType, LogicalType, TimeUnit as Stamp},
     column::reader::{ColumnReader, ColumnReaderImpl},
     data_type::{ByteArray, DataType},
     errors::ParquetError,
@@ -20,13 +20,16 @@ mod size;
 use self::size::refuse_too_long;
 use super::{
     clock::Clock,
-    columns::{KNOWN, Layout, TIME, Table, Target, infinite_is_missing},
+    columns::{KNOWN, Layout, NAMES, TIME, Table, Target, infinite_is_missing},
     memory::Memory,
 };
 use crate::{
     file::Limits,
     recording::{mapping::Mapping, place::Places, read_error::ReadError, unit::TimeUnit},
 };
+
+/// How the library begins to say that it cannot decompress a column.
+const NOT_BUILT: &str = "Disabled feature at compile time";
 
 /// Reads the samples of a Parquet file in file units; columns may be doubles, floats or integers.
 pub(crate) fn read(
@@ -86,6 +89,23 @@ pub(crate) fn beginning(path: &Path, rows: usize, limits: &Limits) -> Option<Vec
     Some(of.collect())
 }
 
+/// The unit of a column of times whose type says it, as data frames write stamps.
+pub(crate) fn unit_of_stamps(path: &Path, mapping: &Mapping) -> Option<TimeUnit> {
+    let reader = open(path).ok()?;
+    let schema = reader.metadata().file_metadata().schema_descr_ptr();
+    let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
+    let renamed = mapping.renamed(&names.iter().map(String::as_str).collect::<Vec<_>>()).ok()?;
+    let at = renamed.iter().position(|name| name == NAMES[TIME])?;
+    match schema.column(at).logical_type_ref()? {
+        LogicalType::Timestamp(stamp) => Some(match stamp.unit {
+            Stamp::MILLIS => TimeUnit::Millisecond,
+            Stamp::MICROS => TimeUnit::Microsecond,
+            Stamp::NANOS => TimeUnit::Nanosecond,
+        }),
+        _ => None,
+    }
+}
+
 fn open(path: &Path) -> Result<SerializedFileReader<File>, ReadError> {
     let file = File::open(path)
         .map_err(|cause| ReadError::Unreadable { path: path.to_path_buf(), found: cause.to_string() })?;
@@ -137,6 +157,9 @@ fn groups(
 }
 
 fn damaged(path: &Path, cause: &ParquetError) -> ReadError {
+    if cause.to_string().contains(NOT_BUILT) {
+        return ReadError::Compression { path: path.to_path_buf() };
+    }
     ReadError::Damaged {
         path: path.to_path_buf(),
         found: cause.to_string(),
