@@ -1,15 +1,18 @@
 //! A simulator's stream, or a reference's pose, that holds something else than it should: each is refused or reported in words
 //! that name what was found and what to do, and nothing of it is taken for an effect of a sensor.
 
-use std::{fs, path::Path, sync::OnceLock};
+use std::{f64::consts::PI, fs, path::Path, sync::OnceLock};
 
 use imucal_host::{
     diagnosis::{Diagnosis, Options, Verdict, diagnose},
     recording::{Simulated, Stream},
     simulator::robot::{RobotKind, RobotPair, RobotScene},
 };
-use imucal_tests::program::{self, Ended};
-use nalgebra::{Matrix3, Vector3};
+use imucal_tests::{
+    program::{self, Ended},
+    simulated,
+};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -75,7 +78,7 @@ fn coordinate_acceleration_is_no_specific_force() {
         for (row, value) in stream.values.acc.iter_mut().flatten().enumerate() {
             *value -= attitude.tr_mul(&gravity);
             let step = times.get(row + 1).map_or(0.0, |next| next - times[row]);
-            attitude *= nalgebra::Rotation3::new(rates[row] * step).into_inner();
+            attitude *= Rotation3::new(rates[row] * step).into_inner();
         }
     });
     assert_refused(&diagnosis, &["coordinate acceleration instead of specific force", "subtract gravity"]);
@@ -128,7 +131,7 @@ fn a_left_handed_frame_and_reversed_gravity_are_reported() {
 
 #[test]
 fn an_oblique_mount_is_reported_and_estimated() {
-    let turn = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 0.5);
+    let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), 0.5);
     let diagnosis = diagnosed(|stream| {
         let Simulated { acc, gyr, mag, .. } = &mut stream.values;
         [acc, gyr, mag].into_iter().for_each(|values| each(values, |value| turn * value));
@@ -184,6 +187,42 @@ fn streams_that_share_no_time_or_movement_are_refused() {
     assert_refused(&other, &["does not follow", "at any lag"]);
     let in_milliseconds = diagnosed(|stream| stream.time.iter_mut().for_each(|time| *time *= 1e3));
     assert_refused(&in_milliseconds, &["look like milliseconds", "[units]"]);
+}
+
+#[test]
+fn a_sensor_that_is_late_in_the_stream_is_no_filter_of_no_size() {
+    let late = diagnosed(|stream| {
+        let acc = stream.values.acc.as_mut().expect("a stream of it");
+        let rows = acc.len();
+        acc.copy_within(0..rows - 4, 4);
+    });
+    assert_reported(&late, &[], &["the opposite of acc.bandwidth", "late in the simulator"]);
+    assert_eq!(late.verdict, Verdict::Unknown);
+}
+
+/// What an arm is given that holds the unit on its side for 70 s, then upright: specific force, rate and field.
+fn put_upright(t: f64) -> [Vector3<f64>; 3] {
+    let on_side = |t: f64| 0.25 * PI * (1.0 + (PI * ((t - 70.0) / 4.0).clamp(0.0, 1.0)).cos());
+    let attitude = |t: f64| {
+        let pitch = Rotation3::from_axis_angle(&Vector3::y_axis(), on_side(t) + 0.3 * (1.1 * t).sin());
+        pitch * Rotation3::from_axis_angle(&Vector3::x_axis(), 0.3 * (0.7 * t).sin())
+    };
+    let step = 1e-5;
+    let rate = (attitude(t - step).inverse() * attitude(t + step)).scaled_axis() / (2.0 * step);
+    let seen = |of: Vector3<f64>| attitude(t).inverse() * of;
+    [seen(Vector3::new(0.0, 0.0, -9.80665)), rate, seen(Vector3::new(25.0, 2.0, 40.0))]
+}
+
+#[test]
+fn a_stream_that_begins_late_shows_no_other_axes() {
+    let real = simulated::recorded(100.0, put_upright);
+    let time: Vec<f64> = (0..2600).map(|row| 74.0 + 0.01 * f64::from(row)).collect();
+    let of = |sensor: usize| Some(time.iter().map(|t| put_upright(*t)[sensor]).collect::<Vec<_>>());
+    let values = Simulated { acc: of(0), gyr: of(1), mag: of(2), ..Simulated::default() };
+    let stream = Stream { name: "arm".to_owned(), time: time.clone(), values };
+    let diagnosis = diagnose(&real, &Options { stream: Some(stream), ..Options::default() }, &|_| ());
+    let swaps = diagnosis.causes.iter().filter(|cause| cause.effect.ends_with("axis_swap")).count();
+    assert!(diagnosis.verdict != Verdict::NotTestable && swaps == 0, "{:?}", diagnosis.causes);
 }
 
 #[test]

@@ -32,6 +32,8 @@ pub struct Solution<'s> {
     pub fit: Fit,
     /// The problem about that fit.
     pub linear: Linearisation<'s>,
+    /// Effects that were left out in the end, since a fit took them at no size.
+    pub idle: Vec<&'static Effect>,
 }
 
 /// Searches. `None` where the simulator fails.
@@ -66,7 +68,7 @@ pub fn search<'s>(
     }
     linear = Linearisation::new(scene, candidates, &fit, &none.noise, None)?;
     trace("shapes of the effects scanned");
-    let mut at = Solution { best: none.clone(), none, fit, linear };
+    let mut at = Solution { best: none.clone(), none, fit, linear, idle: Vec::new() };
     let mut likeliest: Option<Solution<'s>> = None;
     let mut seen = vec![Vec::new()];
     loop {
@@ -106,10 +108,11 @@ impl<'s> Solution<'s> {
             let acts = |effect: &&'static Effect| {
                 !self.fit.doses.iter().any(|dose| dose.effect == *effect && !dose.acts())
             };
-            let set: Vec<&'static Effect> = self.best.set.iter().copied().filter(acts).collect();
-            if set.len() == self.best.set.len() {
+            let (set, idle): (Vec<&'static Effect>, Vec<_>) = self.best.set.iter().copied().partition(acts);
+            if idle.is_empty() {
                 return Ok(self);
             }
+            self.idle.extend(idle);
             let rest = self.linear.judge(&set, &self.best.noise, &SensorKind::ALL, &FAR)?;
             self = self.advanced(&self.linear, rest)?.settled()?;
         }
@@ -149,7 +152,7 @@ impl<'s> Solution<'s> {
         let fit = refit(scene, self.fit.clone().with(scene, doses)?, Some(&next.noise))?;
         next.noise = with_white(&next.noise, &found_in.weighing.white(&fit.residual));
         let linear = Linearisation::new(scene, candidates, &fit, &next.noise, Some(&self.linear))?;
-        Ok(Self { best: next, none: self.none.clone(), fit, linear })
+        Ok(Self { best: next, none: self.none.clone(), fit, linear, idle: self.idle.clone() })
     }
 }
 

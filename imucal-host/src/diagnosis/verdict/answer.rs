@@ -96,6 +96,7 @@ pub fn answer(
         },
         left,
         refuted: asserted.refuted,
+        opposite: !explained.idle.is_empty(),
         within_model: !found.is_empty() && asserted.causes.is_empty() && clock.is_none(),
         faulty: !preparation.findings.is_empty(),
     };
@@ -110,6 +111,7 @@ pub fn answer(
     let faults = fault::faults(recording, &preparation.findings, explained);
     fault::add(&faults, closed.explainable, &mut asserted.causes, &mut gap, &mut total);
     asserted.remarks.extend(preparation.remarks.iter().cloned());
+    asserted.remarks.extend(opposite(&explained.idle));
     let (linear, best) = (&explained.linear, &explained.best);
     let testable = detectability::testable(linear, &best.set, &best.noise);
     let (absent, not_testable) = asserted.part("what is absent or not testable", testable);
@@ -130,6 +132,18 @@ pub fn answer(
         ..untestable(recording, String::new())
     };
     Ok(Answer { diagnosis, following: tested.following(&settings.location) })
+}
+
+/// What is said of effects that a fit took at no size.
+fn opposite(idle: &[&'static Effect]) -> Option<String> {
+    let ids: Vec<&str> = idle.iter().map(|effect| effect.id.as_str()).collect();
+    (!ids.is_empty()).then(|| {
+        format!(
+            "the data show the opposite of {}, which cannot be negative: it is left out, and its part of the gap stays open; of a filter \
+             or a delay that is a sensor which is ahead of the others, or late in the simulator",
+            ids.join(" and of ")
+        )
+    })
 }
 
 /// The table of the gap.

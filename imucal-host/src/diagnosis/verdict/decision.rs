@@ -23,6 +23,8 @@ pub struct Evidence<'a> {
     pub left: Option<&'a Following>,
     /// Held-out data have refuted a cause of the search: the noise model does not hold there.
     pub refuted: bool,
+    /// What the data show is the opposite of an effect, which it cannot be.
+    pub opposite: bool,
     /// All causes are within the standard errors of the given model.
     pub within_model: bool,
     /// The recording itself is faulty, and the fault is named.
@@ -52,8 +54,8 @@ impl Evidence<'_> {
     fn judged(&self, causes: &[Cause], by: &VerdictSettings) -> Verdict {
         let remainder = self.left.map_or(0.0, |left| left.size) / self.explainable;
         match (causes, self.left) {
-            ([], None) => Verdict::None,
-            ([], Some(_)) => Verdict::Unknown,
+            ([], None) if !self.opposite => Verdict::None,
+            ([], _) => Verdict::Unknown,
             (_, Some(_)) if self.closed.total.value < by.explains => Verdict::Unknown,
             (_, Some(_)) if remainder > by.remainder => Verdict::Partly,
             _ if causes.iter().any(|cause| !cause.equivalents.is_empty()) => Verdict::Ambiguous,
@@ -110,6 +112,7 @@ mod tests {
             explainable: closed.explainable,
             left: left.as_ref(),
             refuted: false,
+            opposite: false,
             within_model: false,
             faulty: false,
         };
@@ -141,6 +144,13 @@ mod tests {
     }
 
     #[test]
+    fn the_opposite_of_an_effect_is_a_gap_without_a_cause() {
+        let opposite = |evidence: &mut Evidence<'_>| evidence.opposite = true;
+        assert_eq!(decided(&[], 0.0, None, opposite), Verdict::Unknown);
+        assert_eq!(decided(&[cause(&[])], 0.95, None, opposite), Verdict::Explained);
+    }
+
+    #[test]
     fn what_a_given_model_may_err_by_is_no_gap() {
         let within = |evidence: &mut Evidence<'_>| evidence.within_model = true;
         assert_eq!(decided(&[cause(&[])], 0.95, None, within), Verdict::None);
@@ -159,6 +169,7 @@ mod tests {
                 explainable: 1.0,
                 left: left.as_ref(),
                 refuted: false,
+                opposite: false,
                 within_model: false,
                 faulty: false,
             };

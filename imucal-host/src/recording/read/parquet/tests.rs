@@ -167,7 +167,7 @@ fn more_than_the_limits_allow_is_refused_before_it_is_read() {
 }
 
 #[test]
-fn columns_compressed_by_zstd_are_read_as_those_of_snappy() {
+fn columns_compressed_in_usual_ways_are_read_as_those_that_are_not() {
     let whole: Vec<i64> = (0..5000).map(|k| 1_700_000_000_000_000_000 + 10_000_000 * k).collect();
     let values: Vec<f64> = (0..5000).map(|k| 9.8 + f64::from(k % 17) * 1e-3).collect();
     let columns: [(&str, &[f64]); 4] =
@@ -178,10 +178,53 @@ fn columns_compressed_by_zstd_are_read_as_those_of_snappy() {
         (bytes.len(), Fixture::new("run.parquet", "[units]\nt = \"ns\"\n", bytes).read())
     };
     let (plain, expected) = read(Compression::UNCOMPRESSED);
-    for compression in [Compression::SNAPPY, Compression::ZSTD(Default::default())] {
+    let usual = [Compression::SNAPPY, Compression::LZ4_RAW];
+    let deflated = [Compression::ZSTD(Default::default()), Compression::GZIP(Default::default())];
+    for compression in usual.into_iter().chain(deflated) {
         let (length, found) = read(compression);
         assert!(length < plain, "{compression}: {length} of {plain}");
         assert_eq!(found.acc, expected.acc);
         assert_eq!((found.time, found.epoch), (expected.time.clone(), expected.epoch));
+    }
+}
+
+#[test]
+fn stamps_are_in_the_unit_of_their_type_whatever_the_manifest_says() {
+    let field = |name, physical, logical| {
+        let built = Type::primitive_type_builder(name, physical).with_repetition(Repetition::REQUIRED);
+        Arc::new(built.with_logical_type(logical).build().unwrap())
+    };
+    for (unit, name, per_second) in
+        [(Stamp::MILLIS, "ms", 1_000), (Stamp::MICROS, "us", 1_000_000), (Stamp::NANOS, "ns", 1_000_000_000)]
+    {
+        let axes = ["acc_x", "acc_y", "acc_z"].map(|name| field(name, Physical::DOUBLE, None));
+        let mut fields = vec![field("t", Physical::INT64, Some(LogicalType::timestamp(true, unit)))];
+        fields.extend(axes);
+        let schema = Arc::new(Type::group_type_builder("schema").with_fields(fields).build().unwrap());
+        let mut bytes = Vec::new();
+        let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::default()).unwrap();
+        let mut group = writer.next_row_group().unwrap();
+        let times: Vec<i64> = (0..200).map(|k| 1_700_000_000 * per_second + k * per_second / 100).collect();
+        for column in 0..4 {
+            let mut writer = group.next_column().unwrap().unwrap();
+            if column == 0 {
+                writer.typed::<Int64Type>().write_batch(&times, None, None).unwrap();
+            } else {
+                writer.typed::<DoubleType>().write_batch(&[9.8; 200], None, None).unwrap();
+            }
+            writer.close().unwrap();
+        }
+        group.close().unwrap();
+        writer.close().unwrap();
+        let stated = if name == "us" { "ms" } else { "us" };
+        let manifest = format!("[units]\nt = \"{stated}\"\nacc = \"m/s^2\"\n");
+        let recording = Fixture::new("run.parquet", &manifest, bytes).read();
+        assert!((recording.time[199] - 1.99).abs() < 1e-9, "{name}: {}", recording.time[199]);
+        let said = recording
+            .warnings
+            .iter()
+            .map(ToString::to_string)
+            .find(|warning| warning.contains("stamps are in"));
+        assert_says(&said.expect("said"), &[&format!("the stamps are in {name}"), "ignored"]);
     }
 }
