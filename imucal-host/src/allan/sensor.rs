@@ -97,7 +97,8 @@ pub enum Remark {
     /// Samples are missing.
     #[error(
         "{sensor}: samples are missing from {first:.3} s on; {bridged} were bridged by straight lines, {gaps} longer gaps (up \
-         to {longest:.2} s) end a stretch, and no average goes across"
+         to {longest:.2} s) end a stretch, and no average goes across{}",
+        larger(*.excess)
     )]
     Gaps {
         /// Which sensor.
@@ -110,6 +111,8 @@ pub enum Remark {
         gaps: u64,
         /// The longest, s.
         longest: f64,
+        /// Share by which straight lines may enlarge N.
+        excess: f64,
     },
     /// Little moved.
     #[error(
@@ -348,7 +351,8 @@ impl Running {
         }
         if let Some(first) = gaps.first {
             let Gaps { bridged, gaps, longest, .. } = *gaps;
-            remarks.push(Remark::Gaps { sensor, first, bridged, gaps, longest });
+            let excess = BY_A_LINE * bridged as f64 / (self.samples + bridged) as f64;
+            remarks.push(Remark::Gaps { sensor, first, bridged, gaps, longest, excess });
         }
         if let Some(moved) = moved {
             let Moved { blocks, of, deviation: (_, time), .. } = moved;
@@ -364,6 +368,22 @@ impl Running {
 }
 
 const AXES: [char; 3] = ['x', 'y', 'z'];
+
+/// A straight line over a missing sample gives each of its neighbours half a weight more: of white noise N² grows by 3/2 of the
+/// share of such samples.
+const BY_A_LINE: f64 = 0.75;
+/// An excess of N, a share, that is worth a word.
+const WORTH: f64 = 2e-3;
+
+fn larger(excess: f64) -> String {
+    if excess < WORTH {
+        return String::new();
+    }
+    let percent = 100.0 * excess;
+    format!(
+        "; the lines make N up to {percent:.1} % too large, which its interval does not say, and B likewise"
+    )
+}
 
 fn odd(sensor: SensorKind, axis: char, found: &Axis, begin: f64) -> Vec<Remark> {
     let mut remarks = Vec::new();

@@ -8,7 +8,7 @@ use super::{Act, Effect, Parameter, SensorKind, Truth, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
-        cause: "The field induces currents in metal that turns with the table, and they hold it back by a time.",
+        cause: "The field induces currents in metal that turns with the sensor, and they hold it back by a time.",
         remedy: "Use rests only, replace solid metal near the sensor, or estimate the time constant.",
         needs: "Rates above 1 rad/s about several axes.",
     };

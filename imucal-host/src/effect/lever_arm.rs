@@ -8,7 +8,7 @@ use super::{Act, Effect, Needs, Parameter, SensorKind, Truth, Words, XYZ, vector
 
 pub(super) fn effect() -> Effect {
     let words = Words {
-        cause: "The accelerometer sits at r from the point where the gimbal axes meet.",
+        cause: "The accelerometer sits at r from the point whose movement is known: where the gimbal axes meet, the tracked body, or the simulator's sensor.",
         remedy: "Measure r, or estimate it from motion, and subtract what it adds.",
         needs: "Rates above 1 rad/s about two axes, or brisk sinusoids.",
     };

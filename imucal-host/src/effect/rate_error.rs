@@ -4,7 +4,7 @@ use super::{Act, Effect, Parameter, Part, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
-        cause: "The sensor's clock gains on the rig's: the row of t shows the rig at t / (1 + error).",
+        cause: "The sensor's clock gains on that of the encoders, the reference or the simulator: the row of t shows the movement at t / (1 + error).",
         remedy: "Discipline the clock, or scale the sensors' times.",
         needs: "Brisk motion at the beginning and again at the end of a long recording.",
     };

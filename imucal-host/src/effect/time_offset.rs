@@ -8,7 +8,7 @@ use super::{Act, Effect, Parameter, Part, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
-        cause: "The sensors' clock started after the encoders': the row of t shows the rig at t + offset. Negative: samples reach their row late.",
+        cause: "The sensors' clock started after that of the encoders, the reference or the simulator: the row of t shows the movement at t + offset. Negative: samples reach their row late.",
         remedy: "Record a common trigger, or shift the sensors' times by the offset.",
         needs: "Motion with changing rate, such as sinusoids or slews.",
     };

@@ -56,7 +56,7 @@ pub enum ExportError {
         expected: Unit,
     },
     /// The rate is not one.
-    #[error("--rate: found {found}, expected a number of samples a second above 0")]
+    #[error("--rate: found {found}, expected a number of samples a second from 0.01 to 1000000")]
     Rate {
         /// What was found, Hz.
         found: f64,

@@ -1,10 +1,15 @@
 //! One number for the three axes of a sensor, as targets have it.
 
+use std::ops::RangeInclusive;
+
 use super::{ExportError, Inputs};
 use crate::{
     recording::SensorKind,
     store::noise_file::{Figure, NoiseOfAxis, NoiseOfSensor},
 };
+
+/// Samples a second that a target may have.
+const RATES: RangeInclusive<f64> = 0.01..=1e6;
 
 /// A coefficient of a sensor or an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +65,7 @@ pub(super) fn sensor<'a>(
 /// Samples a second of the target: as given, or as recorded.
 pub(super) fn rate(inputs: &Inputs<'_>, sensor: &NoiseOfSensor) -> Result<f64, ExportError> {
     let rate = inputs.rate.or(sensor.rate).unwrap_or(f64::NAN);
-    if rate.is_finite() && rate > 0.0 { Ok(rate) } else { Err(ExportError::Rate { found: rate }) }
+    if RATES.contains(&rate) { Ok(rate) } else { Err(ExportError::Rate { found: rate }) }
 }
 
 /// Density of the steps of a Gauss–Markov bias, for a standard deviation in the long run: σ = d·√(T/2).

@@ -185,7 +185,7 @@ pub enum ReadError {
 
     /// The samples cannot be in the unit the manifest says, and another unit explains them.
     #[error(
-        "{path}, from {from} on, sensor {sensor}: the median length is {median_norm:.4} {si} when read as `{unit}`, expected {expected}; the samples look like `{suggestion}`: write {sensor} = \"{suggestion}\" below [units] in the manifest"
+        "{path}, from {from} on, sensor {sensor}: the median length is {median_norm:.4} {si} when read as `{unit}`, expected {expected}; the samples look like `{suggestion}`: write {sensor} = \"{suggestion}\" below [units] in the manifest, or --unit {sensor}={suggestion}"
     )]
     UnitImplausible {
         path: PathBuf,

@@ -26,7 +26,7 @@ pub enum ManifestFault {
     },
     /// Counts without their nominal conversion.
     #[error(
-        "found {sensor} = \"counts\" and no conversion, expected `{sensor} = {{ offset = …, per_unit = … }}` below [counts]; add it from the data sheet: value = (raw − offset) / per_unit"
+        "found {sensor} = \"counts\" and no conversion, expected `{sensor} = {{ offset = …, per_unit = … }}` below [counts]; add it from the data sheet: value = (raw − offset) / per_unit; without a manifest --unit says both, such as acc=16384/g or gyr=16.4/deg/s"
     )]
     CountsWithoutConversion {
         /// The sensor.

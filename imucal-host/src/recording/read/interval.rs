@@ -55,7 +55,7 @@ pub(crate) fn check(recording: &mut Recording, from: Place) -> Result<(), ReadEr
                     // Nothing else is wrong with it: it may be true.
                     let seldom = slow && !is_unusual(found) && !is_brief(&recording.time);
                     format!(
-                        "the times look like `{other}`: write t = \"{other}\" below [units] in the manifest{}",
+                        "the times look like `{other}`: write t = \"{other}\" below [units] in the manifest, or --unit t={other}{}",
                         if seldom { SELDOM } else { "" }
                     )
                 },
