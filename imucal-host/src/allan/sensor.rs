@@ -111,7 +111,7 @@ pub enum Remark {
         gaps: u64,
         /// The longest, s.
         longest: f64,
-        /// Share by which straight lines may enlarge N.
+        /// Share by which straight lines enlarge N at most.
         excess: f64,
     },
     /// Little moved.
@@ -216,6 +216,8 @@ struct Running {
     sum: Vector3<f64>,
     samples: u64,
     repeated: u64,
+    /// What straight lines have added to the squares of the samples' weights.
+    by_lines: f64,
 }
 
 impl SensorStream {
@@ -249,6 +251,7 @@ impl SensorStream {
             sum: Vector3::zeros(),
             samples: 0,
             repeated: 0,
+            by_lines: 0.0,
         };
         self.head.drain(..).for_each(|(time, sample)| running.push(time, &sample));
         self.running = Some(running);
@@ -289,6 +292,7 @@ impl Running {
         match self.clock.before(time) {
             Before::Nothing => {}
             Before::Bridge(missing) => {
+                self.by_lines += by_a_line(missing as f64);
                 for k in 1..=missing {
                     let share = k as f64 / (missing + 1) as f64;
                     self.cascade.push(&(self.last + (sample - self.last) * share));
@@ -351,7 +355,7 @@ impl Running {
         }
         if let Some(first) = gaps.first {
             let Gaps { bridged, gaps, longest, .. } = *gaps;
-            let excess = BY_A_LINE * bridged as f64 / (self.samples + bridged) as f64;
+            let excess = 0.5 * self.by_lines / (self.samples + bridged) as f64;
             remarks.push(Remark::Gaps { sensor, first, bridged, gaps, longest, excess });
         }
         if let Some(moved) = moved {
@@ -369,9 +373,12 @@ impl Running {
 
 const AXES: [char; 3] = ['x', 'y', 'z'];
 
-/// A straight line over a missing sample gives each of its neighbours half a weight more: of white noise N² grows by 3/2 of the
-/// share of such samples.
-const BY_A_LINE: f64 = 0.75;
+/// What a straight line over so many missing samples adds to the squares of the weights of samples in a mean, and so to N²: each of its
+/// ends gets half a weight more for each. Source: ours. Not taken into account: short averages, which the line smooths.
+fn by_a_line(missing: f64) -> f64 {
+    0.5 * missing * (missing + 2.0)
+}
+
 /// An excess of N, a share, that is worth a word.
 const WORTH: f64 = 2e-3;
 
@@ -397,4 +404,19 @@ fn odd(sensor: SensorKind, axis: char, found: &Axis, begin: f64) -> Vec<Remark> 
         remarks.push(Remark::Misfit { sensor, axis, chi_square, freedom, inflation: misfit.inflation });
     }
     remarks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_adds_to_the_squared_weights_what_its_samples_give_to_its_ends() {
+        for missing in 1..=10 {
+            let shares = (1..=missing).map(|k| f64::from(k) / f64::from(missing + 1));
+            let end = 1.0 + shares.sum::<f64>();
+            let added = 2.0 * end * end - f64::from(missing + 2);
+            assert!((by_a_line(f64::from(missing)) - added).abs() < 1e-12, "{missing}");
+        }
+    }
 }

@@ -29,11 +29,11 @@ impl Thermometer {
     /// For a calibration: that of the first sensor with terms of temperature says where they hold.
     pub fn new(stored: &StoredCalibration) -> Self {
         let triads = [&stored.acc, &stored.gyr, &stored.mag].into_iter().flatten();
-        let terms = triads.filter_map(|triad| triad.temperature.as_ref()).map(|found| Terms {
+        let mut terms = triads.filter_map(|triad| triad.temperature.as_ref()).map(|found| Terms {
             reference: found.reference,
             span: found.quality.map(|quality| quality.span),
         });
-        Self { last: f32::NAN, rows: 0, without: 0, beyond: (0, 0.0), terms: terms.into_iter().next() }
+        Self { last: f32::NAN, rows: 0, without: 0, beyond: (0, 0.0), terms: terms.next() }
     }
 
     /// °C at each of the next rows; NaN before the first reading.

@@ -110,9 +110,8 @@ pub(super) fn opened(
         warnings.extend(of_driver(path, &manifest, mapping));
     }
     #[cfg(feature = "parquet")]
-    if let Some(unit) = Some(path)
-        .filter(|_| format == Format::Parquet)
-        .and_then(|path| read::parquet::unit_of_stamps(path, mapping))
+    if format == Format::Parquet
+        && let Some(unit) = read::parquet::unit_of_stamps(path, mapping)
     {
         stamped(path, unit, &mut manifest, &mut warnings);
     }
