@@ -64,7 +64,7 @@ pub enum Omission {
     Baseline,
     /// It is a mistake of convention: there or not, of no size.
     Convention,
-    /// It is an error of a reference on the body, which a rig has not.
+    /// It is an error of a reference on the body or of a simulator, which a rig has not.
     Reference,
     /// It leaves the mean of the samples as it is, and λ is the size of a mean.
     NoMean,
@@ -73,7 +73,7 @@ pub enum Omission {
 /// Why an effect is not drawn; `None` for those that are.
 pub fn omission(effect: &Effect) -> Option<Omission> {
     match effect.part {
-        _ if effect.needs.outside => Some(Omission::Reference),
+        _ if effect.needs.outside || effect.needs.stream => Some(Omission::Reference),
         _ if effect.absorbed => Some(Omission::Baseline),
         Part::TriadTerm | Part::RigTerm(_) | Part::Nuisance(_) => Some(Omission::Baseline),
         Part::Fault(Spoils::Nothing | Spoils::Scale) => Some(Omission::Convention),

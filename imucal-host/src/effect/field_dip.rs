@@ -20,10 +20,14 @@ fn alter(values: &[f64], row: &mut Truth) {
     let angle = values.first().copied().unwrap_or(0.0);
     let c_t_n = row.c_p_n * row.c_t_p;
     let b_n = c_t_n * row.b_t;
-    // About a horizontal axis across the field; a vertical field has none.
-    if let Some(across) = b_n.cross(&Vector3::z()).try_normalize(0.0) {
-        row.add_field(&c_t_n, &(rotation::exp(&(across * angle)) * b_n - b_n));
-    }
+    row.add_field(&c_t_n, &(dipped(&b_n, angle) - b_n));
+}
+
+/// A field with components in n that points further down by an angle, rad: turned about the horizontal axis across it. A
+/// vertical field has no such axis, and stays.
+pub(super) fn dipped(b_n: &Vector3<f64>, angle: f64) -> Vector3<f64> {
+    let across = b_n.cross(&Vector3::z()).try_normalize(0.0);
+    across.map_or(*b_n, |across| rotation::exp(&(across * angle)) * b_n)
 }
 
 #[cfg(test)]

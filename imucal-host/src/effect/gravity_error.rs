@@ -1,4 +1,12 @@
 //! Local gravity is not that of the model: `acc.gravity_error`.
+//!
+//! ```text
+//! f_t → f_t − s C_n_t g_n      s the share, g_n the site's gravity
+//! ```
+//!
+//! Where the sensor is not accelerated, it cannot be distinguished from a common scale of the accelerometer's axes.
+
+use nalgebra::Vector3;
 
 use super::{Act, Effect, Parameter, SensorKind, Truth, Words};
 
@@ -15,6 +23,7 @@ pub(super) fn effect() -> Effect {
 }
 
 fn alter(values: &[f64], row: &mut Truth) {
-    let factor = 1.0 + values.first().copied().unwrap_or(0.0);
-    row.f_t *= factor;
+    let share = values.first().copied().unwrap_or(0.0);
+    let up_n = Vector3::new(0.0, 0.0, -row.gravity);
+    row.f_t += (row.c_p_n * row.c_t_p).tr_mul(&(up_n * share));
 }

@@ -22,12 +22,15 @@ mod bias;
 mod bias_drift;
 mod bias_step;
 pub mod class;
+pub mod clock_jump;
+pub mod clock_wander;
 mod cross_axis_product;
 mod earth_rate;
 mod eddy_current;
 mod encoder_harmonic;
 mod encoder_offset;
 mod field_dip;
+mod field_direction;
 mod field_drift;
 mod field_gradient;
 mod field_strength;
@@ -330,6 +333,8 @@ pub static CATALOGUE: LazyLock<Vec<Effect>> = LazyLock::new(|| {
         wobble::effect(),
         time_offset::effect(),
         rate_error::effect(),
+        clock_jump::effect(),
+        clock_wander::effect(),
         motion_mismatch::effect(),
         mount_slip::effect(),
         attitude_noise::effect(),
@@ -337,6 +342,7 @@ pub static CATALOGUE: LazyLock<Vec<Effect>> = LazyLock::new(|| {
         gravity_error::effect(),
         lever_arm::effect(),
         earth_rate::effect(),
+        field_direction::effect(),
         field_drift::effect(),
         transient::effect(),
         field_gradient::effect(),

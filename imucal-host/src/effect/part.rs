@@ -70,6 +70,8 @@ pub struct Needs {
     pub position: bool,
     /// A reference on the body, of a tracker or a simulator: neither a rig nor the sensor's own rests.
     pub outside: bool,
+    /// A simulator's stream: elsewhere the base's heading and the site's field are terms of the baseline.
+    pub stream: bool,
     /// That all sensors were read at the same time: else a delay of one of them is the reference's clock.
     pub read_together: bool,
 }
@@ -84,6 +86,7 @@ impl Needs {
         exact_attitude: false,
         position: false,
         outside: false,
+        stream: false,
         read_together: false,
     };
     /// Gimbals.
@@ -98,6 +101,8 @@ impl Needs {
     pub const POSITION: Self = Self { position: true, ..Self::NOTHING };
     /// A reference on the body.
     pub const OUTSIDE: Self = Self { outside: true, ..Self::NOTHING };
+    /// A simulator's stream.
+    pub const STREAM: Self = Self { stream: true, ..Self::NOTHING };
     /// Sensors that were read together.
     pub const READ_TOGETHER: Self = Self { read_together: true, ..Self::NOTHING };
     /// An exact attitude.

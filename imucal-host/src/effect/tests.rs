@@ -2,7 +2,7 @@ use std::collections::BTreeSet;
 
 use super::*;
 
-/// The contract's list, families spelt `P.`.
+/// The contract's list, families spelt `P.`, and what was added to it.
 const CONTRACT: &str = "ref.motion_mismatch ref.mount_slip ref.attitude_noise ref.position_noise rig.level_tilt rig.heading P.bias P.scale P.misalignment acc.gravity_error \
     rig.encoder_harmonic rig.encoder_offset rig.axis_nonorthogonality rig.wobble clk.time_offset clk.rate_error \
     P.scale_quadratic P.scale_cubic P.scale_asymmetry P.cross_axis_product P.temp_bias P.temp_bias_quadratic \
@@ -10,7 +10,8 @@ const CONTRACT: &str = "ref.motion_mismatch ref.mount_slip ref.attitude_noise re
     P.axis_swap P.unit_error acc.lever_arm acc.inner_lever_arm acc.vibration_rectification acc.hysteresis \
     gyr.hysteresis gyr.g_sensitivity gyr.g2_sensitivity gyr.angular_acceleration gyr.earth_rate \
     mag.gimbal_hard_iron_outer mag.gimbal_hard_iron_middle mag.gimbal_soft_iron_outer mag.gimbal_soft_iron_middle \
-    mag.motor_current mag.eddy_current mag.field_drift mag.transient mag.field_gradient mag.hard_iron mag.soft_iron";
+    mag.motor_current mag.eddy_current mag.field_drift mag.transient mag.field_gradient mag.hard_iron mag.soft_iron \
+    mag.field_direction clk.jump clk.wander";
 
 fn contract() -> BTreeSet<String> {
     CONTRACT

@@ -30,6 +30,8 @@ pub struct Truth {
     pub w_it_t: Vector3<f64>,
     /// Angular acceleration against inertial space, rad/s².
     pub dw_it_t: Vector3<f64>,
+    /// Gravity of the site, m/s².
+    pub gravity: f64,
     /// Specific force where the sensor is, m/s².
     pub f_t: Vector3<f64>,
     /// Magnetic field where the sensor is, µT.

@@ -4,7 +4,7 @@
 //! recording shows the stream at
 //!
 //! ```text
-//! s = (t + offset) / (1 + error)
+//! s = (t + offset + correction(t)) / (1 + error)
 //! ```
 //!
 //! | symbol | meaning |
@@ -12,13 +12,15 @@
 //! | t | time of the row on the sensor's clock, s |
 //! | s | time of the stream on the simulator's clock, s |
 //! | offset, error | [`StreamClock`], as `clk.time_offset` and `clk.rate_error` count them |
+//! | correction | of a clock that jumps or wanders, s; zero of one that runs evenly |
 //!
-//! The attitude is the integral of the rate; its base is levelled by the mean of the specific force, since a machine
-//! that comes to rest has not been accelerated on average, and its heading is that of the first row. Not modelled: noise of
-//! the stream, and Earth's rotation, which the stream's rate holds or does not.
+//! The attitude is the integral of the rate in a level base (`attitude`), and its heading is that of the first row. Not
+//! modelled: noise of the stream.
+
+use std::ops::Range;
 
 use imucal_core::rotation::exp;
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 use super::{
     cubic::{Cubic, sample_before},
@@ -48,18 +50,49 @@ const NOISES: f64 = 5.0;
 const STRETCH: usize = 100;
 
 /// How the clock of a stream stands to that of the sensor.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct StreamClock {
     /// The row of t shows the stream of t + offset, s.
     pub offset: f64,
     /// The sensor's clock gains on the stream's by this share.
     pub error: f64,
+    /// What is added to the offset at times of the sensor's clock, s each: between two on the line through them, beyond the ends
+    /// as at the nearest. Two at one time are a jump. Times never decrease; empty for a clock that runs evenly.
+    pub corrections: Vec<(f64, f64)>,
+    /// Where on the sensor's clock it may have jumped already or not yet, s.
+    pub unknown: Vec<Range<f64>>,
 }
 
 impl StreamClock {
+    /// One that runs evenly.
+    pub fn even(offset: f64, error: f64) -> Self {
+        Self { offset, error, ..Self::default() }
+    }
+
     /// Time of the stream that a row of `time` shows, s.
     pub fn stream_time(&self, time: f64) -> f64 {
-        (time + self.offset) / (1.0 + self.error)
+        (time + self.offset + self.correction(time)) / (1.0 + self.error)
+    }
+
+    /// Time of the row that shows this time of the stream, s.
+    pub fn row_time(&self, stream_time: f64) -> f64 {
+        let even = stream_time * (1.0 + self.error) - self.offset;
+        // Corrections change by much less than time does.
+        even - self.correction(even - self.correction(even))
+    }
+
+    fn correction(&self, time: f64) -> f64 {
+        let after = self.corrections.partition_point(|(at, _)| *at <= time);
+        let before = after.checked_sub(1).and_then(|at| self.corrections.get(at));
+        match (before, self.corrections.get(after)) {
+            (Some((from, one)), Some((to, other))) => one + (other - one) * (time - from) / (to - from),
+            (Some((_, only)), None) | (None, Some((_, only))) => *only,
+            (None, None) => 0.0,
+        }
+    }
+
+    fn is_known(&self, time: f64) -> bool {
+        !self.unknown.iter().any(|unknown| unknown.contains(&time))
     }
 }
 
@@ -95,7 +128,7 @@ impl Streamed {
         let time = stream.time.clone();
         let sampled = |kind: SensorKind| stream.values.sensor(kind);
         let channels = SensorKind::ALL.map(|kind| Some(Cubic::new(&time, sampled(kind)?)));
-        let attitudes = attitudes(&time, &channels);
+        let attitudes = attitude::attitudes(&time, &channels);
         let mut streamed = Self {
             channels,
             attitudes,
@@ -124,8 +157,8 @@ impl Streamed {
     }
 
     /// The clock that rows are read by.
-    pub fn clock(&self) -> StreamClock {
-        self.clock
+    pub fn clock(&self) -> &StreamClock {
+        &self.clock
     }
 
     /// The samples on both sides of a row's time were given.
@@ -133,7 +166,7 @@ impl Streamed {
         let s = self.clock.stream_time(row);
         let after = self.time.partition_point(|t| *t < s);
         let (Some(before), true) = (after.checked_sub(2), after + 1 < self.time.len()) else { return false };
-        measured[before..=after + 1].iter().all(|measured| *measured)
+        measured[before..=after + 1].iter().all(|measured| *measured) && self.clock.is_known(row)
     }
 
     /// Speed at each row, by the specific force less its mean: what a machine gains on the whole it loses until it comes to
@@ -275,20 +308,6 @@ fn measured(stream: &Stream) -> Vec<bool> {
 /// Samples further apart than so many intervals have a gap between them.
 const GAP: f64 = 3.5;
 
-/// Attitude at each sample, table to a base with its third axis down and the heading of the first sample.
-fn attitudes(time: &[f64], [acc, gyr, _]: &[Option<Cubic>; 3]) -> Vec<Matrix3<f64>> {
-    let mut attitudes = vec![Matrix3::identity(); time.len()];
-    if let Some(gyr) = gyr {
-        for k in 1..time.len() {
-            let turn = (gyr.values[k - 1] + gyr.values[k]) * (0.5 * (time[k] - time[k - 1]));
-            attitudes[k] = attitudes[k - 1] * exp(&turn);
-        }
-    }
-    let Some(acc) = acc else { return attitudes };
-    let mean: Vector3<f64> = attitudes.iter().zip(&acc.values).map(|(c, f)| c * f).sum();
-    let Some(level) = Rotation3::rotation_between(&mean, &-Vector3::z()) else { return attitudes };
-    attitudes.iter().map(|attitude| level.matrix() * attitude).collect()
-}
-
+mod attitude;
 #[cfg(test)]
 mod tests;

@@ -123,6 +123,7 @@ pub fn at_pose(
         w_it_t: pose.w_pt_t + w_ie_t,
         // Earth's rotation is fixed in n and turns the other way in t.
         dw_it_t: pose.dw_pt_t - pose.w_pt_t.cross(&w_ie_t),
+        gravity: place.gravity,
         f_t: to_t(Vector3::new(0.0, 0.0, -place.gravity)),
         b_t: to_t(place.field_n),
         temperature,

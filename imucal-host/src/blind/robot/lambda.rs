@@ -290,7 +290,7 @@ fn metrics(scene: &RobotScene, blocks: usize) -> Result<[Metric; 3], SimulationE
 fn unresolved(scene: &RobotScene, blocks: usize) -> Result<[Vec<f64>; 3], SimulationError> {
     let (motion, rows) = (scene.planned()?, rows(scene));
     let time: Vec<f64> = (0..blocks * rows).map(|row| row as f64 / scene.real_rate).collect();
-    let clock = StreamClock { offset: scene.clock_offset, error: scene.clock_rate_error };
+    let clock = StreamClock::even(scene.clock_offset, scene.clock_rate_error);
     let stream = Stream::of(&scene.simulated("")?);
     let streamed =
         stream.and_then(|stream| Streamed::new(&stream, clock, &time, vec![0.0; time.len()], scene.place));

@@ -81,6 +81,7 @@ impl Setting<'_> {
             exact_attitude,
             position,
             outside,
+            stream,
             read_together,
         } = effect.needs;
         let provided = &self.provided;
@@ -99,6 +100,14 @@ impl Setting<'_> {
             && self.kinds.contains(&SensorKind::Mag);
         if outside && (provided.gimbals || !provided.table) {
             return Some("there is no reference on the body: neither a tracker's nor a simulator's");
+        }
+        if stream && !provided.followed {
+            return Some("there is no simulator's stream: how the field points is a term of the baseline");
+        }
+        if stream && ![SensorKind::Acc, SensorKind::Gyr].iter().all(|kind| self.kinds.contains(kind)) {
+            return Some(
+                "without accelerometer and gyroscope the vertical is not known in the stream's axes",
+            );
         }
         if read_together && provided.lags && provided.clock {
             return Some(

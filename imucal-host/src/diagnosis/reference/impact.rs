@@ -30,9 +30,8 @@ pub struct Impacts {
 }
 
 /// The impacts of a recording and of a stream on this clock.
-pub fn impacts(recording: &Recording, stream: &Stream, clock: StreamClock) -> Impacts {
-    // Where a row shows the stream of s: the clock's inverse.
-    let row = |time: f64| time * (1.0 + clock.error) - clock.offset;
+pub fn impacts(recording: &Recording, stream: &Stream, clock: &StreamClock) -> Impacts {
+    let row = |time: f64| clock.row_time(time);
     let rows: Vec<f64> = stream.time.iter().map(|time| row(*time)).collect();
     let (mut times, mut unmatched) = (Vec::new(), Vec::new());
     for kind in SensorKind::ALL {
@@ -78,7 +77,7 @@ mod tests {
     fn left_out(scene: &RobotScene) -> f64 {
         let pair = scene.record("pair").unwrap();
         let stream = Stream::of(&pair.simulated).unwrap();
-        let rows = impacts(&pair.real, &stream, StreamClock::default()).resolved;
+        let rows = impacts(&pair.real, &stream, &StreamClock::default()).resolved;
         rows.iter().filter(|resolved| !**resolved).count() as f64 / rows.len() as f64
     }
 
@@ -106,7 +105,7 @@ mod tests {
         };
         let unmatched = |scene: &RobotScene| {
             let pair = scene.record("pair").unwrap();
-            impacts(&pair.real, &Stream::of(&pair.simulated).unwrap(), StreamClock::default()).unmatched
+            impacts(&pair.real, &Stream::of(&pair.simulated).unwrap(), &StreamClock::default()).unmatched
         };
         let harder = RobotScene { mismatch: Some((MismatchKind::Contact, 6.0)), ..scene };
         // Where only the stream resolves the impacts, by their gains: one drawn size is twice as hard, or none at all.

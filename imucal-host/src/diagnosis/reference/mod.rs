@@ -19,6 +19,9 @@
 //! | [`scan`] | stretches of a row over which a sum of logarithms of odds is largest |
 //! | [`unforeseen`] | what a sample's neighbours do not foretell of it |
 //! | [`stream_clock`] | its clock against that of the sensor, roughly |
+//! | `rate_lags` | by how much later than a clock says the stream is, by windows |
+//! | `binned` | means of a vector's samples over short bins |
+//! | [`clock_steadiness`] | where that clock jumps or wanders |
 //! | [`revisits`] | whether attitudes are held more than once, without which repeatability cannot be estimated |
 //!
 //! Encoders are replayed, reference attitudes differentiated and streams interpolated by `simulator`.
@@ -26,12 +29,15 @@
 //! Not done here: a reference attitude holds no linear acceleration; its clock is put right in `screening`.
 
 pub mod absence;
+mod binned;
+pub mod clock_steadiness;
 pub mod common_instants;
 pub mod gain;
 pub mod impact;
 pub mod model;
 pub mod movement;
 pub mod pose;
+mod rate_lags;
 pub mod rest_to_rest;
 pub mod revisits;
 pub mod scan;

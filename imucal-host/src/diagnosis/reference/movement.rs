@@ -52,7 +52,7 @@ pub fn reference(
     model: &Model,
     stream: Option<&Stream>,
     pose: Option<&Pose>,
-    clock: StreamClock,
+    clock: &StreamClock,
     bandwidth: f64,
 ) -> Result<Reference, String> {
     let site = &recording.manifest.site;

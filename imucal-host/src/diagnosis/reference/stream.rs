@@ -1,6 +1,7 @@
 //! The movement of a simulator's stream.
 
 use super::{
+    clock_steadiness::Steadiness,
     impact::{self, Impacts},
     stream_clock,
     strikes::Unmatched,
@@ -21,12 +22,12 @@ pub struct Given {
     pub unresolved: Option<String>,
 }
 
-/// The clock of a stream.
+/// The clock of a stream, and how evenly it runs.
 ///
 /// # Errors
 ///
 /// Why the stream gives no movement, for a reader.
-pub fn clock(recording: &Recording, integrity: &Integrity, stream: &Stream) -> Result<StreamClock, String> {
+pub fn clock(recording: &Recording, integrity: &Integrity, stream: &Stream) -> Result<Steadiness, String> {
     stream_clock::coarse(recording, integrity, stream)
 }
 
@@ -38,11 +39,11 @@ pub fn clock(recording: &Recording, integrity: &Integrity, stream: &Stream) -> R
 pub fn movement(
     recording: &Recording,
     stream: &Stream,
-    clock: StreamClock,
+    clock: &StreamClock,
     temperature: Vec<f64>,
     place: Place,
 ) -> Result<Given, String> {
-    let streamed = Streamed::new(stream, clock, &recording.time, temperature, place);
+    let streamed = Streamed::new(stream, clock.clone(), &recording.time, temperature, place);
     let streamed =
         streamed.ok_or_else(|| format!("{}: the stream has fewer than two samples", stream.name))?;
     let Impacts { resolved, unmatched } = impact::impacts(recording, stream, clock);

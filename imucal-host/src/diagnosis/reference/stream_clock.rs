@@ -7,6 +7,11 @@
 
 use nalgebra::Vector3;
 
+use super::{
+    binned::Binned,
+    clock_steadiness::{Steadiness, steadiness},
+    rate_lags::Rates,
+};
 use crate::{
     recording::{Recording, SensorKind, Stream, check::integrity::Integrity, median},
     simulator::streamed::StreamClock,
@@ -19,6 +24,8 @@ const MOST: f64 = 6000.0;
 const FINEST: f64 = 200.0;
 /// Step of the search within windows, s.
 const FINE: f64 = 0.02;
+/// Bins of the rates by which the clock's steadiness is judged, s.
+const BIN: f64 = 0.01;
 /// Length of a window, s; how far about the line it is searched in each round, s.
 const WINDOW: f64 = 12.0;
 const ROUNDS: [f64; 3] = [2.0, 0.5, 0.1];
@@ -54,12 +61,12 @@ struct Even {
     values: Vec<f64>,
 }
 
-/// The stream's clock against that of the recording.
+/// The stream's clock against that of the recording, and how evenly it runs.
 ///
 /// # Errors
 ///
 /// Why the two cannot be put side by side, for a reader.
-pub fn coarse(recording: &Recording, integrity: &Integrity, stream: &Stream) -> Result<StreamClock, String> {
+pub fn coarse(recording: &Recording, integrity: &Integrity, stream: &Stream) -> Result<Steadiness, String> {
     let mut best: Option<(f64, SensorKind, f64)> = None;
     for kind in [SensorKind::Gyr, SensorKind::Acc, SensorKind::Mag] {
         let Some((real, ideal)) = sizes(recording, integrity, stream, kind) else { continue };
@@ -91,7 +98,22 @@ pub fn coarse(recording: &Recording, integrity: &Integrity, stream: &Stream) -> 
             )
         }));
     }
-    Ok(refined(recording, integrity, stream, kind, lag))
+    let clock = refined(recording, integrity, stream, kind, lag);
+    match rates(recording, integrity, stream) {
+        Some(rates) => steadiness(&rates, &clock).map_err(|why| format!("{}: {why}", stream.name)),
+        None => Ok(Steadiness::even(clock)),
+    }
+}
+
+/// Rates of recording and stream; `None` without a gyroscope in both.
+fn rates(recording: &Recording, integrity: &Integrity, stream: &Stream) -> Option<Rates> {
+    let (values, usable) =
+        (&recording.sensor(SensorKind::Gyr)?.values, &integrity.sensor(SensorKind::Gyr)?.usable);
+    let rows = recording.time.iter().zip(values).zip(usable);
+    let real = rows.filter(|(_, usable)| **usable).map(|((time, value), _)| (*time, *value));
+    let ideal = stream.time.iter().copied().zip(stream.values.sensor(SensorKind::Gyr)?.iter().copied());
+    let ideal = ideal.filter(|(_, value)| value.iter().all(|value| value.is_finite()));
+    Some(Rates { real: Binned::new(real, BIN), ideal: Binned::new(ideal, BIN) })
 }
 
 fn no_overlap(recording: &Recording, stream: &Stream) -> String {
@@ -181,7 +203,7 @@ fn refined(
     kind: SensorKind,
     lag: f64,
 ) -> StreamClock {
-    let first = StreamClock { offset: lag, error: 0.0 };
+    let first = StreamClock::even(lag, 0.0);
     let Some((real, ideal)) = sizes(recording, integrity, stream, kind) else { return first };
     let (Some(real), Some(ideal)) = (Even::of(&real, FINE), Even::of(&ideal, FINE)) else { return first };
     let length = (WINDOW / FINE) as usize;
@@ -203,7 +225,7 @@ fn refined(
         let Some((lag, drift)) = line(&found) else { continue };
         (at_zero, slope) = (lag, 1.0 + drift);
     }
-    StreamClock { offset: at_zero / slope, error: 1.0 / slope - 1.0 }
+    StreamClock::even(at_zero / slope, 1.0 / slope - 1.0)
 }
 
 /// Where within a stream a window agrees best with it, in steps, near a place; `None` where it does not clearly.

@@ -21,6 +21,7 @@ mod axis_swap;
 mod carried_about;
 mod gimbal_order;
 mod noise_burst;
+mod other_movement;
 pub(super) mod pairs;
 mod saturation;
 mod stuck_samples;
@@ -85,7 +86,7 @@ pub struct Conventions {
     pub turned: Option<(usize, f64)>,
     /// A sensor that cannot be compared with the movement, since that does not hold what it was given.
     pub beyond_movement: Option<SensorKind>,
-    /// How the encoders contradict every sensor: no baseline fits before that is mended.
+    /// How the encoders, the reference or the stream contradict every sensor: no baseline fits before that is mended.
     pub contradiction: Option<String>,
 }
 
@@ -184,7 +185,7 @@ pub fn check(
         found.remarks.extend(carried_about::left_open(recording, integrity, &rows, &truth));
     }
     let contradicted = || gimbal_order::remark(recording, integrity, motion, &rows, &truth, &pairs);
-    match if source.followed { None } else { contradicted() } {
+    match if source.followed { other_movement::contradiction(&pairs) } else { contradicted() } {
         // Against a wrong movement no sensor's axes mean anything.
         Some(remark) => found.contradiction = Some(remark),
         None => {

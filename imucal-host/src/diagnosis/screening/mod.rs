@@ -8,6 +8,7 @@
 //! | --- | --- |
 //! | [`bandwidth`] | how fast a movement recorded positions can be believed to follow |
 //! | [`conventions`] | axis order and signs, units, gimbal order, clipping, repeated samples, noise bursts |
+//! | `constant_axis` | an axis that shows one value in all rows |
 //! | [`mounting`] | the small turn of a unit against the sensor that a simulator's stream is of |
 //! | [`held_values`] | rows that repeat the one before until a new value comes |
 //! | [`pose_conventions`] | what a reference's attitudes and positions hold instead of what they should: order, frame, rate, jumps, steps, unit |
@@ -21,6 +22,7 @@
 //! Not done here: effects that leave the samples usable; those are candidates of the search.
 
 pub mod bandwidth;
+mod constant_axis;
 pub mod conventions;
 pub mod held_values;
 pub mod mounting;

@@ -6,7 +6,7 @@ use imucal_core::{rotation::exp, triad::Triad};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    bandwidth, conventions,
+    bandwidth, constant_axis, conventions,
     conventions::{Conventions, Finding},
     mounting::mounting,
     pose_conventions, reference_offset, stream_conventions,
@@ -16,8 +16,8 @@ use crate::{
     diagnosis::{
         error::DiagnosisError,
         reference::{
-            model::Model, movement, movement::Reference, rest_to_rest::RestToRest, revisits, stream,
-            strikes::Unmatched,
+            clock_steadiness::Steadiness, model::Model, movement, movement::Reference,
+            rest_to_rest::RestToRest, revisits, stream, strikes::Unmatched,
         },
         settings::Settings,
     },
@@ -93,24 +93,25 @@ impl Preparation {
             }
         };
         let pose = of_pose.pose.as_ref();
-        let of_bandwidth = |clock: StreamClock, bandwidth: f64| {
+        let of_bandwidth = |clock: &StreamClock, bandwidth: f64| {
             movement::reference(recording, &integrity, &model, stream, pose, clock, bandwidth)
                 .map_err(DiagnosisError::Recording)
         };
-        let reference = |clock: StreamClock| of_bandwidth(clock, bandwidth::USUAL);
-        let mut clock = match stream {
+        let reference = |clock: &StreamClock| of_bandwidth(clock, bandwidth::USUAL);
+        let steadiness = match stream {
             Some(given) => stream::clock(recording, &integrity, given).map_err(DiagnosisError::Recording)?,
-            None => StreamClock::default(),
+            None => Steadiness::even(StreamClock::default()),
         };
-        let mut as_read = reference(clock)?;
+        let mut clock = steadiness.clock.clone();
+        let mut as_read = reference(&clock)?;
         if settings.source.clock && stream.is_none() {
             clock.offset = reference_offset::coarse(recording, &integrity, &*as_read.movement);
             if clock.offset != 0.0 {
-                as_read = reference(clock)?;
+                as_read = reference(&clock)?;
             }
         }
         if settings.source.placed {
-            as_read = bandwidth::best(recording, &integrity, as_read, &|width| of_bandwidth(clock, width))?;
+            as_read = bandwidth::best(recording, &integrity, as_read, &|width| of_bandwidth(&clock, width))?;
         }
         let Reference { mut movement, held, unmatched, remarks: of_reference } = as_read;
         let lacks =
@@ -138,6 +139,13 @@ impl Preparation {
         for usable in &mut usable {
             usable.iter_mut().zip(movement.known()).for_each(|(usable, known)| *usable &= known);
         }
+        let mut constant = Vec::new();
+        for kind in SensorKind::ALL {
+            if let Some(remark) = constant_axis::remark(recording, kind, &usable[kind as usize]) {
+                usable[kind as usize].fill(false);
+                constant.push(remark);
+            }
+        }
         let mut triads = model.triads;
         if let Some(held) = &held {
             for kind in [SensorKind::Acc, SensorKind::Gyr] {
@@ -157,14 +165,17 @@ impl Preparation {
             movement = mounted;
         }
         if !usable.iter().flatten().any(|row| *row) {
-            let why = [vec!["no sensor has a usable row".to_owned()], of_stream.remarks].concat().join("; ");
+            let why = [vec!["no sensor has a usable row".to_owned()], of_stream.remarks, constant];
+            let why = why.concat().join("; ");
             return Err(DiagnosisError::Recording(why));
         }
         let mut remarks = conventions.remarks;
         remarks.extend(integrity.sensors.iter().flat_map(integrity_warning::stuck));
+        remarks.extend(constant);
         remarks.extend(repeated.flatten());
         remarks.extend(of_pose.remarks);
         remarks.extend(of_stream.remarks.iter().cloned());
+        remarks.extend(stream_conventions::clock::remark(&steadiness));
         remarks.extend(of_reference);
         remarks.extend(model.remarks.iter().cloned());
         // A machine's attitudes are no rests of a table, whose pointing errors repeat.
@@ -172,6 +183,7 @@ impl Preparation {
         remarks.extend(shortcomings(recording));
         let mut findings = of_pose.findings;
         findings.extend(conventions.findings);
+        findings.extend(stream_conventions::clock::findings(&steadiness));
         Ok(Self {
             movement,
             held,

@@ -72,7 +72,7 @@ pub fn answer(
     let mut asserted = Asserted::of(explained, &tested)?;
     let found = asserted.causes.clone();
     let remainder = left.map_or(0.0, |left| left.size);
-    let terms = reference_clock::terms(explained, preparation.clock)?;
+    let terms = reference_clock::terms(explained, &preparation.clock)?;
     let apart = reference_clock::candidates(explained.linear.candidates, &terms);
     let clock = match &apart {
         Some(apart) => reference_clock::clock(explained, apart, &terms, &found, remainder)?,

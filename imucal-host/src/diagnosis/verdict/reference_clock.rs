@@ -37,7 +37,7 @@ pub struct Clock<'s> {
 }
 
 /// The terms of the clock that are known and matter; the reference was read by `clock`.
-pub fn terms(explained: &Solution<'_>, clock: StreamClock) -> Result<Vec<Term>, DiagnosisError> {
+pub fn terms(explained: &Solution<'_>, clock: &StreamClock) -> Result<Vec<Term>, DiagnosisError> {
     let is_term = |term: &&'static Effect| matches!(term.part, Part::ClockTerm | Part::ClockRateTerm);
     let terms: Vec<&'static Effect> =
         explained.linear.candidates.baseline.iter().copied().filter(is_term).collect();

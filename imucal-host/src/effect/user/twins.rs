@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Effects of the catalogue that are no formula, `P.` for each sensor, and why.
-const NO_FORMULAS: [(&str, &str); 35] = [
+const NO_FORMULAS: [(&str, &str); 38] = [
     ("ref.motion_mismatch", "it moves the machine"),
     ("ref.mount_slip", "it turns all that is sensed before the triads"),
     ("ref.attitude_noise", "it has no pattern"),
@@ -26,9 +26,12 @@ const NO_FORMULAS: [(&str, &str); 35] = [
     ("rig.wobble", "it moves the rig"),
     ("clk.time_offset", "it changes the time"),
     ("clk.rate_error", "it changes the time"),
+    ("clk.jump", "it changes the time"),
+    ("clk.wander", "it changes the time"),
     ("acc.gravity_error", "it changes gravity before the triad, along the vertical of the site"),
     ("acc.lever_arm", "it changes the force before the triad; acc.inner_lever_arm holds it as a formula"),
     ("gyr.earth_rate", "it takes a rate out that no input tells from the table's"),
+    ("mag.field_direction", "it turns the field about the vertical, which is no input"),
     ("mag.field_drift", "its vector lies in the room, whose axes are no input"),
     ("mag.transient", "its vector lies in the room, whose axes are no input"),
     ("mag.field_gradient", "it depends on where in the room the sensor is"),

@@ -2,7 +2,7 @@ use super::*;
 use crate::{recording::Simulated, simulator::Tumble};
 
 /// The stream of a tumbling hand at 250 Hz, its own clock by `clock`.
-fn stream(tumble: &Tumble, clock: StreamClock) -> Stream {
+fn stream(tumble: &Tumble, clock: &StreamClock) -> Stream {
     let time: Vec<f64> = (0..7500).map(|k| 0.004 * f64::from(k)).collect();
     let shown = |s: &f64| tumble.truth(s * (1.0 + clock.error) - clock.offset, &|_| ());
     let truth: Vec<Truth> = time.iter().map(shown).collect();
@@ -18,7 +18,7 @@ fn stream(tumble: &Tumble, clock: StreamClock) -> Stream {
 
 fn streamed(clock: StreamClock, alter: impl Fn(&mut Stream)) -> (Tumble, Streamed) {
     let tumble = Tumble::new(5, 3);
-    let mut stream = stream(&tumble, clock);
+    let mut stream = stream(&tumble, &clock);
     alter(&mut stream);
     let rows: Vec<f64> = (0..2900).map(|k| 0.3 + 0.01 * f64::from(k)).collect();
     let streamed = Streamed::new(&stream, clock, &rows, vec![25.0; 2900], tumble.place()).unwrap();
@@ -27,7 +27,7 @@ fn streamed(clock: StreamClock, alter: impl Fn(&mut Stream)) -> (Tumble, Streame
 
 #[test]
 fn a_row_shows_the_stream_at_its_own_time_on_the_sensor_s_clock() {
-    let (tumble, streamed) = streamed(StreamClock { offset: 0.0371, error: 3e-4 }, |_| ());
+    let (tumble, streamed) = streamed(StreamClock::even(0.0371, 3e-4), |_| ());
     let mut kinks = 0;
     for k in 0..400 {
         let t = 10.5 + 0.0371 * f64::from(k);
@@ -63,9 +63,9 @@ fn rows_in_a_gap_of_the_stream_and_beyond_its_ends_are_not_known() {
     let at = |t: f64| streamed.known()[((t - 0.3) / 0.01).round() as usize];
     assert!(at(11.9) && !at(12.05) && at(12.3));
     assert!(streamed.truth(12.05, &|_| ()).w_it_t.iter().all(|w| w.is_finite()));
-    let late = StreamClock { offset: 5.0, error: 0.0 };
+    let late = StreamClock::even(5.0, 0.0);
     let rows: Vec<f64> = (0..2900).map(|k| 0.01 * f64::from(k)).collect();
-    let stream = stream(&Tumble::new(5, 3), StreamClock::default());
+    let stream = stream(&Tumble::new(5, 3), &StreamClock::default());
     let cut = Streamed::new(&stream, late, &rows, vec![25.0; 2900], Place::ankara()).unwrap();
     assert!(cut.known()[2400] && !cut.known()[2600]);
 }
@@ -103,7 +103,7 @@ fn a_stream_at_rest_does_not_move() {
 
 #[test]
 fn a_mounted_unit_is_given_the_same_movement_in_its_own_axes() {
-    let (_, streamed) = streamed(StreamClock { offset: 0.01, error: 1e-4 }, |_| ());
+    let (_, streamed) = streamed(StreamClock::even(0.01, 1e-4), |_| ());
     let c_t_q = exp(&Vector3::new(0.02, -0.05, 0.1));
     let mounted = streamed.mounted(&c_t_q).unwrap();
     for t in [10.0, 12.34, 25.1] {
@@ -119,4 +119,18 @@ fn a_mounted_unit_is_given_the_same_movement_in_its_own_axes() {
         let to_n = |truth: &Truth| truth.c_p_n * truth.c_t_p * truth.f_t;
         assert!((to_n(&here) - to_n(&there)).norm() < 1e-6, "{t}");
     }
+}
+
+#[test]
+fn a_clock_that_jumps_and_wanders_is_followed_and_its_inverse_finds_the_row() {
+    let corrections = vec![(10.0, 0.0), (10.0, 0.04), (20.0, 0.04), (30.0, 0.05)];
+    let clock = StreamClock { corrections, unknown: vec![9.8..10.1], ..StreamClock::even(0.5, 1e-3) };
+    for (time, correction) in [(3.0, 0.0), (9.99, 0.0), (10.01, 0.04), (25.0, 0.045), (40.0, 0.05)] {
+        let shown = clock.stream_time(time);
+        assert!((shown - (time + 0.5 + correction) / 1.001).abs() < 1e-12, "{time}");
+        assert!((clock.row_time(shown) - time).abs() < 1e-4, "{time}");
+    }
+    let (_, streamed) = streamed(clock, |_| ());
+    let at = |t: f64| streamed.known()[((t - 0.3) / 0.01).round() as usize];
+    assert!(at(9.7) && !at(9.9) && at(10.2));
 }

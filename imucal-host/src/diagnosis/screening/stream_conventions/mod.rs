@@ -7,12 +7,14 @@
 //! | [`gravity`] | coordinate acceleration instead of specific force |
 //! | [`sparse`] | samples too far apart for what lies between them |
 //! | [`own_noise`] | noise and steps of the stream's own |
+//! | [`clock`] | a clock that jumps or wanders |
 //! | [`axes`] | axes that are turned or mirrored against the sensor's |
 //!
 //! A stream from which no movement follows is refused; all else is a remark that says what was found, what was expected
 //! and what to do.
 
 pub mod axes;
+pub mod clock;
 pub mod gravity;
 pub mod held;
 pub mod own_noise;
