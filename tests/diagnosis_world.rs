@@ -11,6 +11,9 @@ use nalgebra::{Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+/// The base of a stream is level to so much, rad; the errors that are stated leave it out.
+const LEVEL: f64 = 1e-3;
+
 const KINDS: [RobotKind; 3] = [RobotKind::Legged, RobotKind::Wheeled, RobotKind::Flying];
 
 fn scene(kind: RobotKind, seed: u64) -> RobotScene {
@@ -40,10 +43,10 @@ fn amount<'d>(diagnosis: &'d Diagnosis, effect: &str, parameter: &str) -> &'d Am
     cause.parameters.iter().find(|amount| amount.name == parameter).expect("its parameter")
 }
 
-/// Within four standard errors.
-fn is_near(found: &Amount, truth: f64) -> bool {
+/// Within four standard errors, and what else may be off.
+fn is_near(found: &Amount, truth: f64, off: f64) -> bool {
     let (value, error) = (found.value.expect("a value"), found.std_error.expect("an error"));
-    (value - truth).abs() < 4.0 * error
+    (value - truth).abs() < 4.0 * error + off
 }
 
 #[test]
@@ -65,7 +68,7 @@ fn a_simulator_s_field_with_another_declination_and_dip_is_named_with_both_angle
             }
             for (name, truth) in [("declination", declination), ("dip", dip)] {
                 let found = amount(&diagnosis, "mag.field_direction", name);
-                assert!(is_near(found, truth), "{case} {name}: {found:?}");
+                assert!(is_near(found, truth, LEVEL), "{case} {name}: {found:?}");
             }
         }
     }
@@ -79,7 +82,7 @@ fn another_place_s_gravity_is_named_where_accelerations_tell_it_from_a_scale() {
     let diagnosis = diagnosed(&real, &simulator);
     assert_eq!(named(&diagnosis), ["acc.gravity_error"]);
     let found = amount(&diagnosis, "acc.gravity_error", "share");
-    assert!(is_near(found, 0.05 / simulator.place.gravity), "{found:?}");
+    assert!(is_near(found, 0.05 / simulator.place.gravity, 0.0), "{found:?}");
 }
 
 #[test]
@@ -99,7 +102,7 @@ fn rows_that_are_lost_and_numbered_as_if_none_were_are_a_jump_of_the_clock_where
     // Twelve rows at 200 Hz.
     let once = numbered(&|row| (15_000..15_012).contains(&row));
     assert_eq!(named(&once), ["clk.jump"]);
-    assert!(is_near(amount(&once, "clk.jump", "jump"), 0.06), "{:?}", once.causes);
+    assert!(is_near(amount(&once, "clk.jump", "jump"), 0.06, 0.0), "{:?}", once.causes);
     // One in forty, here and there.
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let lost: Vec<bool> = (0..pair.real.rows()).map(|_| random.random::<f64>() < 0.025).collect();

@@ -10,7 +10,8 @@
 //! | δ | `dip`: it points further down |
 //!
 //! It turns the stream's own field about the vertical of the stream: a heading that drifts with the stream's rate changes
-//! nothing. Not modelled: another strength, which the magnetometer's scale takes up.
+//! nothing. Not modelled: another strength, which the magnetometer's scale takes up. The errors that are stated leave out how level
+//! the stream's base is, about a milliradian (`tests/diagnosis_world.rs`).
 
 use imucal_core::rotation;
 use nalgebra::Vector3;

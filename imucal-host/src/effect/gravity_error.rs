@@ -8,7 +8,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Act, Effect, Parameter, SensorKind, Truth, Words};
+use super::{Act, Effect, Needs, Parameter, SensorKind, Truth, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -18,6 +18,7 @@ pub(super) fn effect() -> Effect {
     };
     Effect::new("acc.gravity_error", Act::Field(alter), vec![Parameter::amplitude("share", "-", 5e-4)], words)
         .absorbed()
+        .needing(Needs::EXACT_FORCE)
         .on(SensorKind::Acc)
         .like("acc.scale", "a known centripetal acceleration; not data with 1 g alone")
 }

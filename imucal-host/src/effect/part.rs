@@ -70,6 +70,8 @@ pub struct Needs {
     pub position: bool,
     /// A reference on the body, of a tracker or a simulator: neither a rig nor the sensor's own rests.
     pub outside: bool,
+    /// Specific force without the errors of accelerations that follow from positions.
+    pub exact_force: bool,
     /// A simulator's stream: elsewhere the base's heading and the site's field are terms of the baseline.
     pub stream: bool,
     /// That all sensors were read at the same time: else a delay of one of them is the reference's clock.
@@ -86,6 +88,7 @@ impl Needs {
         exact_attitude: false,
         position: false,
         outside: false,
+        exact_force: false,
         stream: false,
         read_together: false,
     };
@@ -101,6 +104,8 @@ impl Needs {
     pub const POSITION: Self = Self { position: true, ..Self::NOTHING };
     /// A reference on the body.
     pub const OUTSIDE: Self = Self { outside: true, ..Self::NOTHING };
+    /// An exact specific force.
+    pub const EXACT_FORCE: Self = Self { exact_force: true, ..Self::NOTHING };
     /// A simulator's stream.
     pub const STREAM: Self = Self { stream: true, ..Self::NOTHING };
     /// Sensors that were read together.

@@ -81,6 +81,7 @@ impl Setting<'_> {
             exact_attitude,
             position,
             outside,
+            exact_force,
             stream,
             read_together,
         } = effect.needs;
@@ -100,6 +101,12 @@ impl Setting<'_> {
             && self.kinds.contains(&SensorKind::Mag);
         if outside && (provided.gimbals || !provided.table) {
             return Some("there is no reference on the body: neither a tracker's nor a simulator's");
+        }
+        if exact_force && provided.placed {
+            return Some(
+                "accelerations that follow from positions are off by more than what distinguishes gravity from a scale of all \
+                 axes",
+            );
         }
         if stream && !provided.followed {
             return Some("there is no simulator's stream: how the field points is a term of the baseline");
