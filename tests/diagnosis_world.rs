@@ -11,8 +11,8 @@ use nalgebra::{Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// The base of a stream is level to so much, rad; the errors that are stated leave it out.
-const LEVEL: f64 = 1e-3;
+/// What else an angle may be off by, rad; the errors that are stated leave it out.
+const OFF: f64 = 5e-4;
 
 const KINDS: [RobotKind; 3] = [RobotKind::Legged, RobotKind::Wheeled, RobotKind::Flying];
 
@@ -62,13 +62,10 @@ fn a_simulator_s_field_with_another_declination_and_dip_is_named_with_both_angle
             let diagnosis = diagnosed(&real, &simulator);
             let case = format!("{kind:?} {declination} {dip}");
             assert_eq!(named(&diagnosis), ["mag.field_direction"], "{case}");
-            // What the stream's own attitude is off by, a milliradian or so, is seen from there on.
-            if declination.abs() < 0.3 {
-                assert_eq!(diagnosis.verdict, Verdict::Explained, "{case}");
-            }
+            assert_eq!(diagnosis.verdict, Verdict::Explained, "{case}");
             for (name, truth) in [("declination", declination), ("dip", dip)] {
                 let found = amount(&diagnosis, "mag.field_direction", name);
-                assert!(is_near(found, truth, LEVEL), "{case} {name}: {found:?}");
+                assert!(is_near(found, truth, OFF), "{case} {name}: {found:?}");
             }
         }
     }

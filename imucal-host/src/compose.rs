@@ -51,6 +51,11 @@ pub enum ComposeFault {
         /// What the old one puts out.
         expected: Unit,
     },
+    /// Both are one calibration.
+    #[error(
+        "both calibrations have the same gains and biases, expected a new one of what the old one has corrected; give the right files"
+    )]
+    Same,
     /// Terms beyond gain and bias.
     #[error(
         "{sensor}: found {what} in the {which} calibration, expected gain and bias alone; calibrate from raw values"
@@ -94,6 +99,14 @@ pub fn compose(old: &StoredCalibration, new: &StoredCalibration) -> Result<Store
     }
     if SensorKind::ALL.into_iter().all(|kind| new.triad(kind).is_none()) {
         return Err(ComposeFault::Nothing);
+    }
+    let constants = |calibration: &StoredCalibration, kind: SensorKind| {
+        calibration.triad(kind).map(|triad| (triad.gain, triad.bias))
+    };
+    let is_same =
+        |kind: SensorKind| new.triad(kind).is_none() || constants(new, kind) == constants(old, kind);
+    if SensorKind::ALL.into_iter().all(is_same) {
+        return Err(ComposeFault::Same);
     }
     let of = |kind: SensorKind| match (old.triad(kind), new.triad(kind)) {
         (Some(old), Some(new)) => of_sensor(kind, old, new).map(Some),
@@ -203,6 +216,8 @@ mod tests {
         assert_eq!(compose(&without, &new), Err(ComposeFault::Alone { sensor: SensorKind::Acc }));
         let nothing = StoredCalibration { acc: None, gyr: None, mag: None, ..new.clone() };
         assert_eq!(compose(&old, &nothing), Err(ComposeFault::Nothing));
+        // One that takes what it puts out can follow on itself by its units.
+        assert_eq!(compose(&new, &new), Err(ComposeFault::Same));
         let mut flat = old.clone();
         flat.acc.as_mut().expect("one").gain = [[0.0; 3]; 3];
         assert_eq!(compose(&flat, &new), Err(ComposeFault::Singular { sensor: SensorKind::Acc }));

@@ -10,8 +10,8 @@
 //! | δ | `dip`: it points further down |
 //!
 //! It turns the stream's own field about the vertical of the stream: a heading that drifts with the stream's rate changes
-//! nothing. Not modelled: another strength, which the magnetometer's scale takes up. The errors that are stated leave out how level
-//! the stream's base is, about a milliradian (`tests/diagnosis_world.rs`).
+//! nothing. Not modelled: another strength, which the magnetometer's scale takes up. Angles of half a radian are found to half a
+//! milliradian, which is more than the errors that are stated (`tests/diagnosis_world.rs`).
 
 use imucal_core::rotation;
 use nalgebra::Vector3;

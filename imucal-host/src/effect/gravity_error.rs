@@ -16,7 +16,9 @@ pub(super) fn effect() -> Effect {
         remedy: "Enter the site's measured gravity, or its latitude and height.",
         needs: "Known specific force other than gravity, as of a centrifuge; rests alone cannot show it.",
     };
-    Effect::new("acc.gravity_error", Act::Field(alter), vec![Parameter::amplitude("share", "-", 5e-4)], words)
+    // On Earth it differs by half a per cent, and a simulator may have 10 m/s².
+    let share = Parameter { range: (-0.03, 0.03), ..Parameter::amplitude("share", "-", 5e-4) };
+    Effect::new("acc.gravity_error", Act::Field(alter), vec![share], words)
         .absorbed()
         .needing(Needs::EXACT_FORCE)
         .on(SensorKind::Acc)

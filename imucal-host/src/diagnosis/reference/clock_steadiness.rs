@@ -144,11 +144,23 @@ fn wandering(coarse: &StreamClock, lags: &[Lag], p_value: f64) -> Result<Steadin
         let value = lag.value + coarse.stream_time(lag.time) - even.stream_time(lag.time);
         (lag.time, value * (1.0 + even.error))
     };
-    let corrections: Vec<(f64, f64)> = near.map(off).collect();
+    let mut corrections: Vec<(f64, f64)> = near.map(off).collect();
     let squares: f64 = corrections.iter().map(|(_, off)| off * off).sum();
     let wander = Some((squares / corrections.len() as f64).sqrt());
+    let ends = [beyond(corrections.iter().rev()), beyond(corrections.iter())];
+    let [last, first] = ends;
+    corrections.extend(last);
+    corrections.splice(0..0, first);
     let clock = StreamClock { corrections, ..even };
     Ok(Steadiness { clock, jumps: Vec::new(), wander, p_value })
+}
+
+/// The correction a window further on than the first of some, on a line; `None` where they do not span one.
+fn beyond<'c>(mut corrections: impl Iterator<Item = &'c (f64, f64)>) -> Option<(f64, f64)> {
+    let (end, value) = corrections.next()?;
+    let (inside, other) = corrections.find(|(time, _)| (time - end).abs() >= 0.5 * WINDOW)?;
+    let further = WINDOW * (end - inside).signum();
+    Some((end + further, value + (value - other) / (end - inside) * further))
 }
 
 /// How far a lag is from the line through its neighbours, s; zero at the ends.

@@ -7,6 +7,7 @@
 //! | file | what |
 //! | --- | --- |
 //! | [`model`] | the simulator's present model of the unit: a stored calibration as triads in SI |
+//! | `moments` | samples against what they were given, by least squares |
 //! | [`movement`] | which of the movements a recording has, and its place on Earth |
 //! | [`pose`] | attitudes and positions of a reference |
 //! | [`rest_to_rest`] | a movement reconstructed from the sensor's own rests and turns (this runs a whole calibration) |
@@ -35,6 +36,7 @@ pub mod common_instants;
 pub mod gain;
 pub mod impact;
 pub mod model;
+pub(super) mod moments;
 pub mod movement;
 pub mod pose;
 mod rate_lags;

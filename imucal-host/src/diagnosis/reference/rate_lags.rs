@@ -15,10 +15,10 @@
 
 use std::ops::Range;
 
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Vector2, Vector3};
 use rayon::prelude::*;
 
-use super::binned::Binned;
+use super::{binned::Binned, moments::Moments};
 use crate::simulator::StreamClock;
 
 /// Length of a window, s, and the way to the next one.
@@ -39,8 +39,6 @@ const ROUNDS: usize = 6;
 const SETTLED: f64 = 1e-6;
 /// A window whose lag is known less closely shows nothing, s.
 const CLOSE: f64 = 3e-3;
-/// Directions in which rates vary less than this share do not count.
-const FLAT: f64 = 1e-6;
 /// A unit turns briskly whose rate scatters by this within a window, rad/s.
 const BRISK: f64 = 0.1;
 /// By a clock that explains a smaller share of the rates K is not known.
@@ -66,25 +64,17 @@ pub(super) struct Rates {
     pub ideal: Binned,
 }
 
-/// Second moments of rates at like times.
-struct Moments {
-    k: Matrix3<f64>,
-    explained: f64,
-}
-
 impl Rates {
     /// The stream's rates in the recording's axes, where a clock is near enough for these to be known. `None` where nothing of
     /// the one lies beside the other.
     pub fn aligned(&self, clock: &StreamClock) -> Option<Self> {
-        let by_clock = self.pairs(0..self.real.time.len(), |time| clock.stream_time(time));
-        let moments = Moments::of(&by_clock)?;
-        let moments = match moments.explained < FOLLOWED {
-            true => Moments::of(&self.by_sizes(clock)).unwrap_or(moments),
-            false => moments,
-        };
+        let by_clock = Moments::of(&self.pairs(0..self.real.time.len(), |time| clock.stream_time(time)));
+        let is_followed = by_clock.unexplained() < 1.0 - FOLLOWED;
+        let moments = if is_followed { by_clock } else { Moments::of(&self.by_sizes(clock)) };
+        let k = moments.sensitivity();
         let mut aligned = self.clone();
-        aligned.ideal.values.iter_mut().for_each(|rate| *rate = moments.k * *rate);
-        Some(aligned)
+        aligned.ideal.values.iter_mut().for_each(|rate| *rate = k * *rate);
+        (moments.output > 0.0).then_some(aligned)
     }
 
     /// Recorded and simulated rates of rows, where both are given.
@@ -210,25 +200,6 @@ impl Rates {
 fn searched() -> impl Iterator<Item = f64> {
     let steps = (REACH / SEARCH) as i32;
     (-steps..=steps).map(|k| f64::from(k) * SEARCH)
-}
-
-impl Moments {
-    /// `None` where nothing varies.
-    fn of(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Self> {
-        let n = pairs.len().max(1) as f64;
-        let zero = (Vector3::zeros(), Vector3::zeros());
-        let mean = pairs.iter().fold(zero, |(y, x), pair| (y + pair.0 / n, x + pair.1 / n));
-        let (mut cross, mut input, mut output) = (Matrix3::zeros(), Matrix3::zeros(), 0.0);
-        for (y, x) in pairs {
-            let (y, x) = (y - mean.0, x - mean.1);
-            cross += y * x.transpose();
-            input += x * x.transpose();
-            output += y.norm_squared();
-        }
-        // Directions about which the machine hardly turns do not count.
-        let k = cross * input.pseudo_inverse(FLAT * input.trace()).ok()?;
-        (output > 0.0).then(|| Self { k, explained: (k * cross.transpose()).trace() / output })
-    }
 }
 
 /// Of two vectors over time, all axes together; zero where one of them does not vary.

@@ -54,10 +54,11 @@ pub fn movement(
 fn unresolved(resolved: &[bool]) -> Option<String> {
     let left_out = resolved.iter().filter(|resolved| !**resolved).count();
     (left_out > 0).then(|| {
+        let share = 100.0 * left_out as f64 / resolved.len() as f64;
+        let rows = if share < 0.1 { format!("{left_out} rows") } else { format!("{share:.1} % of the rows") };
         format!(
-            "{:.1} % of the rows are left out, near impacts that the samples of the stream do not resolve: a stream at a higher \
-             rate would show them",
-            100.0 * left_out as f64 / resolved.len() as f64
+            "{rows} are left out, near impacts that the samples of the stream do not resolve: a stream at a higher rate would show \
+             them"
         )
     })
 }

@@ -19,8 +19,9 @@
 use imucal_core::triad::Triad;
 use nalgebra::{Matrix3, Vector3};
 
-use super::conventions::pairs::{Moments, Pairs};
+use super::conventions::pairs::Pairs;
 use crate::{
+    diagnosis::reference::moments::Moments,
     effect::Truth,
     recording::{Recording, SensorKind, check::integrity::Integrity},
     simulator::Motion,

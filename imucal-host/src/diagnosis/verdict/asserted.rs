@@ -4,9 +4,13 @@ use super::{
     confounded_episode, credible, cross_validation, estimates, model_error, reference_error,
     tested::{Tested, is_followed},
 };
-use crate::diagnosis::{
-    error::DiagnosisError, finding::Cause, library::candidates::Candidates, location::score_test::Following,
-    reference::model::Model, search::stepwise::Solution, settings::VerdictSettings,
+use crate::{
+    diagnosis::{
+        error::DiagnosisError, finding::Cause, library::candidates::Candidates,
+        location::score_test::Following, reference::model::Model, search::stepwise::Solution,
+        settings::VerdictSettings,
+    },
+    effect::Effect,
 };
 
 /// The causes that are asserted, and what is said of the others.
@@ -109,8 +113,20 @@ fn refuted(
         return Ok(Vec::new());
     }
     let mut remarks = cross_validation::leave_out(causes, linear, &best.set, &best.noise)?;
+    remarks.extend(implausible(causes, &best.set));
     remarks.extend(confounded_episode::leave_out(causes, &linear.scene.blocks, by.carried));
     Ok(remarks)
+}
+
+/// Takes out the causes that would have to be implausibly large; what they explain is a gap of an unknown cause.
+fn implausible(causes: &mut Vec<Cause>, set: &[&'static Effect]) -> Vec<String> {
+    let is_implausible = |cause: &mut Cause| {
+        let effect = set.iter().find(|effect| effect.id == cause.effect);
+        effect.is_some_and(|effect| !estimates::is_plausible(effect, &cause.parameters))
+    };
+    let remark =
+        |cause: Cause| format!("not asserted, since it would have to be implausibly large: {}", cause.effect);
+    causes.extract_if(.., is_implausible).map(remark).collect()
 }
 
 fn small(effect: &str, share: f64, interval: Option<[f64; 2]>) -> String {

@@ -17,6 +17,8 @@ use crate::{
     simulator::Dose,
 };
 
+/// An amplitude is beyond its range by so many standard errors.
+const BEYOND: f64 = 3.0;
 /// Prior standard deviation in usual sizes: so loose that it only keeps what the data do not show finite.
 const LOOSE: f64 = 1e3;
 /// Parts of a jackknife.
@@ -134,6 +136,15 @@ pub fn is_material(effect: &Effect, amounts: &[Amount]) -> bool {
     })
 }
 
+/// No amplitude is beyond its plausible range by more than three standard errors.
+pub fn is_plausible(effect: &Effect, amounts: &[Amount]) -> bool {
+    effect.parameters.iter().zip(amounts).all(|(parameter, amount)| {
+        let off = amount.std_error.map_or(0.0, |error| BEYOND * error);
+        let range = parameter.range.0 - off..=parameter.range.1 + off;
+        parameter.role != Role::Amplitude || amount.value.is_none_or(|value| range.contains(&value))
+    })
+}
+
 /// At least one amplitude is further from zero than so many of its standard errors; true where the effect is a product of
 /// amplitudes and a shape of either sign, such as a gradient and an arm, since the data know neither factor alone.
 pub fn is_sized(effect: &Effect, amounts: &[Amount], errors: f64) -> bool {
@@ -146,4 +157,24 @@ pub fn is_sized(effect: &Effect, amounts: &[Amount], errors: f64) -> bool {
         let far = |value: f64| amount.std_error.is_none_or(|error| value.abs() >= errors * error);
         parameter.role == Role::Amplitude && amount.value.is_some_and(far)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::find;
+
+    #[test]
+    fn an_amplitude_beyond_its_range_by_more_than_its_errors_is_implausible() {
+        let effect = find("acc.gravity_error").unwrap();
+        let share = |value: f64, std_error: f64| {
+            let (value, std_error) = (Some(value), Some(std_error));
+            [Amount { name: "share".into(), value, std_error, unit: "-".into() }]
+        };
+        for (value, std_error, plausible) in
+            [(0.005, 1e-4, true), (-0.031, 1e-3, true), (0.041, 3e-4, false), (-0.041, 3e-4, false)]
+        {
+            assert_eq!(is_plausible(effect, &share(value, std_error)), plausible, "{value} {std_error}");
+        }
+    }
 }

@@ -6,11 +6,8 @@
 
 use nalgebra::Matrix3;
 
-use super::{
-    Conventions, Finding, SURE,
-    pairs::{Moments, Pairs},
-};
-use crate::{effect::axis_swap, recording::SensorKind};
+use super::{Conventions, Finding, SURE, pairs::Pairs};
+use crate::{diagnosis::reference::moments::Moments, effect::axis_swap, recording::SensorKind};
 
 /// The next best must leave so many times as much.
 const MARGIN: f64 = 6.0;

@@ -13,8 +13,8 @@
 //! Sizes of what is sensed find the clock, and those of two flights with the same rests agree well enough for that. Not looked
 //! for: a stretch of another movement, which `ref.motion_mismatch` names.
 
-use super::pairs::{Moments, Pairs};
-use crate::recording::SensorKind;
+use super::pairs::Pairs;
+use crate::{diagnosis::reference::moments::Moments, recording::SensorKind};
 
 /// A sensor follows its stream if it repeats this share of it,
 const REPEATED: f64 = 0.5;

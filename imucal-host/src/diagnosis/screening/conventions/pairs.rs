@@ -1,8 +1,9 @@
 //! A triad's samples against what it was given: y ≈ K v + b by robust linear least squares.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use crate::{
+    diagnosis::reference::{moments, moments::Moments},
     effect::Truth,
     recording::{Recording, SensorKind, check::integrity::Integrity},
 };
@@ -12,25 +13,10 @@ const STRONG: [f64; 3] = [2.0, 0.1, 5.0];
 /// Rounds of leaving out outliers, and how many medians away an outlier is.
 const ROUNDS: usize = 3;
 const FAR: f64 = 6.0;
-/// Directions in which the input varies less than this share of the largest do not count.
-const FLAT: f64 = 1e-6;
 /// Samples this many times full scale are in another unit.
 const BEYOND: f64 = 1.05;
 /// A triad with fewer rows says nothing, nor do fewer samples beyond full scale.
 const FEWEST: usize = 20;
-
-/// Second moments of samples and inputs about their means.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Moments {
-    /// Rows.
-    pub rows: f64,
-    /// Σ (y − ȳ)(v − v̄)ᵀ
-    pub cross: Matrix3<f64>,
-    /// Σ |y − ȳ|²
-    pub output: f64,
-    /// Σ (v − v̄)(v − v̄)ᵀ
-    pub input: Matrix3<f64>,
-}
 
 /// Rows of a triad that can be compared.
 #[derive(Clone, Debug)]
@@ -86,24 +72,12 @@ impl Pairs {
 
     /// Means of samples and inputs.
     pub(crate) fn means(&self) -> (Vector3<f64>, Vector3<f64>) {
-        let sum =
-            self.rows.iter().fold((Vector3::zeros(), Vector3::zeros()), |(y, v), row| (y + row.0, v + row.1));
-        let rows = self.rows.len().max(1) as f64;
-        (sum.0 / rows, sum.1 / rows)
+        moments::means(&self.rows)
     }
 
     /// Moments of all rows.
     pub(crate) fn moments(&self) -> Moments {
-        let rows = self.rows.len() as f64;
-        let (y, v) = self.means();
-        let mut moments = Moments { rows, cross: Matrix3::zeros(), output: 0.0, input: Matrix3::zeros() };
-        for row in &self.rows {
-            let (y, v) = (row.0 - y, row.1 - v);
-            moments.cross += y * v.transpose();
-            moments.output += y.norm_squared();
-            moments.input += v * v.transpose();
-        }
-        moments
+        Moments::of(&self.rows)
     }
 
     /// Without the rows that stand far off the fit.
@@ -121,21 +95,5 @@ impl Pairs {
             pairs.rows.retain(|_| off.next().is_some_and(|off| off <= limit));
         }
         pairs
-    }
-}
-
-impl Moments {
-    /// K; zero along inputs that do not vary.
-    pub(crate) fn sensitivity(&self) -> Matrix3<f64> {
-        let largest = self.input.symmetric_eigenvalues().max();
-        self.input
-            .pseudo_inverse(FLAT * largest)
-            .map_or_else(|_| Matrix3::zeros(), |inverse| self.cross * inverse)
-    }
-
-    /// Share of the samples' variance that K does not explain; 1 where nothing varies.
-    pub(crate) fn unexplained(&self) -> f64 {
-        let explained = (self.sensitivity() * self.cross.transpose()).trace();
-        if self.output > 0.0 { (1.0 - explained / self.output).max(0.0) } else { 1.0 }
     }
 }
