@@ -216,7 +216,7 @@ mod tests {
         assert_eq!(compose(&without, &new), Err(ComposeFault::Alone { sensor: SensorKind::Acc }));
         let nothing = StoredCalibration { acc: None, gyr: None, mag: None, ..new.clone() };
         assert_eq!(compose(&old, &nothing), Err(ComposeFault::Nothing));
-        // One that takes what it puts out can follow on itself by its units.
+        // Its units would allow it to follow on itself.
         assert_eq!(compose(&new, &new), Err(ComposeFault::Same));
         let mut flat = old.clone();
         flat.acc.as_mut().expect("one").gain = [[0.0; 3]; 3];

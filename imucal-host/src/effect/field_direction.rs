@@ -21,7 +21,7 @@ use super::{Act, Effect, Needs, Parameter, SensorKind, Truth, Words, field_dip::
 pub(super) fn effect() -> Effect {
     let words = Words {
         cause: "The simulator's field points elsewhere than the site's: it has another declination or another dip.",
-        remedy: "Enter the site's field in the simulator, as of a model of Earth's field (WMM or IGRF), or turn its by these angles.",
+        remedy: "Enter the site's field in the simulator, as of a model of Earth's field (WMM or IGRF), or turn its field by these angles.",
         needs: "A simulator's stream with a field, a magnetometer, and attitudes that differ by more than a turn about one axis.",
     };
     let parameters = Parameter::amplitudes(&["declination", "dip"], "rad", 0.1);

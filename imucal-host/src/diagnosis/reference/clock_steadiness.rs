@@ -11,7 +11,8 @@
 //! | a, b | its offset and rate |
 //! | J_k, t_k | a jump, and when it comes |
 //!
-//! Lags that no line with a few jumps describes are followed as they are. Not modelled: a clock that changes within a window by more than some milliseconds; such a recording is refused.
+//! Lags that no line with a few jumps describes are followed as they are. Not modelled: a clock that changes within a window by
+//! more than some milliseconds; such a recording is refused.
 
 use std::ops::Range;
 
@@ -22,7 +23,7 @@ use crate::{recording::median, simulator::StreamClock};
 
 /// Passes of finding lags.
 const PASSES: usize = 2;
-/// Rounds of fitting a lag.
+/// Rounds of least squares, each with the weights that the last one left.
 const ROUNDS: usize = 6;
 /// Lags of a steady clock scatter by this at least, s: a filter's delay depends on how brisk a movement is.
 const SCATTER: f64 = 4e-4;
@@ -40,7 +41,7 @@ const MOST: usize = 8;
 const WANDERS: f64 = 2.0;
 /// and, where a lag is further from the line through its neighbours than this, s, too fast to be followed.
 const LOST: f64 = 2e-3;
-/// Steps in which the place of a jump cannot be excluded: the sum of squares is larger by so many variances at most.
+/// A jump may be wherever the sum of squares is larger by so many variances at most than where it is least.
 const PLACED: f64 = 12.0;
 /// A wander is followed where so many of the windows in which the unit turns briskly have a lag.
 const FOUND: f64 = 0.6;
@@ -147,8 +148,7 @@ fn wandering(coarse: &StreamClock, lags: &[Lag], p_value: f64) -> Result<Steadin
     let mut corrections: Vec<(f64, f64)> = near.map(off).collect();
     let squares: f64 = corrections.iter().map(|(_, off)| off * off).sum();
     let wander = Some((squares / corrections.len() as f64).sqrt());
-    let ends = [beyond(corrections.iter().rev()), beyond(corrections.iter())];
-    let [last, first] = ends;
+    let (last, first) = (beyond(corrections.iter().rev()), beyond(corrections.iter()));
     corrections.extend(last);
     corrections.splice(0..0, first);
     let clock = StreamClock { corrections, ..even };

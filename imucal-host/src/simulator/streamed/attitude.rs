@@ -10,11 +10,12 @@
 //! | C_k | table to base at sample k, its third axis down and its heading that of the first sample |
 //! | h, w, ẇ | interval, rate and its slope at the samples |
 //! | ρ | rate of the room against the integral, rad/s: Earth's rotation, where the stream's rate holds it |
-//! | L | the turn that takes the mean of the specific force up: of samples at rest, or, without a rest, of all, since a machine that comes to rest has not been accelerated on average |
+//! | L | the turn that takes the mean of the specific force up: at rest, or else of all samples |
 //!
-//! φ is Magnus' expansion to fourth order in h. ρ is fitted to what stays in the room: the field of the stream, as far as that
-//! is uniform, and gravity, at rest, or else on the whole, where the accelerations of a journey hide it the less the longer that takes. Not modelled: a stream
-//! whose rate has a bias of its own, and a field that differs from place to place.
+//! Of all samples, since a machine that comes to rest has not been accelerated on average. φ is Magnus' expansion to fourth
+//! order in h. ρ is fitted to what stays in the room: the field of the stream, as far as that is uniform, and gravity, at rest, or
+//! else on the whole, where the accelerations of a journey hide it the less the longer that takes. Not modelled: a stream whose
+//! rate has a bias of its own, and a field that differs from place to place.
 
 use imucal_core::rotation::exp;
 use nalgebra::{Matrix3, Rotation3, Vector3};
