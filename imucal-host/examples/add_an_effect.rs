@@ -54,6 +54,7 @@ fn amplitude(axis: &str) -> Parameter {
         role: Role::Amplitude,
         prior_scale: usual,
         range: (-30.0 * usual, 30.0 * usual),
+        is_bounded: false,
         material: 0.2 * usual,
     }
 }

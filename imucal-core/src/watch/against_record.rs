@@ -112,6 +112,11 @@ impl RecordChart {
         self.latest.is_some_and(|(z, reference)| z.abs() < 0.5 * reference) && self.sums() == [0.0; 2]
     }
 
+    /// What the poses before this one showed is over: it is held against the unit no more.
+    pub(super) fn forget_poses(&mut self) {
+        self.base = [0.0; 2];
+    }
+
     /// What disturbed the latest looks is over.
     pub(super) fn forget_block(&mut self) {
         (self.count, self.mean, self.latest) = (0, 0.0, None);

@@ -80,6 +80,7 @@ impl Chart {
             }
             Some(Compared::WithRecord) if self.record.agrees() => {
                 self.track.close(now.time);
+                self.record.forget_poses();
                 true
             }
             Some(_) => false,

@@ -1,6 +1,6 @@
 //! Earth's rotation is not that of the model: `gyr.earth_rate`.
 
-use super::{Act, Effect, Needs, Parameter, Role, SensorKind, Truth, Words};
+use super::{Act, Effect, Needs, Parameter, SensorKind, Truth, Words};
 
 pub(super) fn effect() -> Effect {
     let words = Words {
@@ -8,8 +8,7 @@ pub(super) fn effect() -> Effect {
         remedy: "Add Earth's rotation at the site's latitude to the rate.",
         needs: "Long rests in different attitudes and a gyroscope quieter than 10 degrees an hour.",
     };
-    let share =
-        Parameter { role: Role::Amplitude, range: (-2.0, 2.0), ..Parameter::amplitude("share", "-", 1.0) };
+    let share = Parameter::bounded("share", "-", 1.0, (-2.0, 2.0));
     Effect::new("gyr.earth_rate", Act::Field(alter), vec![share], words)
         .needing(Needs::HEADING)
         .on(SensorKind::Gyr)

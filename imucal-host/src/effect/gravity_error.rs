@@ -17,7 +17,7 @@ pub(super) fn effect() -> Effect {
         needs: "Known specific force other than gravity, as of a centrifuge; rests alone cannot show it.",
     };
     // On Earth it differs by half a per cent, and a simulator may have 10 m/s².
-    let share = Parameter { range: (-0.03, 0.03), ..Parameter::amplitude("share", "-", 5e-4) };
+    let share = Parameter::bounded("share", "-", 5e-4, (-0.03, 0.03));
     Effect::new("acc.gravity_error", Act::Field(alter), vec![share], words)
         .absorbed()
         .needing(Needs::EXACT_FORCE)

@@ -37,6 +37,8 @@ pub struct Parameter {
     pub prior_scale: f64,
     /// Plausible values, in `unit`. A parameter from zero up cannot be negative.
     pub range: (f64, f64),
+    /// Nothing in the world is beyond `range`: an estimate beyond it has another cause.
+    pub is_bounded: bool,
     /// Smaller amplitudes do not matter to a user; in `unit`.
     pub material: f64,
 }
@@ -50,8 +52,14 @@ impl Parameter {
             role: Role::Amplitude,
             prior_scale,
             range: (-30.0 * prior_scale, 30.0 * prior_scale),
+            is_bounded: false,
             material: 0.2 * prior_scale,
         }
+    }
+
+    /// An amplitude that the world bounds.
+    pub(super) fn bounded(name: &str, unit: &str, prior_scale: f64, range: (f64, f64)) -> Self {
+        Self { range, is_bounded: true, ..Self::amplitude(name, unit, prior_scale) }
     }
 
     /// An amplitude that cannot be negative.

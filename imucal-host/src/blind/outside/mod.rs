@@ -88,6 +88,7 @@ pub(super) fn amplitudes(names: &[&str], scale: f64) -> Vec<Parameter> {
         role: Role::Amplitude,
         prior_scale: scale,
         range: (-1e4 * scale, 1e4 * scale),
+        is_bounded: false,
         material: 0.0,
     };
     names.iter().map(amplitude).collect()
@@ -100,6 +101,7 @@ pub(super) fn shape(name: &str, usual: f64) -> Parameter {
         role: Role::Shape { usual },
         prior_scale: usual,
         range: (0.1 * usual, 10.0 * usual),
+        is_bounded: false,
         material: 0.0,
     }
 }

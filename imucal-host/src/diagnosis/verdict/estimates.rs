@@ -136,12 +136,13 @@ pub fn is_material(effect: &Effect, amounts: &[Amount]) -> bool {
     })
 }
 
-/// No amplitude is beyond its plausible range by more than three standard errors.
+/// No amplitude is beyond what the world bounds it to, by more than three standard errors. A magnet held to a magnetometer may
+/// be of any strength.
 pub fn is_plausible(effect: &Effect, amounts: &[Amount]) -> bool {
     effect.parameters.iter().zip(amounts).all(|(parameter, amount)| {
         let off = amount.std_error.map_or(0.0, |error| BEYOND * error);
         let range = parameter.range.0 - off..=parameter.range.1 + off;
-        parameter.role != Role::Amplitude || amount.value.is_none_or(|value| range.contains(&value))
+        !parameter.is_bounded || amount.value.is_none_or(|value| range.contains(&value))
     })
 }
 
@@ -163,6 +164,18 @@ pub fn is_sized(effect: &Effect, amounts: &[Amount], errors: f64) -> bool {
 mod tests {
     use super::*;
     use crate::effect::find;
+
+    #[test]
+    fn a_magnet_of_any_strength_is_plausible() {
+        let field = |name: &str| Amount {
+            name: name.into(),
+            value: Some(500.0),
+            std_error: Some(0.1),
+            unit: "uT".into(),
+        };
+        let amounts = ["x", "y", "z", "t_start", "t_end"].map(field);
+        assert!(is_plausible(find("mag.bias_step").unwrap(), &amounts));
+    }
 
     #[test]
     fn an_amplitude_beyond_its_range_by_more_than_its_errors_is_implausible() {

@@ -275,6 +275,7 @@ impl Shape {
             role: Role::Shape { usual: typical },
             prior_scale,
             range: (low, high),
+            is_bounded: false,
             material: 0.0,
         })
     }
