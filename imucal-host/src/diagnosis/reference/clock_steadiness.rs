@@ -16,27 +16,19 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector};
-
-use super::rate_lags::{Lag, Rates, WINDOW};
+use super::{
+    lag_steps::{FAR, FEWEST, SCATTER, StepFit, Stepped},
+    rate_lags::{Lag, Rates, WINDOW},
+};
 use crate::{recording::median, simulator::StreamClock};
 
-/// Passes of finding lags.
-const PASSES: usize = 2;
-/// Rounds of least squares, each with the weights that the last one left.
-const ROUNDS: usize = 6;
-/// Lags of a steady clock scatter by this at least, s: a filter's delay depends on how brisk a movement is.
-const SCATTER: f64 = 4e-4;
-/// What is further off counts as another movement, in standard deviations.
-const FAR: f64 = 4.0;
-/// A piece of the clock between jumps has so many windows at least.
-const FEWEST: usize = 4;
-/// A jump takes so much of the sum of squares away,
-const SURE: f64 = 60.0;
-/// and is at least this long, s.
-const LEAST: f64 = 2e-3;
-/// Most jumps.
-const MOST: usize = 8;
+/// Passes of finding lags at most.
+const PASSES: usize = 4;
+/// Before the last pass, jumps that leave so many times less scatter than a line are taken for all there is: by a clock that is far
+/// off, lags scatter.
+const STEPPED: f64 = 10.0;
+/// Windows that overlap know a jump by so many times less than windows that do not.
+const OVERLAP: f64 = std::f64::consts::SQRT_2;
 /// A clock whose lags scatter about line and jumps by so many times what they should wanders,
 const WANDERS: f64 = 2.0;
 /// and, where a lag is further from the line through its neighbours than this, s, too fast to be followed.
@@ -80,11 +72,13 @@ impl Steadiness {
     pub fn even(clock: StreamClock) -> Self {
         Self { clock, jumps: Vec::new(), wander: None, p_value: 1.0 }
     }
-}
 
-impl Lag {
-    fn deviation(&self) -> f64 {
-        self.error.hypot(SCATTER)
+    /// As many jumps at the same times, each by the same but for its error; a wander is like any other.
+    fn is_alike(&self, other: &Self) -> bool {
+        let mut jumps = self.jumps.iter().zip(&other.jumps);
+        self.jumps.len() == other.jumps.len()
+            && self.wander.is_some() == other.wander.is_some()
+            && jumps.all(|(a, b)| a.within == b.within && (a.by - b.by).abs() <= a.error)
     }
 }
 
@@ -96,18 +90,20 @@ impl Lag {
 /// Why the recording's times are of no use, for a reader.
 pub(super) fn steadiness(rates: &Rates, coarse: &StreamClock) -> Result<Steadiness, String> {
     let mut steadiness = Steadiness::even(coarse.clone());
-    for _ in 0..PASSES {
+    for pass in 1..=PASSES {
         let Some(rates) = rates.aligned(&steadiness.clock) else { break };
         let against_coarse = |lag: Lag| {
             let value = lag.value + steadiness.clock.stream_time(lag.time) - coarse.stream_time(lag.time);
             Lag { value, ..lag }
         };
         let lags: Vec<Lag> = rates.lags(&steadiness.clock).into_iter().map(against_coarse).collect();
-        steadiness = judged(&rates, coarse, &lags)?;
-        if steadiness.wander.is_some() && (lags.len() as f64) < FOUND * rates.brisk_windows() as f64 {
+        let judged = judged(&rates, coarse, &lags, pass == PASSES)?;
+        if judged.wander.is_some() && (lags.len() as f64) < FOUND * rates.brisk_windows() as f64 {
             return Err(LOST_ROWS.to_owned());
         }
-        if steadiness.jumps.is_empty() && steadiness.wander.is_none() {
+        let before = std::mem::replace(&mut steadiness, judged);
+        let is_as_before = pass > 1 && before.is_alike(&steadiness);
+        if is_as_before || (steadiness.jumps.is_empty() && steadiness.wander.is_none()) {
             break;
         }
     }
@@ -172,15 +168,18 @@ fn bend(lags: &[Lag], at: usize) -> f64 {
     (own.value - before.value - (after.value - before.value) * share).abs()
 }
 
-/// How evenly the coarse clock runs, by lags.
-fn judged(rates: &Rates, coarse: &StreamClock, lags: &[Lag]) -> Result<Steadiness, String> {
+/// How evenly the coarse clock runs, by lags; in the last pass, or in one after which there are others.
+fn judged(rates: &Rates, coarse: &StreamClock, lags: &[Lag], is_last: bool) -> Result<Steadiness, String> {
     let even = || Ok(Steadiness::even(coarse.clone()));
-    let Some(Stepped { fit, places, least_gain }) = stepped(lags).filter(|_| lags.len() >= 2 * FEWEST) else {
+    let Some(Stepped { fit, places, least_gain }) = Stepped::of(lags).filter(|_| lags.len() >= 2 * FEWEST)
+    else {
         return even();
     };
     let expected = median(lags.iter().map(Lag::deviation).collect()).unwrap_or(SCATTER);
     let ratio = (fit.left / expected).powi(2);
-    if ratio > WANDERS * WANDERS {
+    let line = StepFit::of(lags, &[]).map_or(f64::INFINITY, |line| line.left);
+    let is_stepped = !is_last && !places.is_empty() && STEPPED * fit.left < line;
+    if ratio > WANDERS * WANDERS && !is_stepped {
         // Chernoff's bound of a χ² that large.
         let p_value = libm::exp(-0.5 * lags.len() as f64 * (ratio - 1.0 - ratio.ln()));
         return wandering(coarse, lags, p_value);
@@ -189,7 +188,8 @@ fn judged(rates: &Rates, coarse: &StreamClock, lags: &[Lag]) -> Result<Steadines
         return even();
     }
     let jump = |(at, place): (usize, &usize)| {
-        let (by, error) = (fit.coefficients[2 + at], fit.errors[2 + at]);
+        // Where the lags scatter by less than a filter might make them, a jump is known by as much better.
+        let (by, error) = (fit.coefficients[2 + at], OVERLAP * ratio.sqrt() * fit.errors[2 + at]);
         let between = lags[place - 1].time..lags[*place].time;
         let before = fit.coefficients[0] + fit.coefficients[1] * between.start;
         let before = before + fit.coefficients[2..2 + at].iter().sum::<f64>();
@@ -233,81 +233,5 @@ fn placed(
     Some(time(from)?..time(to).unwrap_or(between.end + WINDOW))
 }
 
-/// A line with steps through lags.
-struct StepFit {
-    /// Value at zero, slope, and the steps.
-    coefficients: Vec<f64>,
-    errors: Vec<f64>,
-    /// Sum of whitened squares, each at most that of [`FAR`].
-    cost: f64,
-    /// Scatter about it, by the median, s.
-    left: f64,
-}
-
-/// A line with as many steps as lags show.
-struct Stepped {
-    fit: StepFit,
-    /// The lags before which a step is.
-    places: Vec<usize>,
-    /// The least that a step took away of the cost.
-    least_gain: f64,
-}
-
-fn stepped(lags: &[Lag]) -> Option<Stepped> {
-    let mut places: Vec<usize> = Vec::new();
-    let mut best = StepFit::of(lags, &places)?;
-    let mut least_gain = f64::INFINITY;
-    while places.len() < MOST {
-        let with = |place: usize| {
-            let mut places = places.clone();
-            places.push(place);
-            places.sort_unstable();
-            let bounds = [&[0][..], &places, &[lags.len()]].concat();
-            let long = bounds.windows(2).all(|piece| piece[1] >= piece[0] + FEWEST);
-            long.then(|| StepFit::of(lags, &places)).flatten().map(|fit| (fit, places))
-        };
-        let tried = (1..lags.len()).filter_map(with);
-        let Some((fit, at)) = tried.min_by(|a, b| a.0.cost.total_cmp(&b.0.cost)) else { break };
-        let gain = best.cost - fit.cost;
-        if gain < SURE || fit.coefficients[2..].iter().any(|jump| jump.abs() < LEAST) {
-            break;
-        }
-        (best, places) = (fit, at);
-        least_gain = gain.min(least_gain);
-    }
-    Some(Stepped { fit: best, places, least_gain })
-}
-
-impl StepFit {
-    /// With steps before the lags of these places, by least squares of which far lags have little part.
-    fn of(lags: &[Lag], places: &[usize]) -> Option<Self> {
-        let columns = 2 + places.len();
-        let design = DMatrix::from_fn(lags.len(), columns, |row, column| match column {
-            0 => 1.0,
-            1 => lags[row].time,
-            step => f64::from(u8::from(row >= places[step - 2])),
-        });
-        let values = DVector::from_iterator(lags.len(), lags.iter().map(|lag| lag.value));
-        let mut off: DVector<f64> = DVector::zeros(lags.len());
-        let mut found = None;
-        for _ in 0..ROUNDS {
-            // Cauchy's weights: those of all are equal at first.
-            let ratio = |row: usize| off[row] / lags[row].deviation();
-            let weight = |row: usize| lags[row].deviation().powi(-2) / (1.0 + ratio(row).powi(2) / FAR);
-            let weighted =
-                DMatrix::from_fn(lags.len(), columns, |row, column| design[(row, column)] * weight(row));
-            let inverse = (design.transpose() * &weighted).try_inverse()?;
-            let solution = &inverse * (weighted.transpose() * &values);
-            off = &values - &design * &solution;
-            found = Some((solution, inverse));
-        }
-        let (solution, inverse) = found?;
-        let whitened = |row: usize| off[row] / lags[row].deviation();
-        Some(Self {
-            coefficients: solution.iter().copied().collect(),
-            errors: (0..columns).map(|at| inverse[(at, at)].max(0.0).sqrt()).collect(),
-            cost: (0..lags.len()).map(|row| whitened(row).powi(2).min(FAR * FAR)).sum(),
-            left: 1.48 * median(off.iter().map(|off| off.abs()).collect())?,
-        })
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -21,6 +21,7 @@
 //! | [`unforeseen`] | what a sample's neighbours do not foretell of it |
 //! | [`stream_clock`] | its clock against that of the sensor, roughly |
 //! | `rate_lags` | by how much later than a clock says the stream is, by windows |
+//! | `lag_steps` | a line with steps through these |
 //! | `binned` | means of a vector's samples over short bins |
 //! | [`clock_steadiness`] | where that clock jumps or wanders |
 //! | [`revisits`] | whether attitudes are held more than once, without which repeatability cannot be estimated |
@@ -35,6 +36,7 @@ pub mod clock_steadiness;
 pub mod common_instants;
 pub mod gain;
 pub mod impact;
+mod lag_steps;
 pub mod model;
 pub(super) mod moments;
 pub mod movement;

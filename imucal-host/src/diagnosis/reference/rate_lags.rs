@@ -214,3 +214,52 @@ fn correlation(one: &[Vector3<f64>], other: &[Vector3<f64>]) -> f64 {
     }
     if yy * xx > 0.0 { xy / (yy * xx).sqrt() } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Rotation3;
+
+    use super::*;
+
+    const STEP: f64 = 0.01;
+
+    fn turning(time: f64) -> Vector3<f64> {
+        Vector3::new((1.3 * time).sin(), 0.6 * (2.9 * time + 1.0).cos(), 0.8 * (4.1 * time).sin())
+    }
+
+    /// Of a unit that lies still in its second minute, in another frame than the stream's, which is `late`.
+    fn rates(late: f64) -> Rates {
+        let mount = Rotation3::from_euler_angles(0.4, 0.1, -0.7);
+        let moving = |time: f64| (((time - 90.0).abs() - 30.0) / 5.0).clamp(0.0, 1.0);
+        let times = || (0..18_000).map(|k| STEP * f64::from(k));
+        let rate = |time: f64| turning(time) * moving(time);
+        Rates {
+            real: Binned::new(times().map(|time| (time, mount * rate(time))), STEP),
+            ideal: Binned::new(times().map(|time| (time, rate(time - late))), STEP),
+        }
+    }
+
+    #[test]
+    fn windows_in_motion_show_the_lag_in_whatever_frame_and_rests_show_none() {
+        let clock = StreamClock::even(0.0, 0.0);
+        // By the second clock the frame is known from the rates' sizes alone.
+        for late in [0.0137, -0.35] {
+            let rates = rates(late).aligned(&clock).unwrap();
+            let lags = rates.lags(&clock);
+            assert!(lags.len() >= 40 && lags.len() <= rates.brisk_windows(), "{}", lags.len());
+            for lag in lags {
+                assert!((lag.value - late).abs() < 2e-3, "{late}: {lag:?}");
+                assert!(lag.time < 61.0 || lag.time > 119.0, "{lag:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn rates_of_a_unit_that_never_moves_have_no_frame_and_no_lags() {
+        let clock = StreamClock::even(0.0, 0.0);
+        let still = || Binned::new((0..6000).map(|k| (STEP * f64::from(k), Vector3::zeros())), STEP);
+        let rates = Rates { real: still(), ideal: still() };
+        assert!(rates.aligned(&clock).is_none() && rates.lags(&clock).is_empty());
+        assert_eq!(rates.brisk_windows(), 0);
+    }
+}

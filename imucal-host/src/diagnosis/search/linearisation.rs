@@ -49,7 +49,8 @@ pub struct Linearisation<'s> {
     held: Vec<Dose>,
     normals: Memo<Noise, Normal>,
     products: Memo<White, DesignProducts>,
-    offsets: Memo<White, Option<SharedOffsets>>,
+    /// The same for all problems of a scene.
+    offsets: Arc<Memo<White, Option<SharedOffsets>, 1>>,
     projected: Memo<Noise, Result<(Projected, Vec<usize>), DiagnosisError>>,
 }
 
@@ -129,7 +130,11 @@ impl<'s> Linearisation<'s> {
             None => Design::new(scene, fresh, &signatures, &fit.residual),
         };
         restore(&mut design, fit.doses.iter().filter(|dose| !candidates.has_term(dose.effect)));
-        Ok(Self::of(scene, candidates, scan, fit, design, alone.weighing, shapes))
+        let new = Self::of(scene, candidates, scan, fit, design, alone.weighing, shapes);
+        Ok(match before {
+            Some(before) => new.sharing_offsets(before),
+            None => new,
+        })
     }
 
     fn of(
@@ -154,9 +159,13 @@ impl<'s> Linearisation<'s> {
             held,
             normals: Memo::default(),
             products: Memo::default(),
-            offsets: Memo::default(),
+            offsets: Arc::default(),
             projected: Memo::default(),
         }
+    }
+
+    fn sharing_offsets(self, of: &Linearisation<'_>) -> Self {
+        Self { offsets: Arc::clone(&of.offsets), ..self }
     }
 
     /// An effect's signature is the same about another fit but for the second order: no sensor it reaches has an effect in
@@ -210,7 +219,9 @@ impl<'s> Linearisation<'s> {
         let columns = kept.iter().map(|id| self.design.columns[*id]).chain(changed).collect();
         let design = self.design.extended(&kept, columns, &signatures);
         let weighing = Weighing::new(self.scene, self.weighing.given.clone());
-        Some(Self::of(self.scene, self.candidates, self.scan.clone(), fit, design, weighing, shapes))
+        let reshaped =
+            Self::of(self.scene, self.candidates, self.scan.clone(), fit, design, weighing, shapes);
+        Some(reshaped.sharing_offsets(self))
     }
 
     /// The same problem with terms of the baseline as effects of these values, the last of `candidates` in their order.
@@ -227,6 +238,7 @@ impl<'s> Linearisation<'s> {
         let shapes = self.shapes.iter().cloned().chain(doses.iter().map(neutral)).collect();
         let weighing = Weighing::new(self.scene, self.weighing.given.clone());
         Linearisation::of(self.scene, candidates, self.scan.clone(), fit, design, weighing, shapes)
+            .sharing_offsets(self)
     }
 
     /// The same problem with further effects, the last of `candidates`, whose signatures are given; what is `fitted` so far
@@ -249,7 +261,7 @@ impl<'s> Linearisation<'s> {
         let weighing = Weighing::new(self.scene, self.weighing.given.clone());
         let joined =
             Linearisation::of(self.scene, candidates, self.scan.clone(), fit, design, weighing, shapes);
-        Linearisation { baseline: fitted.to_vec(), ..joined }
+        Linearisation { baseline: fitted.to_vec(), ..joined.sharing_offsets(self) }
     }
 
     /// Parameters at which a candidate's signature was taken.

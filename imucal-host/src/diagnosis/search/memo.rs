@@ -2,19 +2,16 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Answers that are kept.
-const KEPT: usize = 2;
+/// The latest `KEPT` answers by what was asked.
+pub struct Memo<K, V, const KEPT: usize = 2>(Mutex<Vec<(K, Arc<V>)>>);
 
-/// Answers by what was asked.
-pub struct Memo<K, V>(Mutex<Vec<(K, Arc<V>)>>);
-
-impl<K, V> Default for Memo<K, V> {
+impl<K, V, const KEPT: usize> Default for Memo<K, V, KEPT> {
     fn default() -> Self {
         Self(Mutex::default())
     }
 }
 
-impl<K: PartialEq, V> Memo<K, V> {
+impl<K: PartialEq, V, const KEPT: usize> Memo<K, V, KEPT> {
     /// The answer that is kept, or a new one. Of two that ask at once, each may work it out.
     pub fn get(&self, key: K, answer: impl FnOnce() -> V) -> Arc<V> {
         let locked = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -24,6 +21,8 @@ impl<K: PartialEq, V> Memo<K, V> {
         if let Some(value) = known(&locked()) {
             return value;
         }
+        // An old answer makes room before the new one is worked out: some are large.
+        locked().truncate(KEPT - 1);
         let value = Arc::new(answer());
         let mut kept = locked();
         kept.truncate(KEPT - 1);
@@ -38,7 +37,7 @@ mod tests {
 
     #[test]
     fn the_last_two_answers_are_kept_and_an_older_one_is_worked_out_again() {
-        let (latest, mut worked_out) = (Memo::default(), Vec::new());
+        let (latest, mut worked_out) = (Memo::<_, _>::default(), Vec::new());
         for key in [1, 2, 1, 3, 2, 3, 1] {
             let answer = latest.get(key, || {
                 worked_out.push(key);
