@@ -69,6 +69,17 @@ pub enum ApplyError {
         /// The count of the calibration over that of the manifest.
         ratio: f64,
     },
+    /// The recording is what this calibration has made of another one.
+    #[error(
+        "{recording}: {sensor} was corrected by this calibration before, as [calibrated] of the manifest says; take the recording \
+         as the sensor gave it"
+    )]
+    AlreadyCorrected {
+        /// The recording.
+        recording: String,
+        /// Which sensor.
+        sensor: SensorKind,
+    },
     /// Nothing in the recording is calibrated.
     #[error(
         "{recording}: holds none of the sensors that the calibration is for; check that both belong together"
@@ -93,7 +104,8 @@ fn count_ratio(triple: &Triple, triad: &StoredTriad, kind: SensorKind) -> Option
 /// refusal of another serial into a warning.
 ///
 /// # Errors
-/// [`ApplyError`] for another serial, another unit, another full scale, or nothing in common.
+/// [`ApplyError`] for another serial, another unit, another full scale, samples that the calibration has corrected before, or nothing in
+/// common.
 pub fn check(
     recording: &Recording,
     stored: &StoredCalibration,
@@ -125,6 +137,9 @@ pub fn check(
             continue;
         };
         any = true;
+        if recording.manifest.is_calibrated_by(kind, &triad.identity()) {
+            return Err(ApplyError::AlreadyCorrected { recording: recording.name.clone(), sensor: kind });
+        }
         if triple.unit != triad.unit_in {
             return Err(ApplyError::WrongUnit {
                 recording: recording.name.clone(),
@@ -243,6 +258,7 @@ fn corrected_by<E>(
         triple.nominal = nominal;
         triple.single = true;
         set_unit(&mut corrected, kind, stored.unit_out);
+        corrected.manifest.calibrated.of_mut(kind).get_or_insert_default().push(stored.identity());
     }
     Ok(corrected)
 }

@@ -247,6 +247,26 @@ cross_std = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
     }
 
     #[test]
+    fn what_a_calibration_has_corrected_is_not_corrected_by_it_a_second_time() {
+        let mut bench = Bench::new();
+        bench.stream("out.csv").unwrap();
+        fs::rename(bench.path("out.csv"), bench.path("run.csv")).unwrap();
+        fs::rename(bench.path("out.toml"), bench.path("run.toml")).unwrap();
+        let refused = bench.stream("again.csv").unwrap_err().to_string();
+        assert!(refused.contains("acc was corrected by this calibration before"), "{refused}");
+        // What the first one left is corrected by another; both are named.
+        let acc = bench.stored.acc.as_mut().unwrap();
+        let first = acc.identity();
+        (acc.unit_in, acc.gain) = (acc.unit_out, [[1.01, 0.0, 0.0], [0.0, 0.99, 0.0], [0.0, 0.0, 1.0]]);
+        (acc.bias, acc.temperature, acc.nonlinearity) = ([0.01, 0.0, 0.0], None, None);
+        let second = acc.identity();
+        bench.record = bench.stored.to_record(Path::new("cal.toml")).unwrap();
+        bench.stream("again.csv").unwrap();
+        let again = Recording::read(&bench.path("again.csv")).unwrap();
+        assert_eq!(again.manifest.calibrated.acc, Some(vec![first, second]));
+    }
+
+    #[test]
     fn what_is_refused_by_its_first_part_writes_nothing() {
         let mut bench = Bench::new();
         bench.stored.acc.as_mut().unwrap().unit_in = crate::recording::Unit::Gravity;

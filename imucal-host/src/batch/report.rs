@@ -1,5 +1,7 @@
 //! A batch as JSON and in words.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
 
 use super::{
@@ -55,6 +57,20 @@ impl Counts {
     }
 }
 
+/// Names of recordings that hold the same samples, a list for each.
+#[must_use]
+pub fn copies(entries: &[Entry]) -> Vec<Vec<&str>> {
+    let mut by_samples: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for entry in entries {
+        if let Some(input) = &entry.input {
+            by_samples.entry(&input.sha256).or_default().push(&entry.name);
+        }
+    }
+    let mut copies: Vec<Vec<&str>> = by_samples.into_values().filter(|names| names.len() > 1).collect();
+    copies.sort_unstable();
+    copies
+}
+
 /// The whole document.
 #[must_use]
 pub fn json(entries: &[Entry], outliers: &Outliers) -> Value {
@@ -69,6 +85,7 @@ pub fn json(entries: &[Entry], outliers: &Outliers) -> Value {
             "failed": counts.failed,
         },
         "recordings": entries.iter().map(recording).collect::<Vec<_>>(),
+        "copies": copies(entries),
         "populations": outliers.populations,
         "outliers": outliers.outliers,
     })
@@ -110,4 +127,32 @@ fn outlier(outlier: &Outlier) -> String {
         words(*sensor),
         plain(*median)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::batch::entry::Input;
+
+    #[test]
+    fn recordings_of_the_same_samples_are_named_together_whatever_their_manifests() {
+        let entry = |name: &str, sha256: &str| {
+            let mut entry = Entry::for_tests(name, Standing::Calibrated, Vec::new());
+            entry.input =
+                Some(Input { size: 7, sha256: sha256.to_owned(), manifest_sha256: Some(name.to_owned()) });
+            entry
+        };
+        let unread = Entry::for_tests("e", Standing::Unreadable, Vec::new());
+        let entries = [
+            entry("a", "0c"),
+            entry("b", "01"),
+            entry("c", "0c"),
+            entry("d", "02"),
+            unread.clone(),
+            unread,
+            entry("g", "01"),
+        ];
+        assert_eq!(copies(&entries), [["a", "c"], ["b", "g"]]);
+        assert!(copies(&entries[..2]).is_empty());
+    }
 }

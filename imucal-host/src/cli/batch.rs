@@ -19,6 +19,7 @@ use super::{
     overwrite::{Overwrite, Planned},
     progress::Progress,
     reading::Reading,
+    warn,
 };
 use crate::{
     batch::{
@@ -214,6 +215,12 @@ fn finished(
     arguments.html.add_of(&mut pages, &page::title(entries), &[], &Ok, &parts)?;
     for files in [table_file, json_files, pages] {
         files.commit()?;
+    }
+    for names in report::copies(entries) {
+        warn(&format_args!(
+            "{}: the same samples; they are compared with the others as if they were of several units",
+            names.join(", ")
+        ));
     }
     let counts = Counts::of(entries);
     match (&arguments.json, json_file(arguments)) {

@@ -57,6 +57,9 @@ pub struct Manifest {
     /// Nominal conversions of counts.
     #[serde(default, skip_serializing_if = "PerSensor::is_empty")]
     pub counts: PerSensor<Counts>,
+    /// By which calibrations the samples have been corrected, the first one first.
+    #[serde(default, skip_serializing_if = "PerSensor::is_empty")]
+    pub calibrated: PerSensor<Vec<String>>,
     /// Which unit was recorded.
     #[serde(default, skip_serializing_if = "Identity::is_empty")]
     pub sensor: Identity,
@@ -157,6 +160,15 @@ impl<T: Copy> PerSensor<T> {
 }
 
 impl<T> PerSensor<T> {
+    /// What is given for a sensor, to be changed.
+    pub(crate) fn of_mut(&mut self, kind: SensorKind) -> &mut Option<T> {
+        match kind {
+            SensorKind::Acc => &mut self.acc,
+            SensorKind::Gyr => &mut self.gyr,
+            SensorKind::Mag => &mut self.mag,
+        }
+    }
+
     fn is_empty(&self) -> bool {
         self.acc.is_none() && self.gyr.is_none() && self.mag.is_none()
     }
@@ -200,6 +212,7 @@ impl Default for Manifest {
             reference: None,
             ranges: PerSensor::default(),
             counts: PerSensor::default(),
+            calibrated: PerSensor::default(),
             sensor: Identity::default(),
         }
     }
@@ -307,6 +320,17 @@ impl Manifest {
         check::check(self)
     }
 
+    /// A sensor's samples have been corrected by the calibration of this identity.
+    #[must_use]
+    pub fn is_calibrated_by(&self, kind: SensorKind, identity: &str) -> bool {
+        let by = match kind {
+            SensorKind::Acc => &self.calibrated.acc,
+            SensorKind::Gyr => &self.calibrated.gyr,
+            SensorKind::Mag => &self.calibrated.mag,
+        };
+        by.iter().flatten().any(|own| own == identity)
+    }
+
     /// The manifest as TOML text.
     ///
     /// # Errors
@@ -384,6 +408,7 @@ mod tests {
             noise: Some(1e-3),
             name: Some("gazebo".to_owned()),
         });
+        manifest.calibrated.acc = Some(vec!["0badcafe".to_owned(), "01234567".to_owned()]);
         manifest.sensor.serial = Some("00300512".to_owned());
         for manifest in [manifest, Manifest::default()] {
             let text = manifest.to_toml().unwrap();

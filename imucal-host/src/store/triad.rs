@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{StoredCalibration, StoredCurvature, StoredNonlinearity, StoredTemperatureQuality, record_form};
-use crate::recording::Unit;
+use crate::{file::digest::sha256_of, recording::Unit};
 
 /// One sensor's calibration: `calibrated = gain · (raw − bias)` and how good it was.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -62,6 +62,17 @@ impl StoredTriad {
     pub fn triad(&self) -> Triad<f64> {
         let gain = Matrix3::from_fn(|row, column| self.gain[row][column]);
         Triad { gain, bias: Vector3::from(self.bias) }
+    }
+
+    /// What it is known by in the manifests of what it has corrected: the first 16 digits of the SHA-256 of gain, by rows, and bias as
+    /// the device holds them. A file for people and its record have the same.
+    #[must_use]
+    pub fn identity(&self) -> String {
+        let numbers = self.gain.as_flattened().iter().chain(&self.bias);
+        let bytes: Vec<u8> = numbers.flat_map(|number| (*number as f32).to_le_bytes()).collect();
+        let mut digits = sha256_of(&bytes);
+        digits.truncate(16);
+        digits
     }
 
     /// Itself, with the serial and the day of the calibration that it is taken from.

@@ -29,6 +29,9 @@ const PASSES: usize = 4;
 const STEPPED: f64 = 10.0;
 /// Windows that overlap know a jump by so many times less than windows that do not.
 const OVERLAP: f64 = std::f64::consts::SQRT_2;
+/// A jump is known no better than this, s: the rates are taken for straight lines between samples, and how brisk a movement is changes
+/// for longer than a window.
+const BEST: f64 = 3e-5;
 /// A clock whose lags scatter about line and jumps by so many times what they should wanders,
 const WANDERS: f64 = 2.0;
 /// and, where a lag is further from the line through its neighbours than this, s, too fast to be followed.
@@ -190,6 +193,7 @@ fn judged(rates: &Rates, coarse: &StreamClock, lags: &[Lag], is_last: bool) -> R
     let jump = |(at, place): (usize, &usize)| {
         // Where the lags scatter by less than a filter might make them, a jump is known by as much better.
         let (by, error) = (fit.coefficients[2 + at], OVERLAP * ratio.sqrt() * fit.errors[2 + at]);
+        let error = error.hypot(BEST);
         let between = lags[place - 1].time..lags[*place].time;
         let before = fit.coefficients[0] + fit.coefficients[1] * between.start;
         let before = before + fit.coefficients[2..2 + at].iter().sum::<f64>();

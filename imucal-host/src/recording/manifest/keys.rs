@@ -11,13 +11,14 @@ use super::spelling;
 use crate::recording::{read_error::ReadError, warning::Warning};
 
 /// Sections of the contract and their keys.
-const KNOWN: [(&str, &[&str]); 7] = [
+const KNOWN: [(&str, &[&str]); 8] = [
     ("units", &["t", "acc", "gyr", "mag", "temp", "gimbal"]),
     ("site", &["latitude_deg", "height_m", "gravity", "field_ned_ut"]),
     ("rig", &["kind", "axes"]),
     ("reference", &["kind", "noise", "name"]),
     ("ranges", &["acc", "gyr", "mag"]),
     ("counts", &["acc", "gyr", "mag"]),
+    ("calibrated", &["acc", "gyr", "mag"]),
     ("sensor", &["name", "serial"]),
 ];
 
