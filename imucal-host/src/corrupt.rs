@@ -39,6 +39,17 @@ pub enum CorruptError {
         /// The stream.
         recording: String,
     },
+    /// What the unit itself has read.
+    #[error(
+        "{recording}: {sensor} is in counts, which a sensor gives; expected what an ideal sensor would give, in m/s^2, rad/s or uT, as \
+         `imucal apply` makes of this recording"
+    )]
+    Raw {
+        /// The recording.
+        recording: String,
+        /// Which sensor.
+        sensor: SensorKind,
+    },
     /// The calibration cannot be inverted.
     #[error("the calibration of {sensor} has no inverse at {temperature} degC; calibrate again")]
     Singular {
@@ -89,7 +100,7 @@ pub fn corrupt(
     let mut any = false;
     for kind in SensorKind::ALL {
         let (Some(triad), Some(own)) = (stored.triad(kind), record.triad(kind.into())) else { continue };
-        let Some(mut values) = ideal_values(ideal, kind) else { continue };
+        let Some(mut values) = ideal_values(ideal, kind, triad.unit_out)? else { continue };
         any = true;
         if let Some(drawing) = drawing {
             add_noise(&mut values, kind, drawing, interval);
@@ -103,6 +114,7 @@ pub fn corrupt(
             *value = raw.map(|component| nominal.to_si(component));
         }
         set_unit(&mut read.manifest, kind, triad.unit_in, nominal);
+        *read.manifest.calibrated.of_mut(kind) = None;
         let triple = Triple { values, unit: triad.unit_in, nominal, full_scale: None, single: false };
         match kind {
             SensorKind::Acc => read.acc = Some(triple),
@@ -125,9 +137,21 @@ fn temperatures(ideal: &Recording) -> Vec<f64> {
     simulated.or(ideal.temperature.as_ref()).cloned().unwrap_or_else(|| vec![f64::NAN; ideal.rows()])
 }
 
-fn ideal_values(ideal: &Recording, kind: SensorKind) -> Option<Vec<Vector3<f64>>> {
-    let simulated = ideal.simulated.as_ref().and_then(|simulated| simulated.sensor(kind));
-    simulated.map(<[_]>::to_vec).or_else(|| ideal.sensor(kind).map(|triple| triple.values.clone()))
+/// `expected`: the unit of calibrated values.
+fn ideal_values(
+    ideal: &Recording,
+    kind: SensorKind,
+    expected: Unit,
+) -> Result<Option<Vec<Vector3<f64>>>, CorruptError> {
+    if let Some(simulated) = ideal.simulated.as_ref().and_then(|simulated| simulated.sensor(kind)) {
+        return Ok(Some(simulated.to_vec()));
+    }
+    match ideal.sensor(kind) {
+        Some(triple) if triple.unit == Unit::Counts && expected != Unit::Counts => {
+            Err(CorruptError::Raw { recording: ideal.name.clone(), sensor: kind })
+        }
+        sensor => Ok(sensor.map(|triple| triple.values.clone())),
+    }
 }
 
 /// How raw values are written: by their unit, or for counts by the calibration itself.

@@ -46,11 +46,24 @@ fn a_recording_in_another_unit_is_refused() {
     let folder = Folder::with_calibration();
     folder.run(APPLY).with(0);
     // The corrected recording is in m/s², the calibration takes counts.
-    for line in [
+    let lines = [
         "apply out.csv --calibration cal.bin --out twice.csv",
         "apply out.csv --calibration cal.bin --out twice.csv --other-serial",
         "verify out.csv --calibration cal.toml",
-    ] {
+    ];
+    for line in lines {
+        folder.run(line).with(1).telling(&[
+            "refused",
+            "out.csv",
+            "acc was corrected by this calibration before",
+        ]);
+    }
+    let manifest = folder.text("out.toml");
+    let (before, calibrated) = manifest.split_once("[calibrated]").expect("it is written");
+    let after =
+        calibrated.split_once("[sensor]").map_or(String::new(), |(_, sensor)| format!("[sensor]{sensor}"));
+    folder.write("out.toml", format!("{before}{after}"));
+    for line in lines {
         folder.run(line).with(1).telling(&["refused", "out.csv", "acc is in m/s^2", "takes counts"]);
     }
     assert!(!folder.path("twice.csv").exists());

@@ -206,6 +206,13 @@ fn what_is_corrupted_and_applied_is_the_ideal_stream() {
         let near = |(a, b): (&f64, &f64)| (a - b).abs() < 2e-5 * a.abs().max(1.0);
         assert!(one.len() == other.len() && one.iter().zip(other).all(near), "{one:?} {other:?}");
     }
+    assert!(!folder.text("as-read.toml").contains("[calibrated]"));
+    folder.run("corrupt small.csv --calibration cal.bin --out twice.csv").with(1).telling(&[
+        "refused",
+        "small.csv",
+        "acc is in counts",
+        "imucal apply",
+    ]);
     folder.run("corrupt ideal.csv --calibration cal.bin --out as-read.csv").with(2).telling(&["--force"]);
     folder.run("corrupt ideal.csv --calibration cal.bin --out other.csv --seed 3").with(2);
 }
