@@ -6,6 +6,7 @@ use super::{
     covariance::Products,
     fit::{self, Fit},
     process::Kind,
+    upper_bound::upper_bound,
 };
 
 /// Averages up to this share of the recording: of longer ones there are too few.
@@ -252,8 +253,10 @@ impl<'a> Estimator<'a> {
         let inflation = fitted.map_or(1.0, |(_, fit)| inflation(fit));
         let of = |kind: Kind, unit: f64| match fitted {
             Some((first, fit)) => {
-                let size = fit.of(kind).or_else(|| fit::hidden(&self.sums.products, fit, *first, kind));
-                self.coefficient(size, unit, inflation)
+                let error_at =
+                    |size| Some(inflation * fit::error_at(&self.sums.products, fit, *first, kind, size)?);
+                let found = fit.of(kind).map(|(size, error)| (size, inflation * error));
+                self.coefficient(found.or_else(|| Some((0.0, error_at(0.0)?))), unit, &error_at)
             }
             None => Coefficient::NotSeen { why: NotSeen::NoFit, most: None },
         };
@@ -281,9 +284,15 @@ impl<'a> Estimator<'a> {
         }
     }
 
-    /// `size` and its standard error in samples; `unit` takes the squared coefficient to seconds.
-    fn coefficient(&self, size: Option<(f64, f64)>, unit: f64, inflation: f64) -> Coefficient {
-        let (size, error) = size.map_or((0.0, f64::NAN), |(size, error)| (size, error * inflation));
+    /// `size` and its standard error in samples; `unit` takes the squared coefficient to seconds, and `error_at` gives the standard error
+    /// of another size.
+    fn coefficient(
+        &self,
+        size: Option<(f64, f64)>,
+        unit: f64,
+        error_at: &dyn Fn(f64) -> Option<f64>,
+    ) -> Coefficient {
+        let (size, error) = size.unwrap_or((0.0, f64::NAN));
         let freedom = fit::freedom(size, error);
         if freedom >= SEEN {
             let (low, high) = fit::interval(size, freedom);
@@ -296,8 +305,13 @@ impl<'a> Estimator<'a> {
         }
         let ratio = if error.is_finite() { size / error } else { 0.0 };
         let why = NotSeen::Covered { ratio, least: (0.5 * SEEN).sqrt(), duration: self.duration };
-        let most = ((size + 1.96 * error) * unit).sqrt();
-        Coefficient::NotSeen { why, most: Some(most).filter(|most| most.is_finite()) }
+        let most = upper_bound(size, error_at).map(|most| (most * unit).sqrt());
+        Coefficient::NotSeen { why, most: most.filter(|most| most.is_finite()) }
+    }
+
+    /// The same where the standard error does not depend on the size.
+    fn certain(&self, (size, error): (f64, f64), unit: f64) -> Coefficient {
+        self.coefficient(Some((size, error)), unit, &|_| Some(error))
     }
 
     fn deviations(&self, variances: &[f64], fit: Option<&Fit>) -> Vec<Deviation> {
@@ -347,10 +361,10 @@ impl<'a> Estimator<'a> {
             axis.bias_std = axis.correlation_time.clone();
             return;
         }
-        axis.bias_std = self.coefficient(Some(forgetting.size), 1.0, 1.0);
+        axis.bias_std = self.certain(forgetting.size, 1.0);
         if by > BETTER {
             let why = NotSeen::Forgets { time: time(forgetting.time), by };
-            axis.white = self.coefficient(Some(forgetting.white), self.interval, 1.0);
+            axis.white = self.certain(forgetting.white, self.interval);
             axis.bias_instability = unknown(why);
             axis.random_walk = unknown(why);
             axis.misfit.chi_square = forgetting.misfit;

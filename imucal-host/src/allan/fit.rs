@@ -75,19 +75,21 @@ pub fn fit(products: &Products, variances: &[f64], first: usize, among: &[Kind])
     }
 }
 
-/// Size 0 and the standard error of a kind that a fit from the `first` length on does not have.
-pub fn hidden(products: &Products, fit: &Fit, first: usize, kind: Kind) -> Option<(f64, f64)> {
+/// The standard error of a kind in a fit from the `first` length on if its size were this, and that of the others as in `fit`.
+pub fn error_at(products: &Products, fit: &Fit, first: usize, kind: Kind, size: f64) -> Option<f64> {
     let kinds = products.kinds();
     let all = products.design();
     let rows = all.nrows() - first;
     let columns: Vec<usize> =
         (0..kinds.len()).filter(|at| kinds[*at] == kind || fit.of(kinds[*at]).is_some()).collect();
     let design = DMatrix::from_fn(rows, columns.len(), |row, at| all[(first + row, columns[at])]);
-    let covariance = products.covariance(&fit.sizes_of(kinds));
+    let mut sizes = fit.sizes_of(kinds);
+    sizes[kinds.iter().position(|other| *other == kind)?] = size;
+    let covariance = products.covariance(&sizes);
     let factor = covariance.view((first, first), (rows, rows)).into_owned().cholesky()?;
     let (_, covariance) = generalised(&design, &factor, &DVector::zeros(rows))?;
     let own = columns.iter().position(|at| kinds[*at] == kind)?;
-    Some((0.0, covariance[(own, own)].max(0.0).sqrt()))
+    Some(covariance[(own, own)].max(0.0).sqrt())
 }
 
 struct Problem<'a> {

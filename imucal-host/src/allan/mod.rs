@@ -24,6 +24,7 @@ pub mod fit;
 pub mod process;
 pub mod sensor;
 pub mod stillness;
+mod upper_bound;
 
 use self::sensor::{Refusal, Remark, SensorNoise, SensorStream};
 use crate::{
