@@ -151,15 +151,19 @@ impl<T: Copy> PerSensor<T> {
     /// What is given for a sensor.
     #[must_use]
     pub fn of(&self, kind: SensorKind) -> Option<T> {
-        match kind {
-            SensorKind::Acc => self.acc,
-            SensorKind::Gyr => self.gyr,
-            SensorKind::Mag => self.mag,
-        }
+        self.of_ref(kind).copied()
     }
 }
 
 impl<T> PerSensor<T> {
+    fn of_ref(&self, kind: SensorKind) -> Option<&T> {
+        match kind {
+            SensorKind::Acc => self.acc.as_ref(),
+            SensorKind::Gyr => self.gyr.as_ref(),
+            SensorKind::Mag => self.mag.as_ref(),
+        }
+    }
+
     /// What is given for a sensor, to be changed.
     pub(crate) fn of_mut(&mut self, kind: SensorKind) -> &mut Option<T> {
         match kind {
@@ -323,12 +327,7 @@ impl Manifest {
     /// A sensor's samples have been corrected by the calibration of this identity.
     #[must_use]
     pub fn is_calibrated_by(&self, kind: SensorKind, identity: &str) -> bool {
-        let by = match kind {
-            SensorKind::Acc => &self.calibrated.acc,
-            SensorKind::Gyr => &self.calibrated.gyr,
-            SensorKind::Mag => &self.calibrated.mag,
-        };
-        by.iter().flatten().any(|own| own == identity)
+        self.calibrated.of_ref(kind).into_iter().flatten().any(|own| own == identity)
     }
 
     /// The manifest as TOML text.
