@@ -16,10 +16,14 @@
 //! The looks of a pose share its error, so that a pose counts once, by its latest looks, however long it lasts. A unit whose
 //! true error lies within three of its standard errors adds nothing. One that is 5 off adds 2 a pose, less what instability asks for.
 
+use nalgebra::Vector3;
+
 /// Reference value where instability is small, standard deviations.
 pub const REFERENCE: f32 = 3.0;
 /// What a share of instability adds to it.
 const INSTABILITY: f32 = 1.5;
+/// A pose agrees with the record within this share of k.
+const AGREES: f32 = 0.5;
 /// Looks of which s̄ is a mean, at the most.
 pub const BLOCK: u16 = 60;
 /// Looks without which a pose is not judged.
@@ -56,16 +60,37 @@ pub(super) struct RecordChart {
     mean: f32,
     /// z and k of the latest looks, where they are enough.
     latest: Option<(f32, f32)>,
+    /// Direction in which this pose reads the triad.
+    direction: Option<Vector3<f32>>,
+}
+
+/// What a pose has said on the whole.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pose {
+    /// Direction in which it reads the triad.
+    pub(super) direction: Vector3<f32>,
+    /// It agrees with the record.
+    pub(super) agrees: bool,
+    /// A shift as large as this would not have escaped it, were the unit's own error all that is allowed.
+    pub(super) shows: f32,
 }
 
 impl RecordChart {
     /// A pose is taken up; the one before counts.
-    pub(super) fn begin(&mut self, allowance: &Allowance, time: u32) {
+    pub(super) fn begin(&mut self, allowance: &Allowance, direction: Option<Vector3<f32>>, time: u32) {
         self.base = self.sums();
         for (base, since) in self.base.iter().zip(&mut self.since) {
             *since = if *base > 0.0 { *since } else { time };
         }
         (self.allowance, self.count, self.mean, self.latest) = (*allowance, 0, 0.0, None);
+        self.direction = direction;
+    }
+
+    /// What this pose has said, once it was judged.
+    pub(super) fn pose(&self) -> Option<Pose> {
+        let (_, reference) = self.latest?;
+        let shows = (1.0 + AGREES) * reference * libm::sqrtf(self.allowance.variance());
+        Some(Pose { direction: self.direction?, agrees: self.agrees_alone(), shows })
     }
 
     /// The allowance of this pose.
@@ -107,9 +132,14 @@ impl RecordChart {
         (up >= threshold || down >= threshold).then_some((since, self.mean, self.allowance.variance()))
     }
 
-    /// This pose agrees with the record to half of what is allowed, and no pose before it is held against the unit.
+    /// This pose agrees with the record, and no pose before it is held against the unit.
     pub(super) fn agrees(&self) -> bool {
-        self.latest.is_some_and(|(z, reference)| z.abs() < 0.5 * reference) && self.sums() == [0.0; 2]
+        self.agrees_alone() && self.sums() == [0.0; 2]
+    }
+
+    /// This pose agrees, whatever those before it showed.
+    fn agrees_alone(&self) -> bool {
+        self.latest.is_some_and(|(z, reference)| z.abs() < AGREES * reference)
     }
 
     /// What the poses before this one showed is over: it is held against the unit no more.

@@ -22,7 +22,8 @@
 //!
 //! Their thresholds come from a rate of false alarms a day of rest that the caller states ([`run_length`]). A finding says when the sum
 //! last was zero, how far the statistic has moved since, and that it came back, if it did: then something near the device
-//! disturbed it, a magnet for example, and the sensor is what it was.
+//! disturbed it, a magnet for example, and the sensor is what it was. Where it came back unseen, poses in all directions that agree with
+//! the record show it (`poses`), if the shift was larger than what the record allows.
 //!
 //! Everything is plain data of fixed size: it can be stopped after any second, kept, and gone on with. The test `watch`
 //! shows false alarms, delays and sizes on simulated months.
@@ -34,6 +35,7 @@
 pub mod against_record;
 mod codec;
 mod look;
+mod poses;
 mod reference;
 pub mod run_length;
 mod settings;
@@ -93,10 +95,15 @@ impl Statistic {
         }
     }
 
-    /// Its error depends on the direction of gravity in the sensor.
+    /// Direction in which it reads its triad in this pose; `None` where it reads one axis, whatever the pose.
     #[inline]
-    fn is_of_pose(self) -> bool {
-        !matches!(self, Self::RateX | Self::RateY | Self::RateZ)
+    fn direction(self, look: &Look) -> Option<Vector3<f32>> {
+        let value = match self {
+            Self::RateX | Self::RateY | Self::RateZ => None,
+            Self::Field => look.mag.map(|mag| mag.value),
+            Self::Force | Self::Dip => Some(look.acc.value),
+        }?;
+        Some(value / libm::sqrtf(value.dot(&value)))
     }
 }
 
@@ -175,8 +182,7 @@ impl Watch {
             let Some(reading) = reading.filter(Reading::is_usable) else { continue };
             if moved || !chart.is_begun() {
                 let allowance = self.reference.allowance(&self.settings, statistic, look);
-                let turned = turned || !statistic.is_of_pose();
-                chart.begin_rest(&allowance, turned, statistic.is_of_pose(), now.time);
+                heard |= chart.begin_rest(&allowance, turned, statistic.direction(look), now.time);
             }
             heard |= chart.push(&reading, &now, &self.thresholds);
         }

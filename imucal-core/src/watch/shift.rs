@@ -4,6 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Now, Spell,
+    against_record::Pose,
+    poses::Agreement,
     step::{Change, Settled},
 };
 
@@ -64,6 +66,8 @@ pub(super) struct Track {
     origin: Option<(f32, f32)>,
     /// A change has come after the one that opened the shift.
     again: bool,
+    /// Poses since then that agree with the record.
+    agreement: Agreement,
 }
 
 impl Track {
@@ -71,6 +75,20 @@ impl Track {
     pub(super) fn begin_rest(&mut self, time: u32) {
         self.close_if_back(time);
         self.origin = None;
+    }
+
+    /// Takes a pose in that has ended; true where a shift that was found in one rest is over by what it and those before it show.
+    pub(super) fn pose(&mut self, pose: &Pose, time: u32) -> bool {
+        let Some(shift) = self.shift.filter(|shift| shift.compared == Compared::WithItself) else {
+            return false;
+        };
+        if !pose.agrees {
+            self.agreement = Agreement::default();
+        } else if shift.by.abs() >= pose.shows && self.agreement.push(&pose.direction) {
+            self.close(time);
+            return true;
+        }
+        false
     }
 
     /// Takes a change of the step chart in.
@@ -141,7 +159,7 @@ impl Track {
 
     fn open(&mut self, now: &Now, (since, by, error): (u32, f32, f32), compared: Compared) {
         let temperature = Some(now.temperature).filter(|temperature| temperature.is_finite());
-        self.largest = by;
+        (self.largest, self.agreement) = (by, Agreement::default());
         self.shift = Some(Shift { since, found: now.time, by, error, temperature, compared });
     }
 }

@@ -1,5 +1,7 @@
 //! One statistic: its two charts, what they found, and what it is like on the whole.
 
+use nalgebra::Vector3;
+
 use super::{
     Compared, Now, StatisticSummary,
     against_record::{Allowance, RecordChart},
@@ -35,21 +37,35 @@ impl Chart {
         self.is_begun = false;
     }
 
-    /// The device was put down; `turned`: in another pose, as far as this statistic depends on it.
-    pub(super) fn begin_rest(&mut self, allowance: &Allowance, turned: bool, is_of_pose: bool, time: u32) {
+    /// The device was put down; `turned`: in another pose. `direction`: in which the statistic reads the triad there; `None` where it
+    /// does not depend on the pose. True where the poses before show that what was found is over.
+    pub(super) fn begin_rest(
+        &mut self,
+        allowance: &Allowance,
+        turned: bool,
+        direction: Option<Vector3<f32>>,
+        time: u32,
+    ) -> bool {
         self.track.begin_rest(time);
+        let turned = turned || direction.is_none();
         let all = if allowance.is_known { allowance.variance() } else { UNKNOWN };
         if !core::mem::replace(&mut self.is_begun, true) {
             self.step.begin(all);
-            self.record.begin(allowance, time);
-            return;
+            self.record.begin(allowance, direction, time);
+            return false;
         }
         // Two poses differ by the errors of both.
-        let own = if is_of_pose { allowance.common } else { 0.0 };
+        let own = direction.map_or(0.0, |_| allowance.common);
         self.step.loosen(if turned { 2.0 * (allowance.pose + own) } else { allowance.pose }, all);
-        if turned {
-            self.record.begin(allowance, time);
+        if !turned {
+            return false;
         }
+        let is_over = self.record.pose().is_some_and(|pose| self.track.pose(&pose, time));
+        if is_over {
+            self.record.forget_poses();
+        }
+        self.record.begin(allowance, direction, time);
+        is_over
     }
 
     /// Takes a look in; true where something was found, or came back.

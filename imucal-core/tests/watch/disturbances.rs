@@ -2,11 +2,14 @@
 
 use imucal_core::{
     record::Sensor,
-    watch::{Statistic, TriadState},
+    watch::{Statistic, TriadState, Watch},
 };
 use nalgebra::Vector3;
 
-use crate::{first_shift, rest, settled, unit::GRADES};
+use crate::{
+    first_shift, quantile, rest, settled,
+    unit::{GRADES, Unit},
+};
 
 const SEEDS: u64 = 40;
 
@@ -53,6 +56,55 @@ fn a_magnet_that_stays_is_said_to_have_moved_the_magnetometer_alone() {
         assert_eq!(summary.state(Sensor::Accelerometer), TriadState::Quiet);
         assert_eq!(summary.state(Sensor::Gyroscope), TriadState::Quiet);
     }
+}
+
+/// Puts a unit whose shift is `carried` down in so many attitudes one after another.
+fn carry_about(unit: &mut Unit, watch: &mut Watch, poses: u32, carried: Vector3<f32>) {
+    unit.shift[2] = carried;
+    for _ in 0..poses {
+        unit.turn(0.0);
+        rest(unit, watch, 20);
+    }
+}
+
+#[test]
+fn a_magnet_that_goes_while_the_unit_is_carried_is_over_once_the_poses_after_it_show_it() {
+    let (mut seen, mut over, mut kept, mut poses) = (0_u32, 0_u32, 0, Vec::new());
+    for seed in 0..SEEDS {
+        let (mut unit, mut watch) = settled(GRADES[0], 160 + seed);
+        let magnet = Vector3::new(15.0, -10.0, 20.0);
+        unit.shift[2] = magnet;
+        rest(&mut unit, &mut watch, 60);
+        if watch.summary().state(Sensor::Magnetometer) != TriadState::Moved {
+            // Across the field and the vertical: neither length nor dip shows it.
+            continue;
+        }
+        seen += 1;
+        // Where it stays on the unit, the poses excuse nothing.
+        let (mut marked, mut watched) = (unit.clone(), watch.clone());
+        carry_about(&mut marked, &mut watched, 30, magnet);
+        kept += u32::from(watched.summary().state(Sensor::Magnetometer) == TriadState::Moved);
+
+        let went = unit.time;
+        let taken = (1..=30).find(|_| {
+            carry_about(&mut unit, &mut watch, 1, Vector3::zeros());
+            watch.summary().state(Sensor::Magnetometer) == TriadState::Quiet
+        });
+        let Some(taken) = taken else { continue };
+        (over, _) = (over + 1, poses.push(taken));
+        let summary = watch.summary();
+        let ends = [Statistic::Field, Statistic::Dip].map(|statistic| summary.statistic(statistic).spell);
+        assert!(ends.into_iter().flatten().all(|spell| spell.to >= went), "{went} {ends:?}");
+    }
+    poses.sort_unstable();
+    let (half, most) = (quantile(&poses, 0.5), poses.last().unwrap());
+    println!(
+        "\na magnet that goes while the unit is carried: over in {over} of {seen} units, half after {half} poses, \
+         all after {most}\na magnet that stays on the unit: over in {} of {seen} after 30 poses",
+        seen - kept
+    );
+    assert!(u64::from(seen) * 4 >= SEEDS * 3, "{seen}");
+    assert!(over * 20 >= seen * 19 && kept == seen, "{seen} {over} {kept}");
 }
 
 #[test]

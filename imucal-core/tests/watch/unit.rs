@@ -109,6 +109,7 @@ const EARTH: f32 = 7.292e-5;
 const LATITUDE: f32 = 0.91;
 
 /// One unit.
+#[derive(Clone)]
 pub struct Unit {
     pub grade: Grade,
     pub settings: WatchSettings,
