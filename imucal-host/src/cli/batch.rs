@@ -15,6 +15,7 @@ use super::{
     columns::Columns,
     fitting::Fitting,
     html::Html,
+    json::Json,
     output,
     overwrite::{Overwrite, Planned},
     progress::Progress,
@@ -61,9 +62,8 @@ pub(super) struct Arguments {
     /// Write a row for each recording and sensor: FILE.csv or FILE.parquet
     #[arg(long, value_name = "FILE", value_parser = summary_file)]
     summary: Option<PathBuf>,
-    /// Write everything as JSON; `-` prints it instead of the text
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: Json,
     #[command(flatten)]
     html: Html,
     #[command(flatten)]
@@ -121,17 +121,13 @@ fn planned(arguments: &Arguments, inputs: &[PathBuf]) -> anyhow::Result<[OutputS
     };
     let summary = arguments.summary.as_deref();
     let own = summary.is_some_and(|path| SummaryFormat::of(path).is_ok_and(|format| format.is_summary(path)));
-    let json = json_file(arguments);
+    let json = arguments.json.path();
     let html = arguments.html.path();
     Ok([
         plan(summary, own)?,
         plan(json, json.is_some_and(is_report))?,
         plan(html, html.is_some_and(is_page))?,
     ])
-}
-
-fn json_file(arguments: &Arguments) -> Option<&Path> {
-    arguments.json.as_deref().filter(|path| path.as_os_str() != "-")
 }
 
 /// A file that an earlier batch has written as JSON.
@@ -208,7 +204,7 @@ fn finished(
     if let Some(path) = &arguments.summary {
         table_file.add(path, &summary_bytes(path, entries, &found)?)?;
     }
-    if let Some(path) = json_file(arguments) {
+    if let Some(path) = arguments.json.path() {
         json_files.add(path, json.as_bytes())?;
     }
     let parts = || vec![page::batch(entries, &found)];
@@ -223,9 +219,9 @@ fn finished(
         ));
     }
     let counts = Counts::of(entries);
-    match (&arguments.json, json_file(arguments)) {
-        (Some(_), None) => output::text(&json)?,
-        _ => output::text(&(report::text(&found) + &counts.line()))?,
+    match arguments.json.on_screen() {
+        true => output::document(&json)?,
+        false => output::text(&(report::text(&found) + &counts.line()))?,
     }
     Ok(match entries.iter().map(|entry| entry.standing.exit_status()).max() {
         Some(0) | None => Ending::Done,

@@ -9,6 +9,7 @@ use super::{
     columns::{self, Columns},
     fitting::Fitting,
     html::Html,
+    json::Json,
     output,
     overwrite::{Overwrite, Planned, files_of},
     progress::Progress,
@@ -42,9 +43,8 @@ pub(super) struct Arguments {
     /// Write the record for the device
     #[arg(long, value_name = "CAL.bin")]
     record: Option<PathBuf>,
-    /// Write everything as JSON; `-` prints it instead of the table
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: Json,
     #[command(flatten)]
     html: Html,
     /// Fit every model, score each on data left out of its fit, and recommend one
@@ -74,22 +74,21 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
 
 /// The files asked for.
 fn outputs(arguments: &Arguments) -> Vec<Planned> {
-    [(&arguments.out, Form::Toml), (&arguments.record, Form::Record), (&json_file(arguments), Form::Json)]
-        .into_iter()
-        .filter_map(|(path, form)| Some(Planned::calibration(path.as_ref()?, form)))
-        .chain(arguments.html.planned())
-        .collect()
-}
-
-/// The JSON's file; `--json -` is none.
-fn json_file(arguments: &Arguments) -> Option<PathBuf> {
-    arguments.json.clone().filter(|path| path.as_os_str() != "-")
+    [
+        (arguments.out.as_deref(), Form::Toml),
+        (arguments.record.as_deref(), Form::Record),
+        (arguments.json.path(), Form::Json),
+    ]
+    .into_iter()
+    .filter_map(|(path, form)| Some(Planned::calibration(path?, form)))
+    .chain(arguments.html.planned())
+    .collect()
 }
 
 fn print(arguments: &Arguments, calibration: &Calibration, json: &str) -> anyhow::Result<()> {
-    match (&arguments.json, json_file(arguments)) {
-        (Some(_), None) => output::document(json),
-        _ => output::text(&report::table::table(calibration)),
+    match arguments.json.on_screen() {
+        true => output::document(json),
+        false => output::text(&report::table::table(calibration)),
     }
 }
 
@@ -104,8 +103,8 @@ fn write(
     let of = if request.accept_suspect { StoredCalibration::with_suspects } else { StoredCalibration::of };
     let stored = of(calibration, today());
     let nothing = SensorKind::ALL.into_iter().all(|kind| stored.triad(kind).is_none());
-    if let Some(path) = json_file(arguments) {
-        files.add(&path, json.as_bytes())?;
+    if let Some(path) = arguments.json.path() {
+        files.add(path, json.as_bytes())?;
     }
     let parts = || vec![page::calibration::calibration(calibration, recording)];
     arguments.html.add(&mut files, recording, &parts)?;

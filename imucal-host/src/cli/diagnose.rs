@@ -9,6 +9,7 @@ use super::{
     Ending,
     columns::{self, Columns},
     html::Html,
+    json::Json,
     load, output,
     overwrite::{Overwrite, Planned, files_of},
     own_effects,
@@ -60,9 +61,8 @@ pub(super) struct Arguments {
     /// Write the formulas that are proposed where no effect explains the gap, as a file for --effects
     #[arg(long, value_name = "FILE", conflicts_with = "frozen")]
     proposals: Option<PathBuf>,
-    /// Write everything as JSON; `-` prints it instead of the report
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: Json,
     #[command(flatten)]
     html: Html,
     /// List every effect: what it is, its usual size, what a recording needs to show it, what it may be mistaken for
@@ -84,13 +84,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         return Ok(Ending::Done);
     };
     let frozen = frozen(arguments, &own)?;
-    let written = arguments.json.iter().filter(|path| path.as_os_str() != "-").chain(&arguments.proposals);
     let mut inputs = files_of(path);
     inputs.extend(arguments.model.clone());
     inputs.extend(arguments.sim.iter().flat_map(|path| files_of(path)));
     inputs.extend(arguments.effects.clone());
     inputs.extend(arguments.watch.clone());
-    let written: Vec<Planned> = written.map(Planned::new).chain(arguments.html.planned()).collect();
+    let proposals = arguments.proposals.iter().map(Planned::new);
+    let written: Vec<Planned> =
+        arguments.json.planned().into_iter().chain(proposals).chain(arguments.html.planned()).collect();
     let mut files = arguments.overwrite.plan(&inputs, &written)?;
     let recording = columns::read(path, &arguments.columns, arguments.reading)?;
     let model = arguments.model.as_deref().map(|path| load(path, arguments.reading)).transpose()?;
@@ -147,17 +148,12 @@ fn print(arguments: &Arguments, diagnosis: &Diagnosis, mut files: OutputSet) -> 
     if let Some(path) = arguments.proposals.as_ref().filter(|_| !proposed.is_empty()) {
         files.add(path, proposed.as_bytes())?;
     }
-    let mut printed = None;
-    if let Some(path) = &arguments.json {
-        let text = diagnosis.text();
-        match path.as_os_str() == "-" {
-            true => printed = Some(text),
-            false => files.add(path, text.as_bytes())?,
-        }
+    if let Some(path) = arguments.json.path() {
+        files.add(path, diagnosis.text().as_bytes())?;
     }
     files.commit()?;
-    match printed {
-        Some(json) => output::document(&json),
-        None => output::text(&report::diagnosis::page(diagnosis)),
+    match arguments.json.on_screen() {
+        true => output::document(&diagnosis.text()),
+        false => output::text(&report::diagnosis::page(diagnosis)),
     }
 }

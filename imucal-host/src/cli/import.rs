@@ -27,7 +27,7 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Layout {
     /// One CSV, Parquet or MAT-file, with its columns by --map, --unit and --time; fields of text separated by commas,
-    /// semicolons, tabs or blanks
+    /// semicolons, tabs, bars or blanks
     Csv,
     /// An MCAP file or a bag, its topics by --topic
     Log,

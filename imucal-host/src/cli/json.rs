@@ -12,7 +12,7 @@ use crate::file::OutputSet;
 /// Where a command writes its JSON.
 #[derive(Args, Clone, Debug, Default)]
 pub(super) struct Json {
-    /// Write the result as JSON; `-` prints it instead of the text
+    /// Write everything as JSON; `-` prints it instead of the text
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -23,7 +23,8 @@ impl Json {
         self.json.as_ref().is_some_and(|path| path.as_os_str() == "-")
     }
 
-    fn path(&self) -> Option<&Path> {
+    /// Its file, where there is one.
+    pub(super) fn path(&self) -> Option<&Path> {
         self.json.as_deref().filter(|_| !self.on_screen())
     }
 

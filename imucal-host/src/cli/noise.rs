@@ -8,6 +8,7 @@ use super::{
     Ending,
     columns::{self, Columns},
     html::Html,
+    json::Json,
     output::{self, say},
     overwrite::{Overwrite, Planned, files_of},
     progress::Progress,
@@ -26,9 +27,8 @@ use crate::{
 pub(super) struct Arguments {
     /// A recording of the untouched unit: an hour or more for the bias instability
     recording: PathBuf,
-    /// Write everything as JSON; `-` prints it
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: Json,
     #[command(flatten)]
     html: Html,
     /// Print the settings of another program in place of the tables
@@ -54,10 +54,10 @@ enum To {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let on_screen = arguments.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
+    let on_screen = arguments.json.on_screen();
     anyhow::ensure!(!(on_screen && arguments.to.is_some()), "--json -: found --to too, expected one of them");
-    let json = arguments.json.iter().filter(|_| !on_screen).map(Planned::new);
-    let outputs: Vec<Planned> = json.chain(arguments.html.planned()).collect();
+    let outputs: Vec<Planned> =
+        arguments.json.planned().into_iter().chain(arguments.html.planned()).collect();
     let mut files = arguments.overwrite.plan(&files_of(&arguments.recording), &outputs)?;
     let mapping = arguments.columns.mapping()?;
     let progress = Progress::reading(&arguments.recording);
@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let warnings = noise.messages();
     warnings.iter().for_each(|warning| warn(warning));
     let file = NoiseFile::new(&noise, warnings);
-    if let Some(path) = arguments.json.as_ref().filter(|_| !on_screen) {
+    if let Some(path) = arguments.json.path() {
         files.add(path, file.text().as_bytes())?;
     }
     let page = || page::of_noise(&file, &arguments.recording, today());

@@ -4,6 +4,7 @@ pub mod check;
 pub mod fault;
 pub mod gravity;
 mod keys;
+mod per_sensor;
 mod reference;
 mod rig;
 pub(crate) mod site;
@@ -19,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 pub use self::{
     fault::FORMAT,
+    per_sensor::PerSensor,
     reference::{ReferenceInfo, ReferenceKind},
     rig::{Axis, Rig, RigKind},
     site::Site,
@@ -120,61 +122,6 @@ impl Units {
             SensorKind::Gyr => self.gyr,
             SensorKind::Mag => self.mag,
         }
-    }
-}
-
-/// Something of each sensor.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PerSensor<T> {
-    /// Of the accelerometer.
-    #[serde(default = "none", skip_serializing_if = "Option::is_none")]
-    pub acc: Option<T>,
-    /// Of the gyroscope.
-    #[serde(default = "none", skip_serializing_if = "Option::is_none")]
-    pub gyr: Option<T>,
-    /// Of the magnetometer.
-    #[serde(default = "none", skip_serializing_if = "Option::is_none")]
-    pub mag: Option<T>,
-}
-
-fn none<T>() -> Option<T> {
-    None
-}
-
-impl<T> Default for PerSensor<T> {
-    fn default() -> Self {
-        Self { acc: None, gyr: None, mag: None }
-    }
-}
-
-impl<T: Copy> PerSensor<T> {
-    /// What is given for a sensor.
-    #[must_use]
-    pub fn of(&self, kind: SensorKind) -> Option<T> {
-        self.of_ref(kind).copied()
-    }
-}
-
-impl<T> PerSensor<T> {
-    fn of_ref(&self, kind: SensorKind) -> Option<&T> {
-        match kind {
-            SensorKind::Acc => self.acc.as_ref(),
-            SensorKind::Gyr => self.gyr.as_ref(),
-            SensorKind::Mag => self.mag.as_ref(),
-        }
-    }
-
-    /// What is given for a sensor, to be changed.
-    pub(crate) fn of_mut(&mut self, kind: SensorKind) -> &mut Option<T> {
-        match kind {
-            SensorKind::Acc => &mut self.acc,
-            SensorKind::Gyr => &mut self.gyr,
-            SensorKind::Mag => &mut self.mag,
-        }
-    }
-
-    fn is_empty(&self) -> bool {
-        self.acc.is_none() && self.gyr.is_none() && self.mag.is_none()
     }
 }
 

@@ -343,11 +343,12 @@ mod tests {
     }
 
     #[test]
-    fn semicolons_and_tabs_separate_and_a_comma_is_the_decimal_point_of_such_a_file() {
+    fn semicolons_tabs_and_bars_separate_and_a_comma_is_the_decimal_point_of_such_a_file() {
         let mapping = mapping(&["acc=ax,ay,az"], &["acc=m/s^2"], Some("Time [s]")).expect("a mapping");
         for text in [
             "Time [s];ax;ay;az\n0,5;0;-1,25;9,5\n0,51;0;1;9\n",
             "Time [s]\tax\tay\taz\n0.5\t0\t-1.25\t9.5\n0.51\t0\t1\t9\n",
+            "Time [s] | ax | ay | az\n0.5 | 0 | -1,25 | 9.5\n0.51 | 0 | 1 | 9\n",
         ] {
             let recording = read(text, &mapping).expect("it reads");
             assert_eq!(recording.time, [0.5, 0.51]);

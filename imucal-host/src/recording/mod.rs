@@ -169,7 +169,7 @@ impl Recording {
     }
 
     /// As [`Recording::read_within`], of a file whose columns have other names, or of some topics of a log. Then it needs no
-    /// manifest, and its fields may be separated by semicolons, tabs or blanks.
+    /// manifest, and its fields may be separated by semicolons, tabs, bars or blanks.
     ///
     /// # Errors
     ///

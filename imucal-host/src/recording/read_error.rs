@@ -266,7 +266,7 @@ impl ReadError {
 fn remedy(ending: &str) -> &'static str {
     match ending {
         ".txt" | ".tsv" | ".tab" | ".dat" | ".log" | ".asc" => {
-            "if it is text whose fields are separated by commas, semicolons, tabs or single blanks, let its name end in .csv"
+            "if it is text whose fields are separated by commas, semicolons, tabs, bars or single blanks, let its name end in .csv"
         }
         ".xls" | ".xlsx" | ".ods" => "save its sheet as CSV",
         ".npy" | ".npz" | ".h5" | ".hdf5" | ".pkl" => {

@@ -85,12 +85,12 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Takes semicolons, tabs or blanks for what separates fields, where the first line has no comma; before the first row.
+    /// Takes semicolons, tabs, bars or blanks for what separates fields, where the first line has no comma; before the first row.
     pub(crate) fn find_separator(&mut self) -> Result<(), ReadError> {
         self.skip_blank_lines()?;
         let input = self.text.next()?;
         let line = input.split(|byte| *byte == b'\n').next().unwrap_or_default();
-        let found = [b',', b';', b'\t', b' '].into_iter().find(|separator| line.contains(separator));
+        let found = [b',', b';', b'\t', b'|', b' '].into_iter().find(|separator| line.contains(separator));
         self.separator = found.unwrap_or(b',');
         self.reader = ReaderBuilder::new().delimiter(self.separator).build();
         Ok(())
@@ -262,7 +262,7 @@ impl Numbers<'_> {
 
 /// Whether a line that begins as a comment is the header of the next: samples follow it, or as many fields.
 fn is_header(line: &[u8], next: &[u8]) -> bool {
-    let separates = |byte: &u8| matches!(byte, b',' | b';' | b'\t');
+    let separates = |byte: &u8| matches!(byte, b',' | b';' | b'\t' | b'|');
     let is_value = |field: &[u8]| {
         number::parse(field).is_ok_and(|value| !value.is_nan()) || date::parse(field).is_some()
     };
