@@ -97,6 +97,8 @@ pub enum Quantity {
     Axes,
     /// Slope of the nonlinear terms over the range that they were found in.
     Slope,
+    /// Part of the measured field across a rig's outer axis, as a multiple of the most that the known field has in any heading.
+    Heading,
 }
 
 impl Refusal {
@@ -173,6 +175,10 @@ impl fmt::Display for Refusal {
             Self::Implausible { what: Quantity::Slope, value, limit } => {
                 write!(f, "the nonlinear terms reach a slope of {value:.3}, the limit is {limit}")
             }
+            Self::Implausible { what: Quantity::Heading, value, .. } => write!(
+                f,
+                "no heading of the base gives the known field: across the outer axis it would have to be {value:.3} times as large"
+            ),
             Self::NotFinite => write!(f, "a figure is infinite or NaN"),
         }
     }

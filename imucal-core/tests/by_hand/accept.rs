@@ -312,6 +312,7 @@ fn every_refusal_has_its_name_and_says_its_figures() {
         (implausible(Quantity::AxisRatio), "implausible", &["0.43", "2.5"]),
         (implausible(Quantity::Residual), "implausible", &["43.2 %", "250.0 %"]),
         (implausible(Quantity::Slope), "implausible", &["0.432", "2.5"]),
+        (implausible(Quantity::Heading), "implausible", &["0.432 times"]),
         (Refusal::NotFinite, "not-finite", &["NaN"]),
     ];
     for (refusal, reason, figures) in said {

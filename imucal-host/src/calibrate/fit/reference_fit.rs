@@ -105,7 +105,7 @@ pub fn fit<const P: usize>(
 ) -> ReferenceFit {
     let found = leaving_out_few(tracked.poses.len(), ROUNDS, |used, _| {
         let poses: Vec<_> = used.iter().map(|k| tracked.poses[*k]).collect();
-        let Solved { model, solver, gauge } = solve(&poses, (), base, terms, None);
+        let Solved { model, solver, gauge, .. } = solve(&poses, (), base, terms, None);
         let distances = distances(&model, solver.theta());
         ((model.base, model.held, solver, gauge), distances)
     });
@@ -113,7 +113,7 @@ pub fn fit<const P: usize>(
     let kept: Vec<_> = used.iter().map(|k| tracked.poses[*k]).collect();
     let by_lag: Vec<_> = used.iter().filter_map(|k| tracked.by_lag.get(*k).copied()).collect();
     let model = UnifiedModel { poses: &kept, axes: (), base, terms, held };
-    let fit = summarise(&Solved { model, solver, gauge }, &by_lag);
+    let fit = summarise(&Solved { model, solver, gauge, heading: None }, &by_lag);
     ReferenceFit { fit, kept, used, left_out }
 }
 

@@ -8,7 +8,7 @@ use imucal_core::{
     solver::{LevenbergMarquardt, gauge::Gauge},
     triad::Triad,
 };
-use nalgebra::{DMatrix, DVector, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Rotation3, SVector, Vector3};
 
 use super::{
     compare::Step,
@@ -36,10 +36,21 @@ pub struct RigFit {
     pub entries: Vec<u8>,
     /// Those of them that the poses cannot determine, with the entry each is like.
     pub held: Vec<(u8, Option<u8>)>,
+    /// The heading of the base against the known field, where it was looked for.
+    pub heading: Option<Heading>,
     /// Its figures: three residuals a pose, held out three at a time.
     pub report: FitReport,
     /// Covariance of the estimated entries, for noise that may drift from pose to pose; zero where held.
     pub covariance: DMatrix<f64>,
+}
+
+/// A heading of the base that turns the known field into the measured one, as far as this is determined.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Heading {
+    /// Of the field about the vertical, rad; the base's is the opposite.
+    Found(f64),
+    /// None does: across the outer axis the field would have to be so many times as large.
+    None(f64),
 }
 
 /// Where a fit ended, and what the poses determine of it.
@@ -50,6 +61,8 @@ pub(crate) struct Solved<'a, const P: usize, G: Pose<f64>> {
     pub solver: LevenbergMarquardt<f64, P>,
     /// What the poses do not determine.
     pub gauge: Gauge<f64, P>,
+    /// The heading of the base, where it was looked for.
+    pub heading: Option<Heading>,
 }
 
 /// Fits `terms` from `base`.
@@ -80,14 +93,15 @@ pub(crate) fn solve<'a, const P: usize, G: Pose<f64>>(
         solver = least_squares::solve(&model, start);
     }
     let found = terms.parameters(base, solver.theta());
-    let Some(field) = of_known_length(outer, base, &found, &terms, &gauge) else {
-        return Solved { model, solver, gauge };
+    let (field, heading) = of_known_length(outer, base, &found, &terms, &gauge);
+    let Some(field) = field.filter(|field| field.iter().all(|x| x.is_finite())) else {
+        return Solved { model, solver, gauge, heading };
     };
     // Held again where the field has its length: K and sources are then those of the field that is known.
     let model = UnifiedModel { base: UnifiedParameters { vector_n: field, ..*base }, ..model };
     let start = terms.theta(&UnifiedParameters { vector_n: field, ..found });
     let solver = least_squares::solve(&model, start);
-    Solved { model, solver, gauge }
+    Solved { model, solver, gauge, heading }
 }
 
 /// The field that is known, where what was found of it allows; `None` where nothing of it is held.
@@ -102,31 +116,41 @@ fn of_known_length<const P: usize>(
     found: &UnifiedParameters<f64>,
     terms: &Terms<P>,
     gauge: &Gauge<f64, P>,
-) -> Option<Vector3<f64>> {
+) -> (Option<Vector3<f64>>, Option<Heading>) {
     let of_field = |k: &usize| gauge.is_held(*k) && (14..17).contains(&terms.entries()[*k]);
     let (known, now) = (base.vector_n, found.vector_n);
-    let field = match (0..P).filter(of_field).count() {
-        1 => now * (known.norm() / now.norm()),
-        2 => headed(&known, &outer?.cross(&now))?,
-        _ => return None,
-    };
-    field.iter().all(|x| x.is_finite()).then_some(field)
+    match ((0..P).filter(of_field).count(), outer) {
+        (1, _) => (Some(now * (known.norm() / now.norm())), None),
+        (2, Some(outer)) => {
+            let heading = heading(&known, &outer.cross(&now));
+            let turned = match heading {
+                Heading::Found(angle) => Some(Rotation3::from_axis_angle(&Vector3::z_axis(), angle) * known),
+                Heading::None(_) => None,
+            };
+            (turned, Some(heading))
+        }
+        _ => (None, None),
+    }
 }
 
-/// `known` turned about the vertical until it is across `normal`, by Newton from no turn; `None` where no turn below
-/// some 30° does it.
-fn headed(known: &Vector3<f64>, normal: &Vector3<f64>) -> Option<Vector3<f64>> {
-    let (mut heading, mut field) = (0.0f64, *known);
-    for _ in 0..20 {
-        let slope = normal.dot(&Vector3::new(-field.y, field.x, 0.0));
-        heading -= normal.dot(&field) / slope;
-        if heading.is_nan() || heading.abs() > 0.5 {
-            return None;
-        }
-        let (sin, cos) = heading.sin_cos();
-        field = Vector3::new(cos * known.x - sin * known.y, sin * known.x + cos * known.y, known.z);
+/// The smaller of the two turns about the vertical that bring `known` across `normal`:
+///
+/// ```text
+/// n · R_z(ψ) m = a cos ψ + b sin ψ + n_z m_z = 0,   a = n_x m_x + n_y m_y,   b = n_y m_x − n_x m_y
+/// ```
+///
+/// The other one has the field's part along the outer axis reversed, which a source on the outer gimbal hides.
+fn heading(known: &Vector3<f64>, normal: &Vector3<f64>) -> Heading {
+    let a = normal.xy().dot(&known.xy());
+    let b = normal.y * known.x - normal.x * known.y;
+    let share = -normal.z * known.z / a.hypot(b);
+    if share.is_nan() || share.abs() > 1.0 {
+        return Heading::None(share.abs());
     }
-    Some(field)
+    let (middle, half) = (b.atan2(a), share.acos());
+    let wrapped = |angle: f64| angle.sin().atan2(angle.cos());
+    let [one, other] = [middle - half, middle + half].map(wrapped);
+    Heading::Found(if one.abs() < other.abs() { one } else { other })
 }
 
 impl<const P: usize, G: Pose<f64>> Solved<'_, P, G> {
@@ -138,7 +162,7 @@ impl<const P: usize, G: Pose<f64>> Solved<'_, P, G> {
 
     /// The fit, with these standard errors (zero where held) and these figures.
     pub fn fit(&self, mut covariance: DMatrix<f64>, report: FitReport) -> RigFit {
-        let Self { model, solver, gauge } = self;
+        let Self { model, solver, gauge, heading } = self;
         let entries = model.terms.entries();
         let held: Vec<usize> = (0..P).filter(|k| gauge.is_held(*k)).collect();
         for k in &held {
@@ -150,6 +174,7 @@ impl<const P: usize, G: Pose<f64>> Solved<'_, P, G> {
             parameters: model.terms.parameters(&model.base, solver.theta()),
             entries: entries.to_vec(),
             held: held.iter().map(like).collect(),
+            heading: *heading,
             report,
             covariance,
         }
@@ -157,7 +182,7 @@ impl<const P: usize, G: Pose<f64>> Solved<'_, P, G> {
 }
 
 fn summarise<const P: usize>(poses: &Poses, solved: &Solved<'_, P, GimbalPose<f64>>) -> RigFit {
-    let Solved { model, solver, gauge } = solved;
+    let Solved { model, solver, gauge, .. } = solved;
     let held: Vec<usize> = (0..P).filter(|k| gauge.is_held(*k)).collect();
     let rows = Rows::of(model, solver.theta());
     let covariance =
@@ -255,4 +280,28 @@ impl RigFit {
 /// A gain's derivative by rows, and nothing of the bias.
 fn pad(by: &nalgebra::Matrix3<f64>) -> DVector<f64> {
     DVector::from_iterator(12, by.transpose().iter().copied().chain([0.0; 3]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_heading_of_a_base_is_found_by_what_its_outer_axis_does_not_hide() {
+        let known = Vector3::new(25.0, 2.0, 40.0);
+        for degrees in [-60.0f64, -29.0, 0.0, 0.3, 28.0, 45.0, 70.0] {
+            let turned = Rotation3::from_axis_angle(&Vector3::z_axis(), degrees.to_radians()) * known;
+            for hidden in [-30.0, 0.0, 12.0] {
+                let measured = turned + Vector3::x() * hidden;
+                let found = heading(&known, &Vector3::x().cross(&measured));
+                assert!(
+                    matches!(found, Heading::Found(angle) if (angle.to_degrees() - degrees).abs() < 1e-9),
+                    "{degrees} {found:?}"
+                );
+            }
+        }
+        // 25 µT cannot have a part of 50 µT across the axis.
+        let found = heading(&known, &Vector3::x().cross(&Vector3::new(0.0, 50.0, 40.0)));
+        assert!(matches!(found, Heading::None(share) if (share - 2.0).abs() < 0.01), "{found:?}");
+    }
 }

@@ -1,7 +1,7 @@
 //! A triad on a rig: a rung of its ladder made a calibration, with what belongs to the machine kept apart.
 
 use imucal_core::{
-    accept::{self, Limits, Refusal},
+    accept::{self, Limits, Quantity, Refusal},
     coverage::Coverage,
     model::unified::UnifiedParameters,
     triad::Triad,
@@ -12,7 +12,10 @@ use super::{ladder, ladder::Rung};
 use crate::{
     calibrate::{
         Options,
-        fit::{compare, rig_fit::RigFit},
+        fit::{
+            compare,
+            rig_fit::{Heading, RigFit},
+        },
         nonlinear_terms::NonlinearFinding,
         outcome::{
             Calibration, Estimates, Evidence, FitSummary, Refused, RigFindings, SensorOutcome, entry_name,
@@ -28,6 +31,8 @@ const LEAST_POSES: usize = 6;
 
 /// A tilt with a larger standard error is not determined, rad: a spirit level knows it to 0.2°.
 const LEVELLED: f64 = 3.5e-3;
+/// A heading of the base that is said, rad.
+const TURNED: f64 = 0.1;
 /// A tilt is one from so many standard errors on.
 const SIGNIFICANT_TILT: f64 = 4.0;
 
@@ -177,10 +182,34 @@ pub fn magnetometer(
              [site] field is off; use mag={better}, or point the base"
         ));
     }
-    if let Some((_, std)) = tilt(calibration) {
-        allow_for_tilt(&mut rung, &poses, &base, std);
+    if tilt(calibration).is_none() && is_of_tilt(&rung) {
+        calibration.warnings.push(format!(
+            "mag: nothing shows the base's tilt, which {name} takes into gains and hard iron of the gimbals; the errors allow for {:.1}° \
+             of it. Record the accelerometer in the same poses, or use mag=M15",
+            LEVELLED.to_degrees()
+        ));
     }
+    let std = tilt(calibration).map_or([LEVELLED; 2], |(_, std)| std);
+    allow_for_tilt(&mut rung, &poses, &base, std);
+    calibration.warnings.extend(rung.fit.heading.and_then(turned));
     Some(outcome(SensorKind::Mag, &rung, &poses, sensor, field.norm()))
+}
+
+/// The rung takes the vertical as known: its field has the length that is known and turns about it.
+fn is_of_tilt(rung: &Rung) -> bool {
+    rung.fit.heading.is_some() || !rung.fit.entries.contains(&14)
+}
+
+/// A warning where the base stands far off the field's known direction.
+fn turned(heading: Heading) -> Option<String> {
+    match heading {
+        Heading::Found(angle) if angle.abs() > TURNED => Some(format!(
+            "mag: the base is turned by {:.1}° against [site] field_ned_ut, which gain and hard iron take into account",
+            // The field turns the other way, seen from the base.
+            -angle.to_degrees()
+        )),
+        _ => None,
+    }
 }
 
 /// Adds to a rung's covariance what errors of the base's tilt, of these standard deviations in rad, do to it.
@@ -276,6 +305,7 @@ fn refused(
         | Refusal::IllConditioned { .. }
         | Refusal::Imprecise { .. }
         | Refusal::NotRedundant { .. } => "add poses upside down and oblique ones; turn all three gimbals",
+        Refusal::Implausible { what: Quantity::Heading, .. } => "check [site] field_ned_ut, or use mag=M15",
         Refusal::Implausible { .. } => {
             "check [units], [rig] axes, the encoders' unit and signs, and [site] of the recording's TOML"
         }
@@ -299,6 +329,9 @@ fn judge(fit: &RigFit, summary: &FitSummary, coverage: &Coverage<f64>, norm: f64
         return Err(Refusal::TooFewObservations { have: fit.report.residuals / 3, need });
     }
     accept::check_report(&fit.report.solver)?;
+    if let Some(Heading::None(value)) = fit.heading {
+        return Err(Refusal::Implausible { what: Quantity::Heading, value, limit: 1.0 });
+    }
     accept::check_precision(summary.relative_error(norm), &limits)?;
     accept::check_plausibility(&summary.triad, true, fit.report.rms / norm, &limits)?;
     summary.nonlinear.as_ref().map_or(Ok(()), |found| found.check(&limits))

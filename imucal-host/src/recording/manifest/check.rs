@@ -1,7 +1,12 @@
 //! What a manifest may not say although it is well-formed.
 
+use nalgebra::Vector3;
+
 use super::{Manifest, fault::ManifestFault};
 use crate::recording::{sensor_kind::SensorKind, unit::Unit};
+
+/// Length of a field that a manifest may give, µT: Earth's has 22 to 67, a coil's may have more. Nanotesla and gauss are beyond.
+const FIELD: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
 /// Looks for the first contradiction.
 pub(crate) fn check(manifest: &Manifest) -> Result<(), ManifestFault> {
@@ -53,6 +58,10 @@ fn check_site(manifest: &Manifest) -> Result<(), ManifestFault> {
     }
     for value in site.field_ned_ut.iter().flatten() {
         number("site", "field_ned_ut", *value, "three finite values", f64::is_finite)?;
+    }
+    if let Some(field) = site.field_ned_ut {
+        let length = Vector3::from(field).norm();
+        number("site", "field_ned_ut", length, "a field of 1 to 1000 uT in length", |v| FIELD.contains(&v))?;
     }
     Ok(())
 }
@@ -115,6 +124,8 @@ mod tests {
             ("[site]\nheight_m = 1e6\n", "site.height_m"),
             ("[site]\ngravity = 0\n", "site.gravity = 0"),
             ("[site]\nfield_ned_ut = [1, nan, 2]\n", "site.field_ned_ut = NaN"),
+            ("[site]\nfield_ned_ut = [20000, 0, 45000]\n", "expected a field of 1 to 1000 uT in length"),
+            ("[site]\nfield_ned_ut = [0.2, 0, 0.45]\n", "expected a field of 1 to 1000 uT in length"),
         ] {
             assert_says(&error(sections), &["run.toml, line 3", found, "correct it"]);
         }
