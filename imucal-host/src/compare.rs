@@ -71,7 +71,9 @@ pub enum CompareFault {
         sensor: SensorKind,
     },
     /// They have no sensor in common that can be compared.
-    #[error("no sensor is calibrated in both by models with the same nonlinear terms")]
+    #[error(
+        "no sensor is calibrated in both by models with the same nonlinear terms and terms of temperature"
+    )]
     Nothing,
 }
 
@@ -139,7 +141,8 @@ pub struct Comparison {
     pub sensors: Vec<SensorComparison>,
     /// Sensors that one of them has not.
     pub only_one: Vec<SensorKind>,
-    /// Sensors of which one of them estimates nonlinear terms that the other does not: their gains and biases differ by that alone.
+    /// Sensors of which one of them estimates nonlinear terms that the other does not, or terms of temperature: their gains and
+    /// biases differ by that alone.
     pub other_terms: Vec<SensorKind>,
 }
 
@@ -162,9 +165,7 @@ pub fn compare(
     let acc = a.acc.as_ref().zip(b.acc.as_ref());
     for kind in SensorKind::ALL {
         match (a.triad(kind), b.triad(kind)) {
-            (Some(a), Some(b)) if bent(a).map(|term| term.known()) != bent(b).map(|term| term.known()) => {
-                other_terms.push(kind);
-            }
+            (Some(a), Some(b)) if !has_terms_of(a, b) => other_terms.push(kind),
             (Some(a), Some(b)) => {
                 let axes = acc.unwrap_or((a, b));
                 let alike = [(a, b), axes].iter().all(|(a, b)| estimated(a) == estimated(b));
@@ -180,6 +181,12 @@ pub fn compare(
     }
     let days = i64::from(b.date.days()) - i64::from(a.date.days());
     Ok(Comparison { format: FORMAT, days, sensors, only_one, other_terms })
+}
+
+/// Both have terms of temperature or neither has, and both the same nonlinear ones.
+fn has_terms_of(a: &StoredTriad, b: &StoredTriad) -> bool {
+    bent(a).map(|term| term.known()) == bent(b).map(|term| term.known())
+        && a.temperature.is_some() == b.temperature.is_some()
 }
 
 /// Which entries of the gain are estimated: what its axes are.

@@ -18,7 +18,7 @@ use crate::{
     apply,
     calibrate::{Calibration, Options, calibrate, known_attitudes::ladder},
     compare::{CompareFault, Comparison, compare},
-    recording::SensorKind,
+    recording::{Recording, SensorKind, median},
     report::{self, table::words},
     store::StoredCalibration,
 };
@@ -62,6 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let calibration = calibrate(&recording, &options(&stored), &|_| {});
     calibration.warnings.iter().for_each(|warning| warn(warning));
     let now = StoredCalibration::of(&calibration, today());
+    let stored = at_temperature_of(&recording, stored, &now);
     let comparison = match compare(&stored, &now, arguments.other_serial) {
         Ok(comparison) => comparison,
         Err(CompareFault::Nothing) => {
@@ -78,6 +79,25 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     files.commit()?;
     let fits = comparison.sensors.iter().all(|sensor| !sensor.has_moved());
     Ok(if fits { Ending::Done } else { Ending::Refused })
+}
+
+/// The calibration as it is at the temperature of a recording whose own fit shows no dependence on it.
+fn at_temperature_of(
+    recording: &Recording,
+    mut stored: StoredCalibration,
+    now: &StoredCalibration,
+) -> StoredCalibration {
+    let known = recording.temperature.iter().flatten().copied().filter(|temperature| temperature.is_finite());
+    let Some(temperature) = median(known.collect()) else { return stored };
+    let StoredCalibration { acc, gyr, mag, .. } = &mut stored;
+    for (kind, triad) in SensorKind::ALL.into_iter().zip([acc, gyr, mag]) {
+        if let Some(triad) = triad
+            && now.triad(kind).is_some_and(|now| now.temperature.is_none())
+        {
+            *triad = triad.at_temperature(temperature);
+        }
+    }
+    stored
 }
 
 /// On a rig, the model of an accelerometer's nonlinear terms where the calibration has some: a linear gain would differ from its own.

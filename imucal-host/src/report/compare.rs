@@ -10,8 +10,7 @@ use crate::{
 };
 
 /// Why a sensor is not compared.
-pub const OTHER_TERMS: &str =
-    "one calibration has nonlinear terms that the other has not, and gain and bias are fitted with them";
+pub const OTHER_TERMS: &str = "one calibration has nonlinear terms, or terms of temperature, that the other has not, and gain and bias are fitted with them";
 
 /// All sensors; ends its lines.
 pub fn compared(comparison: &Comparison) -> String {
