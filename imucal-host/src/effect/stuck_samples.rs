@@ -4,14 +4,16 @@ use super::{Act, DataRun, Effect, Parameter, Part, SensorKind, Spoils, Words, me
 
 /// Rows that repeat the one before them, at a time.
 const LENGTH: usize = 5;
+/// Share of the rows that repeat where all stretches follow one another.
+const MOST: f64 = LENGTH as f64 / (LENGTH + 1) as f64;
 
 pub(super) fn effect(kind: SensorKind) -> Effect {
     let words = Words {
-        cause: "The bus or the logger repeats the last sample now and then, for this share of the rows.",
+        cause: "The bus or the logger repeats the last sample now and then, in this share of the rows.",
         remedy: "Mend the transport; leave repeated rows out.",
         needs: "Noise above the converter's step, so that a repeated value is not chance.",
     };
-    let share = Parameter::magnitude("share", "-", 0.02, 1.0);
+    let share = Parameter::magnitude("share", "-", 0.02, MOST);
     Effect::member(kind, "stuck_samples", Act::Data(kind, alter), vec![share], words)
         .part(Part::Fault(Spoils::Repeats))
         .like(&member_id(kind, "bandwidth"), "the samples themselves: repeated ones are equal in all axes")
@@ -20,7 +22,7 @@ pub(super) fn effect(kind: SensorKind) -> Effect {
 fn alter(values: &[f64], run: &mut DataRun<'_>) {
     let share = values.first().copied().unwrap_or(0.0);
     for (index, block) in run.samples.chunks_mut(LENGTH + 1).enumerate() {
-        if chance(index as u64) < share
+        if chance(index as u64) < share / MOST
             && let Some((first, rest)) = block.split_first_mut()
         {
             rest.fill(*first);
@@ -47,6 +49,6 @@ mod tests {
         let mut samples: Vec<_> = (0..60_000).map(|k| Vector3::repeat(f64::from(k))).collect();
         alter(&[0.1], &mut DataRun { samples: &mut samples });
         let stuck = samples.windows(2).filter(|pair| pair[0] == pair[1]).count() as f64 / 60_000.0;
-        assert!((0.07..0.1).contains(&stuck), "{stuck}");
+        assert!((0.09..0.11).contains(&stuck), "{stuck}");
     }
 }

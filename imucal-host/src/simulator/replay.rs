@@ -249,12 +249,11 @@ fn noise(angles: &[[f64; 3]]) -> [f64; 3] {
 }
 
 /// Standard deviation of readings along a smooth movement: by fourth differences, which leave next to nothing of it, and √70
-/// times a reading's standard deviation; those with a missing reading do not count.
+/// times a reading's standard deviation. Missing readings are left out first: a sensor may read in every fifth row.
 pub fn reading_noise(readings: impl Iterator<Item = f64>) -> f64 {
-    let readings: Vec<f64> = readings.collect();
+    let readings: Vec<f64> = readings.filter(|reading| reading.is_finite()).collect();
     let bend = |w: &[f64]| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs();
-    let bends = readings.windows(5).map(bend).filter(|bend| bend.is_finite());
-    std_of_median(bends.collect()).unwrap_or(0.0) / 70.0f64.sqrt()
+    std_of_median(readings.windows(5).map(bend).collect()).unwrap_or(0.0) / 70.0f64.sqrt()
 }
 
 /// That of readings with three axes, the largest of them.

@@ -11,6 +11,7 @@
 //! | `constant_axis` | an axis that shows one value in all rows |
 //! | [`mounting`] | the small turn of a unit against the sensor that a simulator's stream is of |
 //! | [`held_values`] | rows that repeat the one before until a new value comes |
+//! | [`recorded_values`] | a sensor that is slower than the table, whose rows repeat its values |
 //! | [`pose_conventions`] | what a reference's attitudes and positions hold instead of what they should: order, frame, rate, jumps, steps, unit |
 //! | [`stream_conventions`] | what a simulator's stream holds instead of what it should: unit, gravity, axes, noise, steps, too few samples |
 //! | [`reference_offset`] | a large offset of the reference's clock, by the share of variance that no gain and bias explain |
@@ -28,5 +29,6 @@ pub mod held_values;
 pub mod mounting;
 pub mod pose_conventions;
 pub mod preparation;
+pub mod recorded_values;
 pub mod reference_offset;
 pub mod stream_conventions;

@@ -5,7 +5,7 @@ use super::{
     decision::Evidence,
     detectability, experiment, fault, profile,
     reference_clock::{self, Clock},
-    shares,
+    shares, swallowed,
     tested::{Tested, places},
 };
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
         screening::preparation::Preparation,
         search::{linearisation::Linearisation, stepwise::Solution},
     },
-    effect::Effect,
+    effect::{Effect, Role},
     recording::{Recording, SensorKind},
 };
 
@@ -84,6 +84,7 @@ pub fn answer(
     let profiles =
         asserted.part("the profile of the gap", profiles(explained, &tested, clock.as_ref(), &places));
     asserted.take_out_errors(&preparation.model, &settings.verdict);
+    let swallowed = if settings.source.followed { swallowed::remarks(recording, &gap) } else { Vec::new() };
     let evidence = Evidence {
         causes: &found,
         clock: clock.as_ref().map_or(&[], |clock| &clock.causes),
@@ -99,6 +100,7 @@ pub fn answer(
         opposite: !explained.idle.is_empty(),
         within_model: !found.is_empty() && asserted.causes.is_empty() && clock.is_none(),
         faulty: !preparation.findings.is_empty(),
+        swallowed: !swallowed.is_empty(),
     };
     let is_closed = (!found.is_empty() || clock.is_some()) && !evidence.within_model;
     let mut total = is_closed.then_some(closed.total);
@@ -112,6 +114,7 @@ pub fn answer(
     fault::add(&faults, closed.explainable, &mut asserted.causes, &mut gap, &mut total);
     asserted.remarks.extend(preparation.remarks.iter().cloned());
     asserted.remarks.extend(opposite(&explained.idle));
+    asserted.remarks.extend(swallowed);
     let (linear, best) = (&explained.linear, &explained.best);
     let testable = detectability::testable(linear, &best.set, &best.noise);
     let (absent, not_testable) = asserted.part("what is absent or not testable", testable);
@@ -135,15 +138,31 @@ pub fn answer(
 }
 
 /// What is said of effects that a fit took at no size.
-fn opposite(idle: &[&'static Effect]) -> Option<String> {
-    let ids: Vec<&str> = idle.iter().map(|effect| effect.id.as_str()).collect();
-    (!ids.is_empty()).then(|| {
+fn opposite(idle: &[&'static Effect]) -> Vec<String> {
+    let has_one_sign = |effect: &&&'static Effect| {
+        effect
+            .parameters
+            .iter()
+            .any(|parameter| parameter.role == Role::Amplitude && parameter.range.0 >= 0.0)
+    };
+    let (one_sided, others): (Vec<_>, Vec<_>) = idle.iter().partition(has_one_sign);
+    let listed = |effects: &[&&'static Effect], by: &str| -> String {
+        effects.iter().map(|effect| effect.id.as_str()).collect::<Vec<_>>().join(by)
+    };
+    let negative = (!one_sided.is_empty()).then(|| {
         format!(
             "the data show the opposite of {}, which cannot be negative: it is left out, and its part of the gap stays open; of a filter \
              or a delay that is a sensor which is ahead of the others, or late in the simulator",
-            ids.join(" and of ")
+            listed(&one_sided, " and of ")
         )
-    })
+    });
+    let without_size = (!others.is_empty()).then(|| {
+        format!(
+            "not asserted: {}: fitted with the other causes, no size of it is left",
+            listed(&others, ", ")
+        )
+    });
+    negative.into_iter().chain(without_size).collect()
 }
 
 /// The table of the gap.

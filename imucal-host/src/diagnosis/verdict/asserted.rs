@@ -13,6 +13,9 @@ use crate::{
     effect::Effect,
 };
 
+/// A cause is not asserted that is, together with what is the same here, less probable.
+const IMPROBABLE: f64 = 0.05;
+
 /// The causes that are asserted, and what is said of the others.
 pub(super) struct Asserted {
     pub(super) causes: Vec<Cause>,
@@ -26,6 +29,7 @@ impl Asserted {
     pub(super) fn of(explained: &Solution<'_>, tested: &Tested) -> Result<Self, DiagnosisError> {
         let mut causes = causes(explained, tested)?;
         let mut remarks = refuted(&mut causes, explained)?;
+        remarks.extend(improbable(&mut causes));
         if explained.linear.scene.settings.verdict.outweighs_remainder {
             remarks.extend(outweighed(&mut causes, explained, tested));
         }
@@ -101,6 +105,20 @@ fn causes(explained: &Solution<'_>, tested: &Tested) -> Result<Vec<Cause>, Diagn
         });
     }
     Ok(causes)
+}
+
+/// Takes out the causes that are not likely once all others are fitted; remarks on them.
+fn improbable(causes: &mut Vec<Cause>) -> Vec<String> {
+    let remark = |cause: Cause| {
+        let percent = 100.0 * cause.probability;
+        format!(
+            "not asserted: {} has a probability of {percent:.1} % once the others are fitted",
+            cause.effect
+        )
+    };
+    let is_improbable =
+        |cause: &mut Cause| cause.probability * (1 + cause.equivalents.len()) as f64 <= IMPROBABLE;
+    causes.extract_if(.., is_improbable).map(remark).collect()
 }
 
 /// Takes out the causes that held-out data do not confirm, where these are asked; remarks on them.

@@ -29,6 +29,8 @@ pub struct Evidence<'a> {
     pub within_model: bool,
     /// The recording itself is faulty, and the fault is named.
     pub faulty: bool,
+    /// What no effect explains was taken for noise, far above that of the samples.
+    pub swallowed: bool,
 }
 
 impl Evidence<'_> {
@@ -46,6 +48,8 @@ impl Evidence<'_> {
             verdict => verdict,
         };
         match beyond_model {
+            Verdict::None if self.swallowed => Verdict::Unknown,
+            Verdict::Explained | Verdict::Ambiguous if self.swallowed => Verdict::Partly,
             Verdict::None if self.faulty => Verdict::Explained,
             verdict => verdict,
         }
@@ -115,6 +119,7 @@ mod tests {
             opposite: false,
             within_model: false,
             faulty: false,
+            swallowed: false,
         };
         alter(&mut evidence);
         evidence.verdict(&Settings::default().verdict)
@@ -134,6 +139,13 @@ mod tests {
         assert_eq!(verdict(&causes, 0.95, Some(60.0)), Verdict::Partly);
         assert_eq!(verdict(&causes, 0.0, Some(60.0)), Verdict::Unknown);
         assert_eq!(verdict(&[cause(&["mag.bias_drift"])], 0.95, None), Verdict::Ambiguous);
+    }
+
+    #[test]
+    fn a_gap_that_was_taken_for_noise_is_not_explained() {
+        let swallowed = |evidence: &mut Evidence<'_>| evidence.swallowed = true;
+        assert_eq!(decided(&[], 0.0, None, swallowed), Verdict::Unknown);
+        assert_eq!(decided(&[cause(&[])], 0.95, None, swallowed), Verdict::Partly);
     }
 
     #[test]
@@ -172,6 +184,7 @@ mod tests {
                 opposite: false,
                 within_model: false,
                 faulty: false,
+                swallowed: false,
             };
             evidence.verdict(&Settings::default().verdict)
         };

@@ -14,6 +14,7 @@
 //! | [`model_error`] | causes within the standard errors of the given model are taken out |
 //! | [`reference_clock`] | the offset of a reference's clock, a term of the baseline, as a cause |
 //! | [`reference_error`] | causes that an error of the source could stand for are taken out |
+//! | `swallowed` | what no effect explains, taken for noise |
 //! | [`fault`] | shares of faults of the recording itself |
 //! | [`detectability`] | what is absent, and from what size on it would have been detected |
 //! | [`profile`] | the residual over what a sensor follows most, for drawings |
@@ -40,4 +41,5 @@ pub mod profile;
 pub mod reference_clock;
 pub mod reference_error;
 pub mod shares;
+mod swallowed;
 mod tested;

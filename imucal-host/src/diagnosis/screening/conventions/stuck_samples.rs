@@ -52,8 +52,7 @@ pub(crate) fn check(triple: &Triple, sensor: &SensorIntegrity, found: &mut Conve
         ));
         return;
     }
-    // Each stretch holds one row that was measured in addition to those that repeat it.
-    let share = (rows - expected + starts) / total;
+    let share = (rows - expected) / total;
     let std_error = share / starts.sqrt();
     let values = [(Some(share), Some(std_error))];
     found.findings.extend(Finding::new(&format!("{kind}.stuck_samples"), &values, p_value));
