@@ -7,7 +7,9 @@
 //! | symbol | meaning |
 //! | --- | --- |
 //! | h, Δ | time and difference between the two samples |
-//! | l, a | slope times h at the first and at the second: that of the polynomial through a sample and two neighbours on each side; of the parabola through it and one on each side next to an end or a gap |
+//! | l, a | slope times h at the first and at the second: of the polynomial through it and two neighbours on each side |
+//!
+//! Next to an end or a gap slopes are those of the parabola through a sample and its two neighbours.
 //!
 //! Of a smooth movement it is wrong by h⁴ x⁗ / 384 at the most; with slopes of parabolas alone by nine times as much.
 //!

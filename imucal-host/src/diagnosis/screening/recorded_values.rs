@@ -2,7 +2,8 @@
 //! magnetometer's does next to a fast gyroscope.
 //!
 //! Taken as it is, each change would seem late by half of the time that a value is held, and in steps. The first row of each value
-//! is kept, and the others have none. Not modelled: rows whose converter repeats values by chance, which come at uneven distances and are left as they are.
+//! is kept, and the others have none. Not modelled: rows whose converter repeats values by chance, which come at uneven
+//! distances and are left as they are.
 
 use std::borrow::Cow;
 

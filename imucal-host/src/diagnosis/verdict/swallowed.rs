@@ -24,8 +24,8 @@ pub fn remarks(recording: &Recording, gap: &[Gap]) -> Vec<String> {
         let block = of_kind.map(|row| row.noise_floor).fold(0.0, f64::max);
         (sample > 0.0 && block > FACTOR * sample).then(|| {
             format!(
-                "the noise of the {kind} would have to be {block:.2e} {unit} in a mean over a block, and its samples have {sample:.2e} {unit}: \
-                 it holds a part of the gap that no effect explains",
+                "the noise of the {kind} would have to be {block:.2e} {unit} in a mean over a block, and its samples \
+                 have {sample:.2e} {unit}: it holds a part of the gap that no effect explains",
                 unit = si(kind)
             )
         })
