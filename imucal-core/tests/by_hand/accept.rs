@@ -290,7 +290,7 @@ fn every_refusal_has_its_name_and_says_its_figures() {
         need_flatness: 0.01,
     };
     let implausible = |what| Refusal::Implausible { what, value: 0.4321, limit: 2.5 };
-    let said: [(Refusal, &str, &[&str]); 14] = [
+    let said: [(Refusal, &str, &[&str]); 15] = [
         (Refusal::NoRest, "no-rest", &["lay still"]),
         (Refusal::NoMotion, "no-motion", &["turned"]),
         (Refusal::TooFewObservations { have: 7, need: 10 }, "too-few-observations", &["7", "10"]),
