@@ -104,7 +104,7 @@ pub(crate) fn solve<'a, const P: usize, G: Pose<f64>>(
     Solved { model, solver, gauge, heading }
 }
 
-/// The field that is known, where what was found of it allows; `None` where nothing of it is held.
+/// The field that is known, where what was found of it allows, and the heading that was looked for; `None` where nothing of it is held.
 ///
 /// Its length is determined by K alone, so that one entry is held; with a source on the outer gimbal, its component along
 /// the outer axis as well. The entries that are held are not these, and in a base that points elsewhere they are off,

@@ -31,7 +31,7 @@ const LEAST_POSES: usize = 6;
 
 /// A tilt with a larger standard error is not determined, rad: a spirit level knows it to 0.2°.
 const LEVELLED: f64 = 3.5e-3;
-/// A heading of the base that is said, rad.
+/// A larger heading of the base is warned of, rad.
 const TURNED: f64 = 0.1;
 /// A tilt is one from so many standard errors on.
 const SIGNIFICANT_TILT: f64 = 4.0;
