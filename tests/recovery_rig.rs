@@ -2,8 +2,10 @@
 //! standard errors say. 200 recordings each, as `imucal study recovery` prints them.
 
 use imucal_host::{
-    calibrate::{Options, calibrate},
+    calibrate::{Calibration, Options, calibrate},
+    effect,
     recording::SensorKind,
+    simulator::{Dose, Simulation},
     study::recovery::{self, Base, GROUPS, Noise, Scores, moments},
 };
 
@@ -93,5 +95,45 @@ fn a_field_taken_as_known_on_a_base_that_points_elsewhere_is_warned_of() {
     for seed in seeds {
         assert!(warned(seed, Base::Drawn), "seed {seed}");
         assert!(!warned(seed, Base::Exact), "seed {seed}: points north");
+    }
+}
+
+fn calibrated(simulation: &Simulation, skip: &[SensorKind]) -> Calibration {
+    let recording = simulation.record("rig.csv").expect("a possible recording");
+    let options = Options { skip: skip.to_vec(), multipliers: vec![4.0], ..Options::default() };
+    calibrate(&recording, &options, &|_| {})
+}
+
+/// How far the magnetometer's gain is off, in standard errors of its entries, the worst.
+fn worst_gain(simulation: &Simulation, found: &Calibration) -> f64 {
+    let outcome = found.sensor(SensorKind::Mag).expect("it was recorded");
+    let fit = outcome.accepted().unwrap_or_else(|| panic!("not accepted: {outcome:?}"));
+    let unit = simulation.unit_under_test();
+    let truth = unit.c_t_q.transpose() * unit.triad(SensorKind::Mag).triad.gain;
+    (fit.triad.gain - truth).component_div(&fit.gain_std).amax()
+}
+
+#[test]
+fn a_base_that_stands_far_off_the_field_s_direction_leaves_the_gains_right() {
+    for (seed, degrees) in [(1000, 28.0f64), (1001, -35.0), (1002, 60.0), (1003, 170.0), (1004, -100.0)] {
+        let mut simulation = recovery::simulation(seed, Base::Exact).expect("possible");
+        let heading = effect::find("rig.heading").expect("in the catalogue");
+        simulation.doses.push(Dose { effect: heading, values: vec![degrees.to_radians()] });
+        let found = calibrated(&simulation, &[SensorKind::Gyr]);
+        let off = worst_gain(&simulation, &found);
+        assert!(off < 4.5, "{degrees}: {off}");
+        let said = format!("turned by {degrees:.1}°");
+        assert!(found.warnings.iter().any(|warning| warning.contains(&said)), "{:?}", found.warnings);
+    }
+}
+
+#[test]
+fn a_magnetometer_alone_on_a_tilted_base_is_off_by_what_its_errors_allow() {
+    for seed in 1000..1005 {
+        let simulation = recovery::simulation(seed, Base::Drawn).expect("possible");
+        let found = calibrated(&simulation, &[SensorKind::Acc, SensorKind::Gyr]);
+        let off = worst_gain(&simulation, &found);
+        assert!(off < 4.5, "{seed}: {off}");
+        assert!(found.warnings.iter().any(|warning| warning.contains("nothing shows the base's tilt")));
     }
 }

@@ -138,6 +138,15 @@ fn spoil(folder: &Folder) {
 const SPOILT: [usize; 7] = [10, 20, 30, 40, 50, 60, 70];
 
 #[test]
+fn the_json_on_the_screen_is_printed_in_quiet_too() {
+    let folder = units(1);
+    let loud = folder.batch("in.d --out out.d --json -").with(0);
+    let quiet = folder.batch("in.d --out out.d --json - --quiet").with(0);
+    let json: Value = serde_json::from_str(&quiet.out).expect("JSON alone");
+    assert!(json["recordings"].is_array() && loud.out == quiet.out, "{}", loud.out);
+}
+
+#[test]
 fn of_a_hundred_files_the_seven_broken_ones_are_named_and_the_others_done() {
     let folder = units(100);
     spoil(&folder);

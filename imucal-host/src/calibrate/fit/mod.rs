@@ -8,6 +8,7 @@
 //! | --- | --- |
 //! | [`rows`] | derivatives as a dense matrix, its covariance and leverages |
 //! | [`norm_fit`], [`rig_fit`], [`reference_fit`], [`gyr_rig_fit`] | least squares for each kind of observation |
+//! | [`heading`] | the heading of a rig's base against a field that is known |
 //! | [`least_squares`] | one fit by the core's solver |
 //! | [`parallel_rows`] | the same rows on all cores, where they are very many |
 //! | [`parallel_turns`] | rows of turns, worked out on all cores |
@@ -28,6 +29,7 @@ pub mod blocked_score;
 pub mod compare;
 pub mod directions;
 pub mod gyr_rig_fit;
+pub mod heading;
 pub mod held_out;
 pub mod lag;
 pub mod least_squares;

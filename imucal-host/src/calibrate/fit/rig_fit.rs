@@ -5,13 +5,17 @@ use imucal_core::{
         rig::{GimbalPose, Pose},
         unified::{Terms, UnifiedModel, UnifiedParameters},
     },
-    solver::{LevenbergMarquardt, gauge::Gauge},
+    solver::{
+        LevenbergMarquardt,
+        gauge::{Gauge, bit},
+    },
     triad::Triad,
 };
-use nalgebra::{DMatrix, DVector, Rotation3, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, SVector, Vector3};
 
 use super::{
     compare::Step,
+    heading::{self, Heading, headings},
     held_out::{by_steps, root_mean},
     least_squares,
     least_squares::dynamic,
@@ -44,15 +48,6 @@ pub struct RigFit {
     pub covariance: DMatrix<f64>,
 }
 
-/// A heading of the base that turns the known field into the measured one, as far as this is determined.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Heading {
-    /// Of the field about the vertical, rad; the base's is the opposite.
-    Found(f64),
-    /// None does: across the outer axis the field would have to be so many times as large.
-    None(f64),
-}
-
 /// Where a fit ended, and what the poses determine of it.
 pub(crate) struct Solved<'a, const P: usize, G: Pose<f64>> {
     /// The model, with what is held.
@@ -80,7 +75,10 @@ pub(crate) fn solve<'a, const P: usize, G: Pose<f64>>(
     terms: Terms<P>,
     outer: Option<Vector3<f64>>,
 ) -> Solved<'a, P, G> {
+    let known = base.vector_n;
     let free = UnifiedModel { poses, axes, base: *base, terms, held: 0 };
+    let base = &if outer.is_some() { headed(&free) } else { *base };
+    let free = UnifiedModel { base: *base, ..free };
     let mut solver = least_squares::solve(&free, terms.theta(base));
     let gauge = Gauge::of(solver.factor().r(), TOLERANCE, |k| terms.class(k));
     let model = UnifiedModel { held: gauge.held, ..free };
@@ -93,67 +91,90 @@ pub(crate) fn solve<'a, const P: usize, G: Pose<f64>>(
         solver = least_squares::solve(&model, start);
     }
     let found = terms.parameters(base, solver.theta());
-    let (field, heading) = of_known_length(outer, base, &found, &terms, &gauge);
-    let Some(field) = field.filter(|field| field.iter().all(|x| x.is_finite())) else {
-        return Solved { model, solver, gauge, heading };
-    };
+    let fields = of_known_length(outer, &known, &found.vector_n, held_of_field(&terms, &gauge));
+    let not_found = fields.as_ref().err().map(|share| Heading::None(*share));
     // Held again where the field has its length: K and sources are then those of the field that is known.
-    let model = UnifiedModel { base: UnifiedParameters { vector_n: field, ..*base }, ..model };
-    let start = terms.theta(&UnifiedParameters { vector_n: field, ..found });
-    let solver = least_squares::solve(&model, start);
-    Solved { model, solver, gauge, heading }
+    let with = |Directed { field, heading }| {
+        let model = UnifiedModel { base: UnifiedParameters { vector_n: field, ..*base }, ..model };
+        let start = terms.theta(&UnifiedParameters { vector_n: field, ..found });
+        let solver = least_squares::solve(&model, start);
+        Solved { model, solver, gauge, heading }
+    };
+    let fields = fields
+        .unwrap_or_default()
+        .into_iter()
+        .filter(|directed| directed.field.iter().all(|x| x.is_finite()));
+    let solutions = fields.map(with).map(|solved| (sources(&solved.parameters()), solved));
+    match solutions.min_by(|(one, _), (other, _)| one.total_cmp(other)) {
+        Some((_, solved)) => solved,
+        None => Solved { model, solver, gauge, heading: not_found },
+    }
 }
 
-/// The field that is known, where what was found of it allows, and the heading that was looked for; `None` where nothing of it is held.
+/// How much hard iron a solution has on the gimbals, µT: of those that fit alike, the one with least of it is taken.
+fn sources(parameters: &UnifiedParameters<f64>) -> f64 {
+    parameters.outer_source.norm().hypot(parameters.middle_source.norm())
+}
+
+/// The base of a model, its field turned about the vertical as a fit of gain and bias alone wants it, where the field is estimated: far
+/// from its direction, a fit with sources runs off along what the poses do not determine, or ends at a mirrored sensor.
+fn headed<const P: usize, G: Pose<f64>>(free: &UnifiedModel<'_, f64, P, G>) -> UnifiedParameters<f64> {
+    let entries = free.terms.entries();
+    if !entries.contains(&14) {
+        return free.base;
+    }
+    let held = (0..P).filter(|k| (14..23).contains(&entries[*k])).fold(0, |held, k| held | bit(k));
+    let fitted = |field| {
+        let base = UnifiedParameters { vector_n: field, ..free.base };
+        let model = UnifiedModel { base, held, ..*free };
+        let solver = least_squares::solve(&model, free.terms.theta(&base));
+        (solver.report().cost, base)
+    };
+    let fits = heading::starts(free.base.vector_n).map(fitted);
+    fits.min_by(|(one, _), (other, _)| one.total_cmp(other)).map_or(free.base, |(_, base)| base)
+}
+
+/// What the known field can be in the base's frame, and the heading that this takes, where it was looked for.
+struct Directed {
+    field: Vector3<f64>,
+    heading: Option<Heading>,
+}
+
+/// How many components of the field are held.
+fn held_of_field<const P: usize>(terms: &Terms<P>, gauge: &Gauge<f64, P>) -> usize {
+    (0..P).filter(|k| gauge.is_held(*k) && (14..17).contains(&terms.entries()[*k])).count()
+}
+
+/// What the known field can be, where what was `found` of it allows; nothing where nothing of it is held. As an error, how many times as
+/// large it would have to be for a heading to explain what was found.
 ///
 /// Its length is determined by K alone, so that one entry is held; with a source on the outer gimbal, its component along
 /// the outer axis as well. The entries that are held are not these, and in a base that points elsewhere they are off,
 /// K and the sources with them: by 8e-4 for half a degree at a declination of 5°. So the field keeps its length, and
 /// where its direction is determined only in part, that part by a heading of the base.
-fn of_known_length<const P: usize>(
+fn of_known_length(
     outer: Option<Vector3<f64>>,
-    base: &UnifiedParameters<f64>,
-    found: &UnifiedParameters<f64>,
-    terms: &Terms<P>,
-    gauge: &Gauge<f64, P>,
-) -> (Option<Vector3<f64>>, Option<Heading>) {
-    let of_field = |k: &usize| gauge.is_held(*k) && (14..17).contains(&terms.entries()[*k]);
-    let (known, now) = (base.vector_n, found.vector_n);
-    match ((0..P).filter(of_field).count(), outer) {
-        (1, _) => (Some(now * (known.norm() / now.norm())), None),
-        (2, Some(outer)) => {
-            let heading = heading(&known, &outer.cross(&now));
-            let turned = match heading {
-                Heading::Found(angle) => Some(Rotation3::from_axis_angle(&Vector3::z_axis(), angle) * known),
-                Heading::None(_) => None,
-            };
-            (turned, Some(heading))
-        }
-        _ => (None, None),
+    known: &Vector3<f64>,
+    found: &Vector3<f64>,
+    held: usize,
+) -> Result<Vec<Directed>, f64> {
+    match (held, outer) {
+        (1, _) => Ok(vec![Directed { field: found * (known.norm() / found.norm()), heading: None }]),
+        (2, Some(outer)) => headings(known, &outer, found).map(|turns| {
+            let directed =
+                |turn| Directed { field: heading::turned(known, turn), heading: Some(Heading::Found(turn)) };
+            turns.into_iter().map(directed).collect()
+        }),
+        _ => Ok(Vec::new()),
     }
-}
-
-/// The smaller of the two turns about the vertical that bring `known` across `normal`:
-///
-/// ```text
-/// n · R_z(ψ) m = a cos ψ + b sin ψ + n_z m_z = 0,   a = n_x m_x + n_y m_y,   b = n_y m_x − n_x m_y
-/// ```
-///
-/// The other one has the field's part along the outer axis reversed, which a source on the outer gimbal hides.
-fn heading(known: &Vector3<f64>, normal: &Vector3<f64>) -> Heading {
-    let a = normal.xy().dot(&known.xy());
-    let b = normal.y * known.x - normal.x * known.y;
-    let share = -normal.z * known.z / a.hypot(b);
-    if share.is_nan() || share.abs() > 1.0 {
-        return Heading::None(share.abs());
-    }
-    let (middle, half) = (b.atan2(a), share.acos());
-    let wrapped = |angle: f64| angle.sin().atan2(angle.cos());
-    let [one, other] = [middle - half, middle + half].map(wrapped);
-    Heading::Found(if one.abs() < other.abs() { one } else { other })
 }
 
 impl<const P: usize, G: Pose<f64>> Solved<'_, P, G> {
+    /// The parameters where it ended.
+    fn parameters(&self) -> UnifiedParameters<f64> {
+        self.model.terms.parameters(&self.model.base, self.solver.theta())
+    }
+
     /// The fit's figures, without those that need more than the solver.
     pub fn report(&self) -> FitReport {
         let held = (0..P).filter(|k| self.gauge.is_held(*k)).count();
@@ -162,7 +183,7 @@ impl<const P: usize, G: Pose<f64>> Solved<'_, P, G> {
 
     /// The fit, with these standard errors (zero where held) and these figures.
     pub fn fit(&self, mut covariance: DMatrix<f64>, report: FitReport) -> RigFit {
-        let Self { model, solver, gauge, heading } = self;
+        let Self { model, gauge, heading, .. } = self;
         let entries = model.terms.entries();
         let held: Vec<usize> = (0..P).filter(|k| gauge.is_held(*k)).collect();
         for k in &held {
@@ -171,7 +192,7 @@ impl<const P: usize, G: Pose<f64>> Solved<'_, P, G> {
         }
         let like = |k: &usize| (entries[*k], gauge.like[*k].map(|like| entries[usize::from(like)]));
         RigFit {
-            parameters: model.terms.parameters(&model.base, solver.theta()),
+            parameters: self.parameters(),
             entries: entries.to_vec(),
             held: held.iter().map(like).collect(),
             heading: *heading,
@@ -280,28 +301,4 @@ impl RigFit {
 /// A gain's derivative by rows, and nothing of the bias.
 fn pad(by: &nalgebra::Matrix3<f64>) -> DVector<f64> {
     DVector::from_iterator(12, by.transpose().iter().copied().chain([0.0; 3]))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_heading_of_a_base_is_found_by_what_its_outer_axis_does_not_hide() {
-        let known = Vector3::new(25.0, 2.0, 40.0);
-        for degrees in [-60.0f64, -29.0, 0.0, 0.3, 28.0, 45.0, 70.0] {
-            let turned = Rotation3::from_axis_angle(&Vector3::z_axis(), degrees.to_radians()) * known;
-            for hidden in [-30.0, 0.0, 12.0] {
-                let measured = turned + Vector3::x() * hidden;
-                let found = heading(&known, &Vector3::x().cross(&measured));
-                assert!(
-                    matches!(found, Heading::Found(angle) if (angle.to_degrees() - degrees).abs() < 1e-9),
-                    "{degrees} {found:?}"
-                );
-            }
-        }
-        // 25 µT cannot have a part of 50 µT across the axis.
-        let found = heading(&known, &Vector3::x().cross(&Vector3::new(0.0, 50.0, 40.0)));
-        assert!(matches!(found, Heading::None(share) if (share - 2.0).abs() < 0.01), "{found:?}");
-    }
 }

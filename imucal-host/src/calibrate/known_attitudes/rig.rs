@@ -12,10 +12,7 @@ use super::{ladder, ladder::Rung};
 use crate::{
     calibrate::{
         Options,
-        fit::{
-            compare,
-            rig_fit::{Heading, RigFit},
-        },
+        fit::{compare, heading::Heading, rig_fit::RigFit},
         nonlinear_terms::NonlinearFinding,
         outcome::{
             Calibration, Estimates, Evidence, FitSummary, Refused, RigFindings, SensorOutcome, entry_name,
