@@ -76,6 +76,11 @@ impl Steadiness {
         Self { clock, jumps: Vec::new(), wander: None, p_value: 1.0 }
     }
 
+    /// Without jumps or wander.
+    pub fn is_even(&self) -> bool {
+        self.jumps.is_empty() && self.wander.is_none()
+    }
+
     /// As many jumps at the same times, each by the same but for its error; a wander is like any other.
     fn is_alike(&self, other: &Self) -> bool {
         let mut jumps = self.jumps.iter().zip(&other.jumps);
@@ -106,7 +111,7 @@ pub(super) fn steadiness(rates: &Rates, coarse: &StreamClock) -> Result<Steadine
         }
         let before = std::mem::replace(&mut steadiness, judged);
         let is_as_before = pass > 1 && before.is_alike(&steadiness);
-        if is_as_before || (steadiness.jumps.is_empty() && steadiness.wander.is_none()) {
+        if is_as_before || steadiness.is_even() {
             break;
         }
     }
@@ -115,8 +120,8 @@ pub(super) fn steadiness(rates: &Rates, coarse: &StreamClock) -> Result<Steadine
 
 /// The coarse clock with jumps.
 fn jumping(coarse: &StreamClock, fit: &StepFit, jumps: &[Jump]) -> StreamClock {
-    let slope = 1.0 / (1.0 + coarse.error) + fit.coefficients[1];
-    let at_zero = coarse.offset / (1.0 + coarse.error) + fit.coefficients[0];
+    let StreamClock { offset, error, .. } = fit.clock(coarse);
+    let slope = 1.0 / (1.0 + error);
     let mut corrections = Vec::new();
     let mut sum = 0.0;
     for jump in jumps {
@@ -126,7 +131,7 @@ fn jumping(coarse: &StreamClock, fit: &StepFit, jumps: &[Jump]) -> StreamClock {
         corrections.push((middle, sum));
     }
     let unknown = jumps.iter().map(|jump| jump.within.start - MARGIN..jump.within.end + MARGIN).collect();
-    StreamClock { offset: at_zero / slope, error: 1.0 / slope - 1.0, corrections, unknown }
+    StreamClock { offset, error, corrections, unknown }
 }
 
 /// A clock that follows the lags, between them on a line, but for those that are far from their neighbours.
@@ -137,7 +142,7 @@ fn wandering(coarse: &StreamClock, lags: &[Lag], p_value: f64) -> Result<Steadin
     if usual > LOST {
         return Err(LOST_ROWS.to_owned());
     }
-    let even = jumping(coarse, &line, &[]);
+    let even = line.clock(coarse);
     let near =
         lags.iter().zip(&bends).filter(|(_, bend)| **bend <= FAR * (usual + SCATTER)).map(|(lag, _)| lag);
     let off = |lag: &Lag| {

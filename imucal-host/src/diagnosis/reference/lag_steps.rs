@@ -12,7 +12,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::rate_lags::Lag;
-use crate::recording::median;
+use crate::{recording::median, simulator::StreamClock};
 
 /// Lags of a steady clock scatter by this at least, s: a filter's delay depends on how brisk a movement is.
 pub(super) const SCATTER: f64 = 4e-4;
@@ -166,6 +166,13 @@ impl StepFit {
     /// One of the steps is shorter than a jump.
     fn has_small_step(&self) -> bool {
         self.coefficients[2..].iter().any(|jump| jump.abs() < LEAST)
+    }
+
+    /// A clock that is off by these lags' line from another.
+    pub fn clock(&self, from: &StreamClock) -> StreamClock {
+        let slope = 1.0 / (1.0 + from.error) + self.coefficients[1];
+        let at_zero = from.offset / (1.0 + from.error) + self.coefficients[0];
+        StreamClock { offset: at_zero / slope, error: 1.0 / slope - 1.0, ..StreamClock::default() }
     }
 
     /// With steps before the lags of these places, by least squares of which far lags have little part.

@@ -24,6 +24,7 @@
 //! | `lag_steps` | a line with steps through these |
 //! | `binned` | means of a vector's samples over short bins |
 //! | [`clock_steadiness`] | where that clock jumps or wanders |
+//! | `clock_confirmation` | whether another sensor than the gyroscope shows it |
 //! | [`revisits`] | whether attitudes are held more than once, without which repeatability cannot be estimated |
 //!
 //! Encoders are replayed, reference attitudes differentiated and streams interpolated by `simulator`.
@@ -32,6 +33,7 @@
 
 pub mod absence;
 mod binned;
+mod clock_confirmation;
 pub mod clock_steadiness;
 pub mod common_instants;
 pub mod gain;

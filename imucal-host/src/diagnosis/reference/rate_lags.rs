@@ -10,8 +10,9 @@
 //! | c, g | what a window adds and by how much it is stronger |
 //! | s(t) | the stream's time of a row by the clock, s |
 //!
-//! Rates do not depend on an arm. Where the clock is so far off that K means nothing, it is that of windows at the lags at which the
-//! rates' sizes agree. Not modelled: a clock that changes within a window.
+//! Rates do not depend on an arm; accelerometer and magnetometer are taken the same way where they are to confirm what the rates show.
+//! Where the clock is so far off that K means nothing, it is that of windows at the lags at which the sizes agree. Not modelled: a clock
+//! that changes within a window.
 
 use std::ops::Range;
 

@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 
 use super::{
     binned::Binned,
+    clock_confirmation::confirmed,
     clock_steadiness::{Steadiness, steadiness},
     rate_lags::Rates,
 };
@@ -24,7 +25,7 @@ const MOST: f64 = 6000.0;
 const FINEST: f64 = 200.0;
 /// Step of the search within windows, s.
 const FINE: f64 = 0.02;
-/// Bins of the rates by which the clock's steadiness is judged, s.
+/// Bins of the samples by which the clock's steadiness is judged, s.
 const BIN: f64 = 0.01;
 /// Length of a window, s; how far about the line it is searched in each round, s.
 const WINDOW: f64 = 12.0;
@@ -99,19 +100,19 @@ pub fn coarse(recording: &Recording, integrity: &Integrity, stream: &Stream) -> 
         }));
     }
     let clock = refined(recording, integrity, stream, kind, lag);
-    match rates(recording, integrity, stream) {
-        Some(rates) => steadiness(&rates, &clock).map_err(|why| format!("{}: {why}", stream.name)),
-        None => Ok(Steadiness::even(clock)),
-    }
+    let of = |kind| binned(recording, integrity, stream, kind);
+    let Some(rates) = of(SensorKind::Gyr) else { return Ok(Steadiness::even(clock)) };
+    let others = [SensorKind::Acc, SensorKind::Mag].into_iter().filter_map(of);
+    confirmed(steadiness(&rates, &clock), &rates, others, &clock)
+        .map_err(|why| format!("{}: {why}", stream.name))
 }
 
-/// Rates of recording and stream; `None` without a gyroscope in both.
-fn rates(recording: &Recording, integrity: &Integrity, stream: &Stream) -> Option<Rates> {
-    let (values, usable) =
-        (&recording.sensor(SensorKind::Gyr)?.values, &integrity.sensor(SensorKind::Gyr)?.usable);
+/// Means of a sensor's samples and of its stream over short bins; `None` where one of them has none.
+fn binned(recording: &Recording, integrity: &Integrity, stream: &Stream, kind: SensorKind) -> Option<Rates> {
+    let (values, usable) = (&recording.sensor(kind)?.values, &integrity.sensor(kind)?.usable);
     let rows = recording.time.iter().zip(values).zip(usable);
     let real = rows.filter(|(_, usable)| **usable).map(|((time, value), _)| (*time, *value));
-    let ideal = stream.time.iter().copied().zip(stream.values.sensor(SensorKind::Gyr)?.iter().copied());
+    let ideal = stream.time.iter().copied().zip(stream.values.sensor(kind)?.iter().copied());
     let ideal = ideal.filter(|(_, value)| value.iter().all(|value| value.is_finite()));
     Some(Rates { real: Binned::new(real, BIN), ideal: Binned::new(ideal, BIN) })
 }
