@@ -56,8 +56,8 @@ pub(crate) fn calibrate(
     };
     let Some(acc) = &recording.acc else {
         compare_gyr(calibration, &|_| None);
-        let without = wanted.map(|_| without_accelerometer(Refusal::NoRest));
-        calibration.sensors.extend(gyr_on_rig.or(without));
+        let alone = wanted.map(|_| gyr::turns::alone());
+        calibration.sensors.extend(gyr_on_rig.or(alone));
         return None;
     };
     progress("finding rests");

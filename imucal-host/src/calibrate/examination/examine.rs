@@ -279,12 +279,17 @@ impl Scene<'_> {
     /// What the accelerometer says of rests that turn.
     pub(super) fn turning(&self, gravity: f64) -> Option<Turning> {
         let values = &self.recording.acc.as_ref()?.values;
-        let differences =
-            |parts| rest_halves::differences(values, self.usable(SensorKind::Acc), self.rests, parts);
-        let (halves, quarters) = (differences(2), differences(4));
+        let differences = |values: &[Vector3<f64>], parts| {
+            rest_halves::differences(values, self.usable(SensorKind::Acc), self.rests, parts)
+        };
+        let (halves, quarters) = (differences(values, 2), differences(values, 4));
         let total: f64 = self.rests.iter().map(|rest| self.duration(rest)).sum();
         let duration = total / self.rests.len() as f64;
-        (!quarters.is_empty()).then_some(Turning { halves, quarters, duration, gravity })
+        let turning = (!quarters.is_empty()).then_some(Turning { halves, quarters, duration, gravity })?;
+        let Some(temperatures) = &self.recording.temperature else { return Some(turning) };
+        let temperatures: Vec<Vector3<f64>> = temperatures.iter().map(|t| Vector3::x() * *t).collect();
+        let of_parts = |parts| differences(&temperatures, parts).iter().map(|d| d.x).collect::<Vec<f64>>();
+        Some(turning.without_temperature([&of_parts(2), &of_parts(4)]))
     }
 
     /// Samples that are held: a turn's rates are not those in between.

@@ -3,11 +3,15 @@
 //! ```text
 //! Δ₂ = m₂ − m₁ of a rest's halves,   Δ₄ = the same of the halves' own halves
 //! E|Δ₂|² / E|Δ₄|² = ½ of white noise, 1 of 1/f noise, 4 of a turn
+//! Δ′ = Δ − s ΔT,   s = Σ Δ₂ ΔT₂ / Σ ΔT₂²
 //! ```
+//!
+//! s is by how much the accelerometer follows the temperature T while it rests: a unit that warms drifts within each rest, and Δ′ is
+//! what is taken for a turn.
 //!
 //! A mean over an arc is shorter than its radius by |Δ₂|²/(6 r), which an accelerometer's gain takes up; and the rate,
 //! 2 |Δ₂|/(r T) for a rest of duration T, is taken for the gyroscope's bias. Source: ours. Not seen: a turn about the
-//! vertical.
+//! vertical. Not modelled: a drift with temperature that is not linear.
 
 use nalgebra::Vector3;
 
@@ -36,6 +40,18 @@ fn mean_square(differences: &[Vector3<f64>]) -> f64 {
 }
 
 impl Turning {
+    /// Without what follows the temperature, whose differences between halves and between quarters, K, are given.
+    pub fn without_temperature(mut self, [halves, quarters]: [&[f64]; 2]) -> Self {
+        let square: f64 = halves.iter().map(|of| of * of).sum();
+        let along: Vector3<f64> = self.halves.iter().zip(halves).map(|(value, of)| value * *of).sum();
+        let slope = along / square;
+        if slope.iter().all(|x| x.is_finite()) {
+            self.halves.iter_mut().zip(halves).for_each(|(value, of)| *value -= slope * *of);
+            self.quarters.iter_mut().zip(quarters).for_each(|(value, of)| *value -= slope * *of);
+        }
+        self
+    }
+
     /// The accelerometer's suspicion: by how much means are too short, against the standard error of its best gain.
     pub fn of_accelerometer(&self, gain_std: f64) -> Option<Suspicion> {
         let square = mean_square(&self.halves);
@@ -83,6 +99,24 @@ mod tests {
         assert!(turning(0.1, 0.05).of_gyroscope(0.02).is_none());
         // 1/f noise has all halves alike.
         assert!(turning(0.1, 0.1).of_gyroscope(1e-3).is_none());
+    }
+
+    #[test]
+    fn what_follows_the_temperature_is_no_turn_and_what_does_not_is() {
+        let warming: Vec<f64> = (0..20).map(|k| 0.1 * f64::from(k % 3)).collect();
+        let drift = |of: &[f64]| of.iter().map(|t| Vector3::new(0.2, -0.1, 0.3) * *t).collect::<Vec<_>>();
+        let halved: Vec<f64> = warming.iter().map(|t| 0.5 * t).collect();
+        let drifting = Turning { halves: drift(&warming), quarters: drift(&halved), ..turning(0.0, 0.0) };
+        assert!(drifting.of_gyroscope(1e-3).is_some());
+        assert!(drifting.without_temperature([&warming, &halved]).of_gyroscope(1e-9).is_none());
+        // A turn whose axis changes from rest to rest, as poses do.
+        let sign = |k: usize| if k.is_multiple_of(2) { 0.1 } else { -0.1 };
+        let mut turned = turning(0.1, 0.05);
+        turned.halves.iter_mut().enumerate().for_each(|(k, half)| half.x = sign(k));
+        assert!(turned.without_temperature([&warming, &halved]).of_gyroscope(1e-3).is_some());
+        // One temperature throughout says nothing.
+        let still = turning(0.1, 0.05).without_temperature([&[0.0; 20], &[0.0; 20]]);
+        assert!(still.of_gyroscope(1e-3).is_some());
     }
 
     #[test]

@@ -104,6 +104,15 @@ pub fn without_accelerometer(refusal: Refusal) -> SensorOutcome {
     )
 }
 
+/// The outcome of a gyroscope that was recorded without an accelerometer, an encoder and a reference.
+pub fn alone() -> SensorOutcome {
+    not_fitted(
+        Refusal::TooFewObservations { have: 0, need: LEAST_TURNS },
+        "nothing in the recording says how far the gyroscope turned; record the accelerometer as well, or a rig's encoders, or a \
+         reference attitude",
+    )
+}
+
 /// A gyroscope whose samples at rest are stuck or clipped, so that its bias is not known.
 pub fn unknown_at_rest() -> SensorOutcome {
     not_fitted(
