@@ -94,3 +94,27 @@ fn what_cannot_be_read_ends_with_2() {
     folder.run("calibrate small.toml").with(2).telling(&["small.toml", "give the samples file"]);
     assert!(!folder.path("out.csv").exists());
 }
+
+#[test]
+fn what_only_a_device_has_needs_one() {
+    let folder = Folder::with_calibration();
+    for option in ["--flash unit.flash", "--key unit.key"] {
+        folder
+            .run(&format!("verify small.csv --calibration cal.bin {option}"))
+            .with(2)
+            .telling(&["--device"]);
+    }
+}
+
+#[test]
+fn a_gyroscope_alone_is_refused_for_what_is_missing() {
+    let folder = Folder::with_calibration();
+    let rate = |k: u32| (0.01 * f64::from(k)).sin();
+    let rows = (0..3000).map(|k| {
+        format!("{:.2},{:.5},{:.5},{:.5}\n", 0.01 * f64::from(k), rate(k), rate(2 * k), rate(3 * k))
+    });
+    folder.write("gyr.csv", "t,gyr_x,gyr_y,gyr_z\n".to_owned() + &rows.collect::<String>());
+    folder.write("gyr.toml", "format = \"imucal-recording/1\"\n[units]\ngyr = \"rad/s\"\n");
+    let said = ["0 observations, 8 needed", "how far the gyroscope turned", "record the accelerometer"];
+    folder.run("calibrate gyr.csv").with(1).printing(&said);
+}

@@ -182,6 +182,23 @@ fn the_rate_of_a_target_is_that_of_its_samples() {
     assert!((ratio - 2.0).abs() < 1e-3, "{ratio}");
     folder.run("export cal.toml --noise noise.json --to sdf --rate -5").with(2);
     folder.run("export cal.toml --noise noise.json --to sdf --rate 0").with(1).telling(&["--rate: found 0"]);
+    folder.run("export cal.toml --to c-header --rate 50").with(2).telling(&["--rate: found another target"]);
+}
+
+#[test]
+fn a_header_of_a_unit_without_a_name_says_that_it_is_unknown() {
+    let folder = Folder::with_calibration();
+    let named = folder.text("cal.toml");
+    let unnamed = |line: &str| match line.split_once(" = ") {
+        Some((key @ ("name" | "serial"), _)) => format!("{key} = \"\""),
+        _ => line.to_owned(),
+    };
+    let text: Vec<String> = named.lines().map(unnamed).collect();
+    folder.write("unnamed.toml", text.join("\n") + "\n");
+    folder
+        .run("export unnamed.toml --to c-header")
+        .with(0)
+        .printing(&["Sensor unknown, serial unknown, calibrated on"]);
 }
 
 #[test]

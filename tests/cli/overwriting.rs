@@ -54,6 +54,18 @@ fn every_command_refuses_to_replace_a_file_unless_forced() {
 }
 
 #[test]
+fn a_hyphen_is_no_file_but_for_json() {
+    let folder = Folder::with_calibration();
+    let before = state(&folder);
+    for line in
+        ["calibrate small.csv --out -", "calibrate small.csv --record -", "export cal.toml --to csv --out -"]
+    {
+        folder.run(line).with(2).telling(&["found `-`", "expected the name of a file", "./-"]);
+        assert_eq!(state(&folder), before, "{line}");
+    }
+}
+
+#[test]
 fn a_calibration_replaces_its_own_outputs_of_the_same_kind() {
     let folder = Folder::with_calibration();
     let line = "calibrate small.csv --out cal.toml --record cal.bin --json cal.json";

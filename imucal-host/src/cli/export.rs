@@ -38,7 +38,7 @@ pub(super) struct Arguments {
     /// What a diagnosis found, by `imucal diagnose --json`; the targets have no place for it and list it
     #[arg(long, value_name = "DIAGNOSIS.json")]
     diagnosis: Option<PathBuf>,
-    /// Samples a second of the target; without it those of the noise's recording
+    /// Samples a second of the target; without it those of the noise's recording. For `kalibr`, `sdf` and `ros`
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
     /// Write to a file in place of the screen
@@ -64,6 +64,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     anyhow::ensure!(
         arguments.covariance.is_none() || arguments.to.takes_covariance(),
         "--covariance: found another target, expected `python`; the others have no place for covariances"
+    );
+    anyhow::ensure!(
+        arguments.rate.is_none() || arguments.to.takes_rate(),
+        "--rate: found another target, expected `kalibr`, `sdf` or `ros`; nothing in the others depends on a rate"
     );
     let covariance = arguments.covariance.as_ref();
     let covariance = covariance.map(|path| CovarianceFile::read(path, &limits, &calibration)).transpose()?;

@@ -62,6 +62,10 @@ impl Overwrite {
             inputs.iter().filter_map(|input| Some((input, input.canonicalize().ok()?))).collect();
         let (mut places, mut replaceable) = (Vec::new(), Vec::new());
         for output in outputs {
+            anyhow::ensure!(
+                output.path.as_os_str() != "-",
+                "found `-`, expected the name of a file: `--json -` alone writes to the screen; for a file of this name, give ./-"
+            );
             // What is written through replaces nothing.
             let Target::File { path: target, found } = Target::of(&output.path)? else { continue };
             let place = place(&target);

@@ -40,10 +40,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "WHERE")]
     device: Option<Address>,
     /// File that keeps the flash of qemu from one start to the next
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", requires = "device")]
     flash: Option<PathBuf>,
     /// File of the device's key: 64 hexadecimal digits
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", requires = "device")]
     key: Option<PathBuf>,
     /// Compare although the calibration was made for another serial
     #[arg(long, alias = "force")]

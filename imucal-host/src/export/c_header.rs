@@ -42,7 +42,10 @@ pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
 }
 
 fn described(calibration: &StoredCalibration) -> String {
-    let clean = |text: &str| text.replace("*/", "* /").replace(['\n', '\\'], " ");
+    let clean = |text: &str| match text {
+        "" => "unknown".to_owned(),
+        text => text.replace("*/", "* /").replace(['\n', '\\'], " "),
+    };
     let sensor = &calibration.sensor;
     format!(
         "Sensor {}, serial {}, calibrated on {}.",

@@ -103,6 +103,11 @@ impl Target {
         self == Self::Python
     }
 
+    /// Whether its file depends on how fast the target samples.
+    pub fn takes_rate(self) -> bool {
+        matches!(self, Self::Kalibr | Self::Sdf | Self::Ros)
+    }
+
     /// A line of comment.
     fn comment(self, line: &str) -> String {
         match self {

@@ -106,7 +106,8 @@ pub enum ReadError {
     TooManySamples { path: PathBuf, limit: Size },
     /// Too many or too few fields.
     #[error(
-        "{path}, {place}: found {found} fields, expected {expected} as in the header; correct or remove the line"
+        "{path}, {place}: found {found} field{}, expected {expected} as in the header; correct or remove the line",
+        if *found == 1 { "" } else { "s" }
     )]
     FieldCount { path: PathBuf, place: Place, found: usize, expected: usize },
     /// Text where a number should be.
