@@ -18,6 +18,14 @@ impl Dose {
         !self.effect.is_off(&self.values)
     }
 
+    /// The same effect at no size, its shape as it is.
+    #[must_use]
+    pub fn without_amplitudes(&self) -> Self {
+        let mut values = self.values.clone();
+        self.effect.amplitudes().for_each(|at| values[at] = 0.0);
+        Self { effect: self.effect, values }
+    }
+
     /// An effect of a size, in multiples of its usual one, in a run of `duration` s.
     ///
     /// - A single amplitude is size × prior scale; one that cannot be negative takes the size without its sign.

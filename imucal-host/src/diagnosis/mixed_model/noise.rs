@@ -98,6 +98,23 @@ impl Noise {
         self.sensors[kind as usize].white.iter().sum::<f64>() / 3.0
     }
 
+    /// White noise of a sensor's sample in motion, that of the noisiest axis.
+    pub fn largest(&self, kind: SensorKind) -> f64 {
+        self.sensors[kind as usize].moving.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// With all of it smaller by a factor.
+    #[must_use]
+    pub fn scaled(mut self, by: f64) -> Self {
+        for sensor in &mut self.sensors {
+            for sigma in sensor.white.iter_mut().chain(&mut sensor.moving).chain(&mut sensor.drift) {
+                *sigma *= by;
+            }
+            sensor.scatter *= by;
+        }
+        self
+    }
+
     /// −ln of the prior of all that are as likely, but for a constant.
     pub fn neg_log_prior(&self) -> f64 {
         self.sensors.iter().map(SensorNoise::neg_log_prior).sum()

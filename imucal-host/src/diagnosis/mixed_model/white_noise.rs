@@ -10,10 +10,13 @@ use crate::{
         SensorKind,
         order_statistics::{MEDIAN_SQUARE, median, variance_without_largest_tenth},
     },
+    simulator::replay::readings_noise,
 };
 
 /// Pieces of which neighbours are compared, s.
 const PIECE: f64 = 0.1;
+/// Noise that is so many times that of a sample is not the sensor's.
+pub const MISFIT: f64 = 10.0;
 
 impl Weighing<'_> {
     /// Noise from what samples do within a tenth of a second, and a first guess of the drift.
@@ -29,6 +32,12 @@ impl Weighing<'_> {
             SensorNoise { white, moving, drift, slow: USUAL, scatter, breadth: 0.0 }
         });
         Noise { sensors }
+    }
+
+    /// Whether a sensor's white noise is far more than its samples have: along a stream, where these hold what the source does not.
+    pub fn holds_misfit(&self, noise: &Noise, kind: SensorKind) -> bool {
+        let sample = self.scene.recording.sensor(kind).map_or(0.0, |triple| readings_noise(&triple.values));
+        self.scene.settings.source.followed && sample > 0.0 && noise.largest(kind) > MISFIT * sample
     }
 
     /// At rest: what the samples do, and on no rig what the residual does as well, since a reference trembles with the hand.

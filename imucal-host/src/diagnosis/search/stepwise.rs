@@ -22,6 +22,11 @@ use crate::{
     simulator::Dose,
 };
 
+/// In so much of a noise, effects are as large as the data alone would have them.
+const RELEASED: f64 = 0.01;
+/// A fit leaves far less that leaves less than this share of the noise.
+const FAR_LESS: f64 = 0.5;
+
 /// A search that has come to its end.
 pub struct Solution<'s> {
     /// The best set, with its noise.
@@ -151,9 +156,38 @@ impl<'s> Solution<'s> {
         }
         let fit = refit(scene, self.fit.clone().with(scene, doses)?, Some(&next.noise))?;
         next.noise = with_white(&next.noise, &found_in.weighing.white(&fit.residual));
+        let fit = match released(found_in, &fit, &next.noise)? {
+            Some((free, lower)) => {
+                next.noise = lower;
+                free
+            }
+            None => fit,
+        };
         let linear = Linearisation::new(scene, candidates, &fit, &next.noise, Some(&self.linear))?;
         Ok(Self { best: next, none: self.none.clone(), fit, linear, idle: self.idle.clone() })
     }
+}
+
+/// A fit whose effects are not held at their usual sizes, and its noise; `None` unless the noise holds a misfit of which that fit leaves
+/// far less. In a noise as large as what an effect does, the data say little against its usual size. The fit begins without the effects
+/// and with a perfect sensor, whose gain a fit without them may have made many times too large.
+fn released(
+    found_in: &Linearisation<'_>,
+    fit: &Fit,
+    noise: &Noise,
+) -> Result<Option<(Fit, Noise)>, DiagnosisError> {
+    let held = SensorKind::ALL.map(|kind| found_in.weighing.holds_misfit(noise, kind));
+    if !held.contains(&true) {
+        return Ok(None);
+    }
+    let begins_again = |dose: &Dose| matches!(dose.effect.sensors, [kind] if held[*kind as usize]);
+    let begun = |dose: &Dose| if begins_again(dose) { dose.without_amplitudes() } else { dose.clone() };
+    let doses = fit.doses.iter().map(begun).collect();
+    let start = fit.clone().with(found_in.scene, doses)?;
+    let free = refit(found_in.scene, start, Some(&noise.clone().scaled(RELEASED)))?;
+    let lower = with_white(noise, &found_in.weighing.white(&free.residual));
+    let is_far_less = |kind| lower.largest(kind) < FAR_LESS * noise.largest(kind);
+    Ok(SensorKind::ALL.into_iter().any(is_far_less).then_some((free, lower)))
 }
 
 /// An effect's parameters at which its signature was taken; a shape is refined against what is fitted without it.
@@ -253,7 +287,15 @@ fn with_white(noise: &Noise, white: &Noise) -> Noise {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{diagnosis::mixed_model::noise::SensorNoise, effect};
+    use crate::{
+        diagnosis::{
+            Source, library::candidates::Setting, mixed_model::noise::SensorNoise,
+            screening::preparation::Preparation, settings::Settings,
+        },
+        effect,
+        recording::Stream,
+        simulator::robot::{RobotKind, RobotScene},
+    };
 
     fn noise(white: f64, drift: f64) -> Noise {
         let sensor = SensorNoise {
@@ -281,5 +323,46 @@ mod tests {
         let found = with_white(&old, &better).sensors[0];
         assert_eq!((found.white, found.moving, found.drift), ([0.25; 3], [0.5; 3], [0.5; 2]));
         assert_eq!(with_white(&old, &worse), old);
+    }
+
+    #[test]
+    fn an_arm_that_its_usual_length_holds_back_is_released_where_the_noise_holds_a_misfit() {
+        let lever = effect::find("acc.lever_arm").unwrap();
+        let arm = [1.0, 0.5, -0.5];
+        let doses = vec![Dose { effect: lever, values: arm.to_vec() }];
+        let flight =
+            RobotScene { kind: RobotKind::Flying, duration: 60.0, doses, seed: 2, ..RobotScene::default() };
+        let pair = flight.record("arm").unwrap();
+        let (stream, settings) = (Stream::of(&pair.simulated), Settings::preset(Source::Simulator));
+        let preparation = Preparation::new(&pair.real, stream.as_ref(), None, &settings).unwrap();
+        let (usable, movement) = (preparation.usable.clone(), &*preparation.movement);
+        let scene = ForwardModel::new(&pair.real, usable, movement, preparation.triads, &settings);
+        let setting = Setting {
+            kinds: &scene.kinds,
+            thermometer: false,
+            calibrated: &[],
+            provided: settings.source,
+            field_known: true,
+        };
+        let candidates = Candidates::new(&setting, &[], &[]);
+        // A gain that a fit without the arm has made far too large, and an arm of the usual length.
+        let value = |effect: &Effect| if effect.id == "acc.scale" { 8.0 } else { 0.0 };
+        let of = |effect: &&'static Effect| Dose {
+            effect: *effect,
+            values: vec![value(effect); effect.parameters.len()],
+        };
+        let held = Dose { effect: lever, values: vec![0.02, 0.01, -0.01] };
+        let doses = candidates.baseline.iter().map(of).chain([held]).collect();
+        let fit = Fit::of(&scene, doses).unwrap();
+        let linear = Linearisation::fitted_alone(&scene, &candidates, &fit).unwrap();
+        let mut noise = linear.weighing.white(&fit.residual);
+        let acc = &mut noise.sensors[SensorKind::Acc as usize];
+        (acc.white, acc.moving) = ([30.0; 3], [30.0; 3]);
+        let (free, lower) = released(&linear, &fit, &noise).unwrap().expect("it leaves far less");
+        let found = &free.doses.iter().find(|dose| dose.effect == lever).unwrap().values;
+        // The unit's axes are off by up to a degree.
+        assert!(found.iter().zip(arm).all(|(found, arm)| (found - arm).abs() < 0.04), "{found:?}");
+        assert!(lower.largest(SensorKind::Acc) < 1.0, "{lower:?}");
+        assert!(released(&linear, &free, &lower).unwrap().is_none(), "nothing is held any more");
     }
 }

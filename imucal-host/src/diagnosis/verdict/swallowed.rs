@@ -7,14 +7,11 @@
 //! Not modelled: noise that has its power below the rate of the blocks alone.
 
 use crate::{
-    diagnosis::finding::Gap,
+    diagnosis::{finding::Gap, mixed_model::white_noise::MISFIT},
     effect::si,
     recording::{Recording, SensorKind},
     simulator::replay::readings_noise,
 };
-
-/// A block's noise is not that of the sensor from so many times that of a sample on.
-const FACTOR: f64 = 10.0;
 
 /// What is said of each sensor whose noise has taken in a part of the gap.
 pub fn remarks(recording: &Recording, gap: &[Gap]) -> Vec<String> {
@@ -22,7 +19,7 @@ pub fn remarks(recording: &Recording, gap: &[Gap]) -> Vec<String> {
         let sample = readings_noise(&recording.sensor(kind)?.values);
         let of_kind = gap.iter().filter(|row| row.sensor == kind.prefix());
         let block = of_kind.map(|row| row.noise_floor).fold(0.0, f64::max);
-        (sample > 0.0 && block > FACTOR * sample).then(|| {
+        (sample > 0.0 && block > MISFIT * sample).then(|| {
             format!(
                 "the noise of the {kind} would have to be {block:.2e} {unit} in a mean over a block, and its samples \
                  have {sample:.2e} {unit}: it holds a part of the gap that no effect explains",

@@ -123,6 +123,21 @@ mod tests {
     }
 
     #[test]
+    fn a_slow_gyroscope_is_no_clock_that_wanders() {
+        for kind in [RobotKind::Wheeled, RobotKind::Flying] {
+            let pair = scene(kind, Some(("gyr.bandwidth", vec![0.08, 0.0])), 3).record("slow").unwrap();
+            let diagnosis = diagnosed(&pair.real, &pair.simulated);
+            let found = ids(&diagnosis);
+            assert!(
+                cause(&diagnosis, "gyr.bandwidth").is_some(),
+                "{kind:?}: {found:?} {:?}",
+                diagnosis.remarks
+            );
+            assert!(cause(&diagnosis, "clk.wander").is_none(), "{kind:?}: {found:?}");
+        }
+    }
+
+    #[test]
     fn a_clock_that_runs_evenly_neither_jumps_nor_wanders() {
         for (seed, kind) in KINDS.into_iter().cycle().take(9).enumerate() {
             let pair = scene(kind, None, 20 + seed as u64).record("even").unwrap();
