@@ -17,6 +17,8 @@ use nalgebra::{Rotation3, Vector3};
 
 /// Headings from which a fit is started: one is within 23° of the base's.
 const STARTS: usize = 8;
+/// What the known field would have to be a multiple by where what was found lies on the other side of the outer axis.
+const REVERSED: f64 = -1.0;
 
 /// A heading of the base that turns the known field into the measured one, as far as this is determined.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +30,11 @@ pub enum Heading {
 }
 
 /// The turns about the vertical that bring the known field into the plane of the outer axis and the `found` one, on the side of the axis
-/// where that is: two, one, or, as an error, how many times as large the known one would have to be.
+/// where that is: two or one.
+///
+/// # Errors
+///
+/// Where there is none: how many times as large the known field would have to be across the axis, negative where reversed.
 pub fn headings(known: &Vector3<f64>, outer: &Vector3<f64>, found: &Vector3<f64>) -> Result<Vec<f64>, f64> {
     let normal = outer.cross(found);
     let a = normal.xy().dot(&known.xy());
@@ -41,7 +47,9 @@ pub fn headings(known: &Vector3<f64>, outer: &Vector3<f64>, found: &Vector3<f64>
     let across = found - outer * outer.dot(found);
     let wrapped = |angle: f64| angle.sin().atan2(angle.cos());
     let turns = [middle - half, middle + half].map(wrapped);
-    Ok(turns.into_iter().filter(|angle| turned(known, *angle).dot(&across) > 0.0).collect())
+    let turns: Vec<f64> =
+        turns.into_iter().filter(|angle| turned(known, *angle).dot(&across) > 0.0).collect();
+    if turns.is_empty() { Err(REVERSED) } else { Ok(turns) }
 }
 
 /// The known field, turned about the vertical.
@@ -75,5 +83,10 @@ mod tests {
         // 25 µT cannot have a part of 50 µT across the axis.
         let found = headings(&known, &Vector3::x(), &Vector3::new(0.0, 50.0, 40.0));
         assert!(found.as_ref().is_err_and(|share| (share - 2.0).abs() < 0.01), "{found:?}");
+        // Nor can one that dips downwards point up.
+        assert_eq!(headings(&known, &Vector3::x(), &Vector3::new(25.0, -2.0, -40.0)), Err(-1.0));
+        // A field without a horizontal part has no heading.
+        let found = headings(&(Vector3::z() * 40.0), &Vector3::x(), &Vector3::new(0.0, 3.0, 40.0));
+        assert_eq!(found, Err(f64::INFINITY));
     }
 }
