@@ -18,7 +18,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     clock_steadiness::Steadiness,
-    lag_steps::{FEWEST, StepFit},
+    lag_steps::{FAR, FEWEST, StepFit},
     rate_lags::{Lag, Rates},
 };
 use crate::simulator::StreamClock;
@@ -29,8 +29,8 @@ const SURE: f64 = 3.0;
 const OVERLAP: f64 = 2.0;
 /// Lags that scatter by less than this about a line, s, are those of an even clock where the rates cannot be followed at all,
 const STEADY: f64 = 1e-3;
-/// if so many of the windows in which the unit turns briskly have one.
-const FOUND: f64 = 0.5;
+/// if so many of the windows in which the unit turns briskly have one that is no further off than [`FAR`] times as much.
+const FOUND: f64 = 0.8;
 
 /// What was judged by the rates, unless another sensor's lags contradict it: then an even clock by that sensor.
 ///
@@ -59,7 +59,7 @@ pub(super) fn confirmed(
         }
         Err(_) => {
             let least = FOUND * rates.brisk_windows() as f64;
-            lags.iter().find(|lags| lags.len() as f64 >= least && is_steady(lags))
+            lags.iter().find(|lags| is_steady(lags, least))
         }
     };
     match even.and_then(|lags| StepFit::of(lags, &[])) {
@@ -80,9 +80,12 @@ fn lags(of: &Rates, coarse: &StreamClock) -> Option<Vec<Lag>> {
     Some(of.aligned(&clock)?.lags(&clock).into_iter().map(against_coarse).collect())
 }
 
-/// Lags that lie on a line.
-fn is_steady(lags: &[Lag]) -> bool {
-    lags.len() >= 2 * FEWEST && StepFit::of(lags, &[]).is_some_and(|line| line.left < STEADY)
+/// Lags that lie on a line, so many of them at least: a clock that loses rows late has most of them on one as well.
+fn is_steady(lags: &[Lag], least: f64) -> bool {
+    let Some(line) = StepFit::of(lags, &[]).filter(|_| lags.len() >= 2 * FEWEST) else { return false };
+    let off = |lag: &Lag| lag.value - line.coefficients[0] - line.coefficients[1] * lag.time;
+    let near = lags.iter().filter(|lag| off(lag).abs() < FAR * STEADY).count();
+    line.left < STEADY && near as f64 >= least
 }
 
 /// How much of an unevenness a sensor's lags show.
@@ -185,5 +188,8 @@ mod tests {
         let found = confirmed_by(lost(), sensor(|time| 0.09 + 2e-5 * time, 0.0)).unwrap();
         assert!(found.is_even() && (found.clock.offset - 0.09).abs() < 1e-4, "{found:?}");
         assert_eq!(confirmed_by(lost(), sensor(wander, 0.0)), lost());
+        // Rows that are lost in the last quarter leave most lags on a line.
+        let late = |time: f64| 0.08 * (time - 85.0).max(0.0);
+        assert_eq!(confirmed_by(lost(), sensor(late, 0.0)), lost());
     }
 }
