@@ -107,7 +107,7 @@ fn calibrated(simulation: &Simulation, skip: &[SensorKind]) -> Calibration {
 /// How far the magnetometer's gain is off, in standard errors of its entries, the worst.
 fn worst_gain(simulation: &Simulation, found: &Calibration) -> f64 {
     let outcome = found.sensor(SensorKind::Mag).expect("it was recorded");
-    let fit = outcome.accepted().unwrap_or_else(|| panic!("not accepted: {outcome:?}"));
+    let fit = outcome.accepted().unwrap_or_else(|| panic!("not accepted: {:?}", outcome.verdict));
     let unit = simulation.unit_under_test();
     let truth = unit.c_t_q.transpose() * unit.triad(SensorKind::Mag).triad.gain;
     (fit.triad.gain - truth).component_div(&fit.gain_std).amax()

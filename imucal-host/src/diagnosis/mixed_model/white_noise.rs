@@ -34,10 +34,12 @@ impl Weighing<'_> {
         Noise { sensors }
     }
 
-    /// Whether a sensor's white noise is far more than its samples have: along a stream, where these hold what the source does not.
+    /// Whether a sensor's white noise is far more than that of its samples, so that a part of the gap is in it. Along a stream alone:
+    /// a hand's tremor is noise of the movement.
     pub fn holds_misfit(&self, noise: &Noise, kind: SensorKind) -> bool {
-        let sample = self.scene.recording.sensor(kind).map_or(0.0, |triple| readings_noise(&triple.values));
-        self.scene.settings.source.followed && sample > 0.0 && noise.largest(kind) > MISFIT * sample
+        let sensor = self.scene.recording.sensor(kind).filter(|_| self.scene.settings.source.followed);
+        let sample = sensor.map_or(0.0, |triple| readings_noise(&triple.values));
+        sample > 0.0 && noise.largest(kind) > MISFIT * sample
     }
 
     /// At rest: what the samples do, and on no rig what the residual does as well, since a reference trembles with the hand.
