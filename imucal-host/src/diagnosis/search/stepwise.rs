@@ -347,10 +347,8 @@ mod tests {
         let candidates = Candidates::new(&setting, &[], &[]);
         // A gain that a fit without the arm has made far too large, and an arm of the usual length.
         let value = |effect: &Effect| if effect.id == "acc.scale" { 8.0 } else { 0.0 };
-        let of = |effect: &&'static Effect| Dose {
-            effect: *effect,
-            values: vec![value(effect); effect.parameters.len()],
-        };
+        let of =
+            |effect: &&'static Effect| Dose { effect, values: vec![value(effect); effect.parameters.len()] };
         let held = Dose { effect: lever, values: vec![0.02, 0.01, -0.01] };
         let doses = candidates.baseline.iter().map(of).chain([held]).collect();
         let fit = Fit::of(&scene, doses).unwrap();
