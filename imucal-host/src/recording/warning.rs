@@ -178,6 +178,17 @@ pub enum Warning {
         /// Line of the header, where the file has lines.
         line: Option<u64>,
     },
+    /// A rig's axes without the angles about them.
+    #[error(
+        "{path}{}: [rig] of the manifest gives axes, but the columns `gimbal_outer`, `gimbal_middle` and `gimbal_inner`, which hold the angles about them, are missing; the recording is used as one without a rig; add the columns, or delete axes of [rig]",
+        at_line(.line)
+    )]
+    RigWithoutAngles {
+        /// Samples file.
+        path: PathBuf,
+        /// Line of the header, where the file has lines.
+        line: Option<u64>,
+    },
     /// Variables of a MAT-file that are no columns of samples.
     #[error(
         "{path}: left out {}, expected numbers in {rows} rows{}", listed(.others), unpacked(.others)

@@ -232,6 +232,10 @@ pub(crate) fn note_columns(recording: &mut Recording, line: Option<u64>) {
     if recording.position.is_some() && recording.reference.is_none() && recording.gimbal.is_none() {
         recording.warnings.push(Warning::PositionAlone { path: recording.path.clone(), line });
     }
+    let has_axes = recording.manifest.rig.as_ref().is_some_and(|rig| rig.axes.is_some());
+    if has_axes && recording.gimbal.is_none() && recording.simulated.is_none() {
+        recording.warnings.push(Warning::RigWithoutAngles { path: recording.path.clone(), line });
+    }
     if SensorKind::ALL.iter().all(|kind| recording.sensor(*kind).is_none()) {
         let path = recording.path.clone();
         recording.warnings.push(match recording.simulated {
@@ -324,6 +328,19 @@ mod tests {
         let position = alone.read().position.unwrap()[0];
         assert!(position[0] == 1.0 && position[1].is_nan() && position[2].is_nan());
         assert_eq!(with(",ref_qw,ref_qx,ref_qy,ref_qz", ",1,0,0,0").warnings().len(), 1);
+    }
+
+    #[test]
+    fn a_rig_s_axes_without_angles_are_warned_about() {
+        let warnings = |rig: &str, columns: &str, row: &str| {
+            let samples = format!("t,acc_x,acc_y,acc_z{columns}\n0,0,0,9.8{row}\n");
+            Fixture::new("run.csv", rig, samples).warnings()
+        };
+        let rig = "[rig]\nkind = \"flight-motion-simulator\"\naxes = [\"z\", \"y\", \"x\"]\n";
+        let without = warnings(rig, "", "");
+        assert_says(&without[0], &["run.csv, line 1", "[rig]", "gimbal_outer", "without a rig"]);
+        assert!(warnings(rig, ",gimbal_outer,gimbal_middle,gimbal_inner", ",0,0,0").is_empty());
+        assert!(warnings("[rig]\nkind = \"hand\"\n", "", "").is_empty());
     }
 
     #[test]
