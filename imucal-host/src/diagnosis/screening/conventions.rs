@@ -24,6 +24,7 @@ mod noise_burst;
 mod other_movement;
 pub(super) mod pairs;
 mod saturation;
+mod stream_noise;
 mod stuck_samples;
 #[cfg(test)]
 mod tests;
@@ -205,6 +206,9 @@ pub fn check(
         let mut own = Conventions::default();
         if found.beyond_movement != Some(sensor.sensor) {
             of_itself(recording, motion, sensor, &mut own);
+            if source.followed {
+                stream_noise::check(recording, integrity, motion, sensor, &mut own);
+            }
         }
         own
     };

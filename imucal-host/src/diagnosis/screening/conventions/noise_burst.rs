@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::{Conventions, Finding, SURE};
-use crate::recording::{Triple, check::integrity::SensorIntegrity, median};
+use crate::recording::{SensorKind, Triple, check::integrity::SensorIntegrity, median};
 
 const WEIGHTS: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 /// Neighbouring differences are alike: so many of them count as one. 1 + 2 Σ ρ², with ρ = −56, 28, −8 and 1 of 70.
@@ -50,7 +50,80 @@ struct Window {
     level: f64,
 }
 
-/// Looks at one sensor. `moves` is the table's rate at a row, rad/s.
+/// A stretch of larger noise.
+pub(crate) struct Burst {
+    /// By what share the noise is larger, and the standard error of that.
+    excess: (f64, f64),
+    /// When it begins, s, and when it ends, with standard errors; `None` where it lasts to the recording's end.
+    ends: [(Option<f64>, Option<f64>); 2],
+    /// All stretches counted.
+    p_value: f64,
+    /// Its rows.
+    pub(crate) rows: Range<usize>,
+}
+
+impl Burst {
+    /// In one sensor. `moves` is the table's rate at a row, rad/s.
+    pub(crate) fn find(
+        time: &[f64],
+        triple: &Triple,
+        sensor: &SensorIntegrity,
+        moves: &dyn Fn(usize) -> f64,
+    ) -> Option<Self> {
+        let fresh = fresh(triple, sensor);
+        let interval = interval(time, &fresh)?;
+        let bends = bends(time, &triple.values, &fresh, interval);
+        let mut windows = windows(time, &bends, interval, moves);
+        let usual = [false, true].map(|state| normalise(&bends, &mut windows, state));
+        windows.retain(|window| window.level.is_finite());
+        if let [Some(rest), Some(motion)] = usual
+            && rest.iter().zip(motion.iter()).any(|(rest, motion)| *motion > SAME * rest)
+            && windows.iter().filter(|window| !window.moves).count() >= WINDOWS
+        {
+            windows.retain(|window| !window.moves);
+        }
+        let stretch = scan(&windows)?;
+        let (from, to) = (windows[stretch.from].bends.start, windows[stretch.to - 1].bends.end);
+        let burst = Levels::of(&bends, from, to)?;
+        // It began after the window before, and ended before the one behind.
+        let before = stretch.from.checked_sub(1).map_or(0, |at| windows[at].bends.start);
+        let behind = windows.get(stretch.to).map_or(bends.len(), |window| window.bends.end);
+        let first = before..windows[stretch.from].bends.end;
+        let last = windows[stretch.to - 1].bends.start..behind;
+        let (from, to) = burst.ends(&bends, first, last);
+        let burst = Levels::of(&bends, from, to)?;
+        let excess = burst.ratio.sqrt() - 1.0;
+        let material = crate::effect::find(&format!("{}.noise_burst", sensor.sensor))
+            .and_then(|effect| effect.parameters.first().map(|p| p.material));
+        if stretch.p_value > SURE || material.is_none_or(|material| excess < material) {
+            return None;
+        }
+        let at = |bend: usize| bends.get(bend).and_then(|bend| time.get(bend.row)).copied();
+        // A burst that lasts to the end of the recording has not ended.
+        let end = if to < bends.len() { at(to) } else { None };
+        let instant = Some(interval * (2.0 + CHANGE * ALIKE / burst.information()));
+        Some(Self {
+            excess: (excess, burst.excess_std()),
+            ends: [(at(from), instant), (end, end.and(instant))],
+            p_value: stretch.p_value,
+            rows: bends.get(from)?.row..bends.get(to.checked_sub(1)?)?.row + 1,
+        })
+    }
+
+    /// As an effect of the catalogue.
+    pub(crate) fn finding(&self, kind: SensorKind) -> Option<Finding> {
+        let (excess, std_error) = self.excess;
+        let values = [(Some(excess), Some(std_error)), self.ends[0], self.ends[1]];
+        Finding::new(&format!("{kind}.noise_burst"), &values, self.p_value)
+    }
+
+    /// How many times as large as elsewhere the noise is.
+    pub(crate) fn times(&self) -> f64 {
+        1.0 + self.excess.0
+    }
+}
+
+/// Looks at one sensor on a table. `moves` is the table's rate at a row, rad/s.
 pub(crate) fn check(
     time: &[f64],
     triple: &Triple,
@@ -58,59 +131,41 @@ pub(crate) fn check(
     moves: &dyn Fn(usize) -> f64,
     found: &mut Conventions,
 ) {
-    let fresh = fresh(triple, sensor);
-    let Some(interval) = median(fresh.windows(2).map(|pair| time[pair[1]] - time[pair[0]]).collect()) else {
-        return;
-    };
-    let bends = bends(time, triple, &fresh, interval);
-    let mut windows = windows(time, &bends, interval, moves);
-    let usual = [false, true].map(|state| normalise(&bends, &mut windows, state));
-    windows.retain(|window| window.level.is_finite());
-    if let [Some(rest), Some(motion)] = usual
-        && rest.iter().zip(motion.iter()).any(|(rest, motion)| *motion > SAME * rest)
-        && windows.iter().filter(|window| !window.moves).count() >= WINDOWS
-    {
-        windows.retain(|window| !window.moves);
-    }
-    let Some(stretch) = scan(&windows) else { return };
-    let (from, to) = (windows[stretch.from].bends.start, windows[stretch.to - 1].bends.end);
-    let Some(burst) = Levels::of(&bends, from, to) else { return };
-    // It began after the window before, and ended before the one behind.
-    let before = stretch.from.checked_sub(1).map_or(0, |at| windows[at].bends.start);
-    let behind = windows.get(stretch.to).map_or(bends.len(), |window| window.bends.end);
-    let first = before..windows[stretch.from].bends.end;
-    let last = windows[stretch.to - 1].bends.start..behind;
-    let (from, to) = burst.ends(&bends, first, last);
-    let Some(burst) = Levels::of(&bends, from, to) else { return };
-    let excess = burst.ratio.sqrt() - 1.0;
-    let kind = sensor.sensor;
-    let material = crate::effect::find(&format!("{kind}.noise_burst"))
-        .and_then(|effect| effect.parameters.first().map(|p| p.material));
-    if stretch.p_value > SURE || material.is_none_or(|material| excess < material) {
-        return;
-    }
-    let at = |bend: usize| bends.get(bend).and_then(|bend| time.get(bend.row)).copied();
-    // A burst that lasts to the end of the recording has not ended.
-    let end = if to < bends.len() { at(to) } else { None };
-    let instant = Some(interval * (2.0 + CHANGE * ALIKE / burst.information()));
-    let values = [(Some(excess), Some(burst.excess_std())), (at(from), instant), (end, end.and(instant))];
-    found.findings.extend(Finding::new(&format!("{kind}.noise_burst"), &values, stretch.p_value));
+    let burst = Burst::find(time, triple, sensor, moves);
+    found.findings.extend(burst.and_then(|burst| burst.finding(sensor.sensor)));
+}
+
+/// Mean square noise of a sensor in some rows and in all others, by axis, without the largest quarters; `None` where either has too few.
+pub(crate) fn inside_and_outside(
+    time: &[f64],
+    values: &[Vector3<f64>],
+    taken: &[usize],
+    rows: &Range<usize>,
+) -> Option<[Vector3<f64>; 2]> {
+    let bends = bends(time, values, taken, interval(time, taken)?);
+    let (inside, outside): (Vec<Bend>, Vec<Bend>) =
+        bends.into_iter().partition(|bend| rows.contains(&bend.row));
+    (inside.len() >= ROWS && outside.len() >= ROWS).then(|| [trimmed(&inside), trimmed(&outside)])
+}
+
+/// The median interval of some rows, s.
+fn interval(time: &[f64], rows: &[usize]) -> Option<f64> {
+    median(rows.windows(2).map(|pair| time[pair[1]] - time[pair[0]]).collect())
 }
 
 /// Usable rows that do not repeat the one before them: a slow sensor or a stuck transport shows no noise there.
-fn fresh(triple: &Triple, sensor: &SensorIntegrity) -> Vec<usize> {
+pub(crate) fn fresh(triple: &Triple, sensor: &SensorIntegrity) -> Vec<usize> {
     let rows = (1..triple.values.len()).filter(|row| triple.values[*row] != triple.values[row - 1]);
     rows.filter(|row| sensor.usable[*row]).collect()
 }
 
-fn bends(time: &[f64], triple: &Triple, fresh: &[usize], interval: f64) -> Vec<Bend> {
+fn bends(time: &[f64], values: &[Vector3<f64>], rows: &[usize], interval: f64) -> Vec<Bend> {
     let even = |rows: &&[usize]| (time[rows[4]] - time[rows[0]] - 4.0 * interval).abs() < 0.5 * interval;
-    fresh
-        .windows(5)
+    rows.windows(5)
         .filter(even)
         .map(|rows| {
             let bend: Vector3<f64> =
-                rows.iter().zip(WEIGHTS).map(|(row, weight)| triple.values[*row] * weight).sum();
+                rows.iter().zip(WEIGHTS).map(|(row, weight)| values[*row] * weight).sum();
             Bend { row: rows[2], square: bend.component_mul(&bend) / 70.0 }
         })
         .collect()
