@@ -141,18 +141,6 @@ impl Noise {
         }
         self
     }
-
-    /// With white noise that is no more than another's: a misfit that a fit has gone through is no noise.
-    #[must_use]
-    pub fn at_most(mut self, other: &Self) -> Self {
-        for (own, other) in self.sensors.iter_mut().zip(&other.sensors) {
-            for axis in 0..3 {
-                own.white[axis] = own.white[axis].min(other.white[axis]);
-                own.moving[axis] = own.moving[axis].min(other.moving[axis]);
-            }
-        }
-        self
-    }
 }
 
 /// What weighs the blocks: the scene, and what each sensor is given there.

@@ -18,6 +18,20 @@ const PIECE: f64 = 0.1;
 /// Noise that is so many times that of a sample is not the sensor's.
 pub const MISFIT: f64 = 10.0;
 
+impl Noise {
+    /// With white noise that is no more than another's: a misfit that a fit has gone through is no noise.
+    #[must_use]
+    pub fn at_most(mut self, other: &Self) -> Self {
+        for (own, other) in self.sensors.iter_mut().zip(&other.sensors) {
+            for axis in 0..3 {
+                own.white[axis] = own.white[axis].min(other.white[axis]);
+                own.moving[axis] = own.moving[axis].min(other.moving[axis]);
+            }
+        }
+        self
+    }
+}
+
 impl Weighing<'_> {
     /// Noise from what samples do within a tenth of a second, and a first guess of the drift.
     pub fn white(&self, residual: &Means) -> Noise {
@@ -40,6 +54,22 @@ impl Weighing<'_> {
         let sensor = self.scene.recording.sensor(kind).filter(|_| self.scene.settings.source.followed);
         let sample = sensor.map_or(0.0, |triple| readings_noise(&triple.values));
         sample > 0.0 && noise.largest(kind) > MISFIT * sample
+    }
+
+    /// A noise whose drift begins again, from what the samples do, where it is many times all that a fit leaves: it was estimated
+    /// without the effects of that fit, and a descent of a few steps would not leave it.
+    pub fn begun_again(&self, mut noise: Noise, residual: &Means) -> Noise {
+        let white = self.white(residual);
+        for kind in SensorKind::ALL {
+            let Some(left) = &residual[kind as usize] else { continue };
+            let square = left.iter().map(Vector3::norm_squared).sum::<f64>() / (3 * left.len().max(1)) as f64;
+            let sensor = &mut noise.sensors[kind as usize];
+            if sensor.drift.iter().any(|drift| *drift > MISFIT * square.sqrt()) {
+                let begun = white.sensors[kind as usize];
+                (sensor.drift, sensor.slow, sensor.breadth) = (begun.drift, begun.slow, begun.breadth);
+            }
+        }
+        noise
     }
 
     /// At rest: what the samples do, and on no rig what the residual does as well, since a reference trembles with the hand.
@@ -118,5 +148,30 @@ impl Weighing<'_> {
             squares.iter_mut().zip(bends.iter()).for_each(|(squares, bend)| squares.push(*bend));
         }
         squares
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(white: f64, drift: f64) -> Noise {
+        let sensor = SensorNoise {
+            white: [white; 3],
+            moving: [2.0 * white; 3],
+            drift: [drift; 2],
+            slow: 120.0,
+            scatter: 0.0,
+            breadth: 0.0,
+        };
+        Noise { sensors: [sensor; 3] }
+    }
+
+    #[test]
+    fn white_noise_is_lowered_by_a_better_fit_and_never_raised() {
+        let (old, better, worse) = (noise(1.0, 0.5), noise(0.25, 0.1), noise(4.0, 9.0));
+        let found = old.clone().at_most(&better).sensors[0];
+        assert_eq!((found.white, found.moving, found.drift), ([0.25; 3], [0.5; 3], [0.5; 2]));
+        assert_eq!(old.clone().at_most(&worse), old);
     }
 }

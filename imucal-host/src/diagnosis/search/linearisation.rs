@@ -17,6 +17,8 @@ use crate::{
             evidence::Projected,
             grid::{Grid, NuisanceColumns},
             grid_posterior::GridPosterior,
+            nonlinear,
+            nonlinear::Backdrop,
         },
         mixed_model::{
             design::{Design, DesignProducts, Normal, Signature},
@@ -267,6 +269,24 @@ impl<'s> Linearisation<'s> {
     /// Parameters at which a candidate's signature was taken.
     pub fn shape_of(&self, effect: &Effect) -> Vec<f64> {
         self.candidates.shape(&self.shapes, effect)
+    }
+
+    /// An effect's parameters at which its signature was taken; a shape is refined against what is fitted without it.
+    pub fn refined(
+        &self,
+        effect: &'static Effect,
+        doses: &[Dose],
+        rest: &[&'static Effect],
+        noise: &Noise,
+    ) -> Result<Vec<f64>, DiagnosisError> {
+        let values = self.shape_of(effect);
+        if !effect.is_shaped() {
+            return Ok(values);
+        }
+        let (fitted, precisions) = (self.fitted(rest), self.precisions(noise));
+        let backdrop = Backdrop::new(self.scene, &self.design, &fitted, &precisions);
+        let reference = Reference::new(self.scene, doses.to_vec(), &self.scene.fine)?;
+        Ok(nonlinear::refine(effect, &values, &reference, &backdrop).map_or(values, |(refined, _)| refined))
     }
 
     /// Columns of the baseline and of a set.

@@ -16,10 +16,12 @@
 //! | [`motion_evidence`] | where the sensors agree on a movement that the simulator lacks |
 //! | [`motion_mismatch`] | stretches in which the machine moved otherwise than its simulator |
 //! | [`turn_likelihood`] | whether two sensors' residuals are one turn of the sensor, or a fault of either |
+//! | [`held_back`] | effects that a large noise holds back, found from a perfect sensor |
 //! | [`stepwise`] | the search: neighbours are screened and scored until none is better |
 //!
 //! Not done here: sets of more than a few effects are not enumerated; the search climbs.
 
+pub mod held_back;
 pub mod hypothesis;
 pub mod linearisation;
 pub mod memo;

@@ -5,6 +5,7 @@
 //! that was estimated without them. After each change baseline and effects are fitted again through the simulator.
 
 use super::{
+    held_back,
     hypothesis::Scored,
     linearisation::Linearisation,
     refit::{Fit, refit},
@@ -12,20 +13,13 @@ use super::{
 };
 use crate::{
     diagnosis::{
-        error::DiagnosisError,
-        library::{candidates::Candidates, nonlinear, nonlinear::Backdrop},
-        mixed_model::noise::{FAR, Noise},
-        residual::{base_run::Reference, forward_model::ForwardModel},
+        error::DiagnosisError, library::candidates::Candidates, mixed_model::noise::FAR,
+        residual::forward_model::ForwardModel,
     },
     effect::Effect,
     recording::SensorKind,
     simulator::Dose,
 };
-
-/// In so much of a noise, effects are as large as the data alone would have them.
-const RELEASED: f64 = 0.01;
-/// A fit leaves far less that leaves less than this share of the noise.
-const FAR_LESS: f64 = 0.5;
 
 /// A search that has come to its end.
 pub struct Solution<'s> {
@@ -67,7 +61,7 @@ pub fn search<'s>(
     for _ in 0..by.settling {
         fit = refit(scene, fit, Some(&none.noise))?;
         linear = Linearisation::fitted_alone(scene, candidates, &fit)?;
-        let start = with_white(&none.noise, &linear.weighing.white(&fit.residual));
+        let start = none.noise.clone().at_most(&linear.weighing.white(&fit.residual));
         none = linear.judge(&[], &start, &SensorKind::ALL, &FAR)?;
         trace(&format!("the same with the noise estimated again: {:.1}", none.log_evidence));
     }
@@ -78,7 +72,13 @@ pub fn search<'s>(
     let mut seen = vec![Vec::new()];
     loop {
         at = at.settled()?;
-        let Some(Step { to, found_in }) = improved(&at)? else { break };
+        let Some(Step { to, found_in }) = improved(&at)? else {
+            let again = held_back::begun_again(&at.linear, &at.fit, &at.best)?;
+            let Some((best, fit, linear)) = again else { break };
+            trace("begun again from a perfect sensor, with what its noise held back");
+            at = Solution { best, fit, linear, ..at };
+            continue;
+        };
         // Two sets may each be better than the other with the noise that the other leaves; a set may be better once in
         // shapes of another place.
         let visits = if found_in.is_some() { 2 } else { 1 };
@@ -151,62 +151,22 @@ impl<'s> Solution<'s> {
         for effect in next.set.iter().copied().filter(|effect| kept(effect).is_none()) {
             let rest: Vec<&'static Effect> =
                 next.set.iter().copied().filter(|other| *other != effect).collect();
-            let values = refined(effect, found_in, &doses, &rest, &next.noise)?;
+            let values = found_in.refined(effect, &doses, &rest, &next.noise)?;
             doses.push(Dose { effect, values });
         }
         let fit = refit(scene, self.fit.clone().with(scene, doses)?, Some(&next.noise))?;
-        next.noise = with_white(&next.noise, &found_in.weighing.white(&fit.residual));
-        let fit = match released(found_in, &fit, &next.noise)? {
+        next.noise = next.noise.at_most(&found_in.weighing.white(&fit.residual));
+        let fit = match held_back::released(found_in, &fit, &next.noise)? {
             Some((free, lower)) => {
                 next.noise = lower;
                 free
             }
             None => fit,
         };
+        next.noise = found_in.weighing.begun_again(next.noise, &fit.residual);
         let linear = Linearisation::new(scene, candidates, &fit, &next.noise, Some(&self.linear))?;
         Ok(Self { best: next, none: self.none.clone(), fit, linear, idle: self.idle.clone() })
     }
-}
-
-/// A fit whose effects are not held at their usual sizes, and its noise; `None` unless the noise holds a misfit of which that fit leaves
-/// far less. In a noise as large as what an effect does, the data say little against its usual size. The fit begins without the effects
-/// and with a perfect sensor, whose gain a fit without them may have made many times too large.
-fn released(
-    found_in: &Linearisation<'_>,
-    fit: &Fit,
-    noise: &Noise,
-) -> Result<Option<(Fit, Noise)>, DiagnosisError> {
-    let held = SensorKind::ALL.map(|kind| found_in.weighing.holds_misfit(noise, kind));
-    if !held.contains(&true) {
-        return Ok(None);
-    }
-    let begins_again = |dose: &Dose| matches!(dose.effect.sensors, [kind] if held[*kind as usize]);
-    let begun = |dose: &Dose| if begins_again(dose) { dose.without_amplitudes() } else { dose.clone() };
-    let doses = fit.doses.iter().map(begun).collect();
-    let start = fit.clone().with(found_in.scene, doses)?;
-    let free = refit(found_in.scene, start, Some(&noise.clone().scaled(RELEASED)))?;
-    let lower = with_white(noise, &found_in.weighing.white(&free.residual));
-    let is_far_less = |kind| lower.largest(kind) < FAR_LESS * noise.largest(kind);
-    Ok(SensorKind::ALL.into_iter().any(is_far_less).then_some((free, lower)))
-}
-
-/// An effect's parameters at which its signature was taken; a shape is refined against what is fitted without it.
-fn refined(
-    effect: &'static Effect,
-    linear: &Linearisation<'_>,
-    doses: &[Dose],
-    rest: &[&'static Effect],
-    noise: &Noise,
-) -> Result<Vec<f64>, DiagnosisError> {
-    let (scene, values) = (linear.scene, linear.shape_of(effect));
-    if !effect.is_shaped() {
-        return Ok(values);
-    }
-    let fitted = linear.fitted(rest);
-    let precisions = linear.precisions(noise);
-    let backdrop = Backdrop::new(scene, &linear.design, &fitted, &precisions);
-    let reference = Reference::new(scene, doses.to_vec(), &scene.fine)?;
-    Ok(nonlinear::refine(effect, &values, &reference, &backdrop).map_or(values, |(refined, _)| refined))
 }
 
 /// A likelier set, and the problem in which it was found where that is not the one it was sought from.
@@ -274,40 +234,10 @@ fn key(set: &[&'static Effect]) -> Vec<&'static str> {
     key
 }
 
-/// A noise with the white noise of another, where that is less: a misfit that a fit has gone through is no noise.
-fn with_white(noise: &Noise, white: &Noise) -> Noise {
-    let least = white.clone().at_most(noise);
-    let mut noise = noise.clone();
-    for (own, least) in noise.sensors.iter_mut().zip(least.sensors) {
-        (own.white, own.moving) = (least.white, least.moving);
-    }
-    noise
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        diagnosis::{
-            Source, library::candidates::Setting, mixed_model::noise::SensorNoise,
-            screening::preparation::Preparation, settings::Settings,
-        },
-        effect,
-        recording::Stream,
-        simulator::robot::{RobotKind, RobotScene},
-    };
-
-    fn noise(white: f64, drift: f64) -> Noise {
-        let sensor = SensorNoise {
-            white: [white; 3],
-            moving: [2.0 * white; 3],
-            drift: [drift; 2],
-            slow: 120.0,
-            scatter: 0.0,
-            breadth: 0.0,
-        };
-        Noise { sensors: [sensor; 3] }
-    }
+    use crate::effect;
 
     #[test]
     fn a_set_is_the_same_in_whatever_order_it_was_found() {
@@ -315,52 +245,5 @@ mod tests {
         let turned: Vec<&'static Effect> = set.iter().rev().copied().collect();
         assert_eq!(key(&set), key(&turned));
         assert_ne!(key(&set), key(&set[..2]));
-    }
-
-    #[test]
-    fn white_noise_is_lowered_by_a_better_fit_and_never_raised() {
-        let (old, better, worse) = (noise(1.0, 0.5), noise(0.25, 0.1), noise(4.0, 9.0));
-        let found = with_white(&old, &better).sensors[0];
-        assert_eq!((found.white, found.moving, found.drift), ([0.25; 3], [0.5; 3], [0.5; 2]));
-        assert_eq!(with_white(&old, &worse), old);
-    }
-
-    #[test]
-    fn an_arm_that_its_usual_length_holds_back_is_released_where_the_noise_holds_a_misfit() {
-        let lever = effect::find("acc.lever_arm").unwrap();
-        let arm = [1.0, 0.5, -0.5];
-        let doses = vec![Dose { effect: lever, values: arm.to_vec() }];
-        let flight =
-            RobotScene { kind: RobotKind::Flying, duration: 60.0, doses, seed: 2, ..RobotScene::default() };
-        let pair = flight.record("arm").unwrap();
-        let (stream, settings) = (Stream::of(&pair.simulated), Settings::preset(Source::Simulator));
-        let preparation = Preparation::new(&pair.real, stream.as_ref(), None, &settings).unwrap();
-        let (usable, movement) = (preparation.usable.clone(), &*preparation.movement);
-        let scene = ForwardModel::new(&pair.real, usable, movement, preparation.triads, &settings);
-        let setting = Setting {
-            kinds: &scene.kinds,
-            thermometer: false,
-            calibrated: &[],
-            provided: settings.source,
-            field_known: true,
-        };
-        let candidates = Candidates::new(&setting, &[], &[]);
-        // A gain that a fit without the arm has made far too large, and an arm of the usual length.
-        let value = |effect: &Effect| if effect.id == "acc.scale" { 8.0 } else { 0.0 };
-        let of =
-            |effect: &&'static Effect| Dose { effect, values: vec![value(effect); effect.parameters.len()] };
-        let held = Dose { effect: lever, values: vec![0.02, 0.01, -0.01] };
-        let doses = candidates.baseline.iter().map(of).chain([held]).collect();
-        let fit = Fit::of(&scene, doses).unwrap();
-        let linear = Linearisation::fitted_alone(&scene, &candidates, &fit).unwrap();
-        let mut noise = linear.weighing.white(&fit.residual);
-        let acc = &mut noise.sensors[SensorKind::Acc as usize];
-        (acc.white, acc.moving) = ([30.0; 3], [30.0; 3]);
-        let (free, lower) = released(&linear, &fit, &noise).unwrap().expect("it leaves far less");
-        let found = &free.doses.iter().find(|dose| dose.effect == lever).unwrap().values;
-        // The unit's axes are off by up to a degree.
-        assert!(found.iter().zip(arm).all(|(found, arm)| (found - arm).abs() < 0.04), "{found:?}");
-        assert!(lower.largest(SensorKind::Acc) < 1.0, "{lower:?}");
-        assert!(released(&linear, &free, &lower).unwrap().is_none(), "nothing is held any more");
     }
 }
