@@ -22,11 +22,16 @@ pub mod covariance;
 pub mod drawn;
 pub mod fit;
 pub mod process;
+pub mod remark;
+pub mod rounding;
 pub mod sensor;
 pub mod stillness;
 mod upper_bound;
 
-use self::sensor::{Refusal, Remark, SensorNoise, SensorStream};
+use self::{
+    remark::Remark,
+    sensor::{Refusal, SensorNoise, SensorStream},
+};
 use crate::{
     file::Limits,
     recording::{Manifest, Mapping, ReadError, Recording, SensorKind, Source, Warning},

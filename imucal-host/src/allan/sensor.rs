@@ -6,6 +6,8 @@ use super::{
     cascade::Cascade,
     clock::{Before, Gaps, SampleClock},
     coefficients::{Axis, Estimator, Sums},
+    remark::Remark,
+    rounding::{Hidden, Rounding},
     stillness::{Moved, Stillness},
 };
 use crate::recording::{SensorKind, Unit};
@@ -17,8 +19,6 @@ const SHORTEST: f64 = 10.0;
 const FEWEST: u64 = 256;
 /// Samples that are bridged at most, of all.
 const BRIDGED: f64 = 0.05;
-/// Repeated samples beyond this share come from an output that is read more often than it changes.
-const REPEATED: f64 = 0.2;
 /// Averages are fitted from so many repetitions on.
 const REPETITIONS: f64 = 4.0;
 
@@ -79,111 +79,6 @@ impl Refusal {
     }
 }
 
-/// What is odd about a sensor's samples and changes no answer.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum Remark {
-    /// Times are irregular.
-    #[error(
-        "{sensor}: intervals vary by {:.1} % rms; samples are taken as equally spaced, {interval:.6} s apart", 100.0 * .jitter
-    )]
-    Jitter {
-        /// Which sensor.
-        sensor: SensorKind,
-        /// Rms of the intervals, of their mean.
-        jitter: f64,
-        /// Their mean, s.
-        interval: f64,
-    },
-    /// Samples are missing.
-    #[error(
-        "{sensor}: samples are missing from {first:.3} s on; {bridged} were bridged by straight lines, {gaps} longer gaps (up \
-         to {longest:.2} s) end a stretch, and no average goes across{}",
-        larger(*.excess)
-    )]
-    Gaps {
-        /// Which sensor.
-        sensor: SensorKind,
-        /// Time of the first, s.
-        first: f64,
-        /// Samples bridged.
-        bridged: u64,
-        /// Longer gaps.
-        gaps: u64,
-        /// The longest, s.
-        longest: f64,
-        /// Share by which straight lines enlarge N at most.
-        excess: f64,
-    },
-    /// Little moved.
-    #[error(
-        "{sensor}: {blocks} of {of} blocks of a second moved, at {time:.1} s the most; the variances hardly show it"
-    )]
-    Knocked {
-        /// Which sensor.
-        sensor: SensorKind,
-        /// Blocks that moved.
-        blocks: u64,
-        /// All of them.
-        of: u64,
-        /// Time of the largest, s.
-        time: f64,
-    },
-    /// The output is read more often than it changes.
-    #[error(
-        "{sensor}: each value is read {times:.1} times on average before it changes; averages below {shortest:.3} s are not \
-         fitted"
-    )]
-    Repeated {
-        /// Which sensor.
-        sensor: SensorKind,
-        /// How often.
-        times: f64,
-        /// Averages from which on are fitted, s.
-        shortest: f64,
-    },
-    /// The kinds of noise do not explain the variances.
-    #[error(
-        "{sensor}, axis {axis}: white noise, bias instability and random walk do not explain the variances (chi-squared \
-         {chi_square:.0} of {freedom} degrees of freedom); standard errors were raised by {inflation:.1}"
-    )]
-    Misfit {
-        /// Which sensor.
-        sensor: SensorKind,
-        /// x, y or z.
-        axis: char,
-        /// χ².
-        chi_square: f64,
-        /// Its degrees of freedom.
-        freedom: usize,
-        /// The factor.
-        inflation: f64,
-    },
-    /// Averages were left out.
-    #[error(
-        "{sensor}, axis {axis}: averages below {from:.3} s do not fit, as after a filter; they are left out of the fit"
-    )]
-    Filtered {
-        /// Which sensor.
-        sensor: SensorKind,
-        /// x, y or z.
-        axis: char,
-        /// From which on they were fitted, s.
-        from: f64,
-    },
-    /// The axis shows nothing but one value.
-    #[error(
-        "{sensor}, axis {axis}: all samples are {value}: rounding hides the noise, and the axis has no coefficients"
-    )]
-    Constant {
-        /// Which sensor.
-        sensor: SensorKind,
-        /// x, y or z.
-        axis: char,
-        /// The value, SI unit.
-        value: f64,
-    },
-}
-
 /// The noise of a still sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorNoise {
@@ -193,7 +88,7 @@ pub struct SensorNoise {
     pub interval: f64,
     /// Time of all stretches, s.
     pub duration: f64,
-    /// Of x, y and z; `None` where all samples are one value.
+    /// Of x, y and z; `None` where all samples are one value, or rounding hides the noise.
     pub axes: [Option<Axis>; 3],
 }
 
@@ -215,7 +110,7 @@ struct Running {
     last: Vector3<f64>,
     sum: Vector3<f64>,
     samples: u64,
-    repeated: u64,
+    rounding: Rounding,
     /// What straight lines have added to the squares of the samples' weights.
     by_lines: f64,
 }
@@ -250,7 +145,7 @@ impl SensorStream {
             last: Vector3::repeat(f64::NAN),
             sum: Vector3::zeros(),
             samples: 0,
-            repeated: 0,
+            rounding: Rounding::default(),
             by_lines: 0.0,
         };
         self.head.drain(..).for_each(|(time, sample)| running.push(time, &sample));
@@ -290,6 +185,7 @@ impl Running {
     fn push(&mut self, time: f64, sample: &Vector3<f64>) {
         let sample = sample - self.origin;
         match self.clock.before(time) {
+            Before::Nothing if self.samples > 0 => self.rounding.push(&(sample - self.last)),
             Before::Nothing => {}
             Before::Bridge(missing) => {
                 self.by_lines += by_a_line(missing as f64);
@@ -302,7 +198,6 @@ impl Running {
         }
         self.cascade.push(&sample);
         self.stillness.push(time, &sample);
-        self.repeated += u64::from(sample == self.last);
         self.samples += 1;
         self.sum += sample;
         self.last = sample;
@@ -332,6 +227,11 @@ impl Running {
                 remarks.push(Remark::Constant { sensor: kind, axis: AXES[axis], value: mean[axis] });
                 return None;
             }
+            if let Some(Hidden { step, deviation }) = self.rounding.hidden(axis) {
+                let (sensor, unit) = (kind, Unit::si(kind));
+                remarks.push(Remark::Rounded { sensor, axis: AXES[axis], step, deviation, unit });
+                return None;
+            }
             let found = estimator.axis(axis, mean[axis], shortest);
             remarks.extend(odd(kind, AXES[axis], &found, shortest.max(1.0) * interval));
             Some(found)
@@ -341,8 +241,7 @@ impl Running {
 
     /// Samples of the shortest average that is fitted.
     fn shortest(&self) -> f64 {
-        let times = self.samples as f64 / (self.samples - self.repeated).max(1) as f64;
-        if self.repeated as f64 > REPEATED * self.samples as f64 { REPETITIONS * times } else { 1.0 }
+        self.rounding.readings().map_or(1.0, |times| REPETITIONS * times)
     }
 
     fn remarks(&self, sensor: SensorKind, gaps: &Gaps, moved: Option<Moved>) -> Vec<Remark> {
@@ -377,19 +276,6 @@ const AXES: [char; 3] = ['x', 'y', 'z'];
 /// ends gets half a weight more for each. Source: ours. Not taken into account: short averages, which the line smooths.
 fn by_a_line(missing: f64) -> f64 {
     0.5 * missing * (missing + 2.0)
-}
-
-/// An excess of N, a share, that is worth a word.
-const WORTH: f64 = 2e-3;
-
-fn larger(excess: f64) -> String {
-    if excess < WORTH {
-        return String::new();
-    }
-    let percent = 100.0 * excess;
-    format!(
-        "; the lines make N up to {percent:.1} % too large, which its interval does not say, and B likewise"
-    )
 }
 
 fn odd(sensor: SensorKind, axis: char, found: &Axis, begin: f64) -> Vec<Remark> {
