@@ -17,7 +17,7 @@ use crate::{
         Recording, SensorKind,
         check::integrity::{Integrity, SensorIntegrity},
     },
-    simulator::Motion,
+    simulator::{Motion, Recorded},
 };
 
 /// What has less than this share of what a stretch has more than the rest, as mean squares, has no part in it.
@@ -25,20 +25,22 @@ const NO_PART: f64 = 0.1;
 /// A stretch is remarked in which the noise is so many times as large as elsewhere: a machine vibrates more while it moves.
 const REMARKED: f64 = 3.0;
 
-/// Looks at one sensor.
+/// Looks at one sensor, where the stream has a movement.
 pub(crate) fn check(
     recording: &Recording,
     integrity: &Integrity,
-    motion: &dyn Motion,
+    motion: &dyn Recorded,
     sensor: &SensorIntegrity,
     found: &mut Conventions,
 ) {
     let kind = sensor.sensor;
-    let Some(triple) = recording.sensor(kind) else { return };
+    let Some(triple) = recording.sensor(kind).filter(|_| motion.gives(kind)) else { return };
+    let mut within = sensor.clone();
+    within.usable.iter_mut().zip(motion.known()).for_each(|(usable, known)| *usable &= *known);
     let moves = |row: usize| motion.truth(recording.time[row], &|_| ()).w_pt_t.norm();
-    let Some(burst) = Burst::find(&recording.time, triple, sensor, &moves) else { return };
-    let rows = fresh(triple, sensor);
-    if !motion.gives(kind) || has_part(recording, motion, &triple.values, &rows, kind, &burst) {
+    let Some(burst) = Burst::find(&recording.time, triple, &within, &moves) else { return };
+    let rows = fresh(triple, &within);
+    if has_part(recording, motion, &triple.values, &rows, kind, &burst) {
         return;
     }
     if kind != SensorKind::Acc && is_quiet(recording, integrity, &burst) {
@@ -71,7 +73,8 @@ fn has_part(
     let stream: Vec<Vector3<f64>> = recording.time.iter().map(truth).collect();
     let of = |values: &[Vector3<f64>]| inside_and_outside(&recording.time, values, rows, &burst.rows);
     let (Some([inside, outside]), Some([moved, _])) = (of(values), of(&stream)) else { return true };
-    moved.sum() > NO_PART * (inside - outside).sum()
+    let has_none = moved.sum() <= NO_PART * (inside - outside).sum();
+    !has_none
 }
 
 /// Whether the accelerometer is there, and its noise hardly grows in a stretch by the side of the other sensor's.
