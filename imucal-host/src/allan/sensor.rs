@@ -295,6 +295,27 @@ fn odd(sensor: SensorKind, axis: char, found: &Axis, begin: f64) -> Vec<Remark> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simulator::random::{Purpose, Random};
+
+    #[test]
+    fn an_axis_whose_rounding_hides_its_noise_has_no_coefficients_and_the_others_have() {
+        let mut random = Random::new(7, Purpose::Noise);
+        let mut stream = SensorStream::new(SensorKind::Gyr);
+        let rounded = |value: f64, step: f64| 1e-3 * (value / step).round() * step;
+        for k in 0..20_000 {
+            let noise = [random.normal(), random.normal(), random.normal()];
+            let sample =
+                Vector3::new(rounded(2.7 + noise[0], 6.0), rounded(noise[1], 2.0), rounded(noise[2], 0.1));
+            stream.push(0.01 * f64::from(k), &sample);
+        }
+        stream.end();
+        let (noise, remarks) = stream.noise().unwrap();
+        assert!(noise.axes[0].is_none() && noise.axes[1].is_some() && noise.axes[2].is_some());
+        let [remark @ Remark::Rounded { axis: 'x', step, .. }] = &remarks[..] else { panic!("{remarks:?}") };
+        assert!((step / 6e-3 - 1.0).abs() < 1e-9, "{step}");
+        let text = remark.to_string();
+        assert!(text.contains("gyr, axis x") && text.contains("6.000e-3 rad/s"), "{text}");
+    }
 
     #[test]
     fn a_line_adds_to_the_squared_weights_what_its_samples_give_to_its_ends() {
