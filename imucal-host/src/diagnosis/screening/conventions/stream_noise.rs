@@ -22,7 +22,8 @@ use crate::{
 
 /// What has less than this share of what a stretch has more than the rest, as mean squares, has no part in it.
 const NO_PART: f64 = 0.1;
-/// A stretch is remarked in which the noise is so many times as large as elsewhere: a machine vibrates more while it moves.
+/// A stretch is remarked in which the noise is so many times as large as elsewhere, for less than half of the time: a machine vibrates more
+/// while it moves.
 const REMARKED: f64 = 3.0;
 
 /// Looks at one sensor, where the stream has a movement.
@@ -47,7 +48,7 @@ pub(crate) fn check(
         found.findings.extend(burst.finding(kind));
         return;
     }
-    if burst.times() < REMARKED {
+    if burst.times() < REMARKED || 2 * burst.rows.len() > recording.rows() {
         return;
     }
     let time = |row: usize| recording.time.get(row).copied().unwrap_or(f64::NAN);
