@@ -5,7 +5,7 @@ use imucal_host::simulator::{Programme, Simulation};
 use nalgebra::Vector3;
 use serde_json::Value;
 
-use super::{Folder, afflicted, causes, rates, remarks};
+use super::{Folder, afflicted, causes, rates, remarks, without_rig};
 
 /// No cause, nothing closed, and a reason in words with these parts.
 fn assert_refused(diagnosis: &Value, parts: &[&str]) {
@@ -42,8 +42,7 @@ fn cut(recording: &mut Recording, from: usize, to: usize) {
 #[test]
 fn without_rig_and_reference_a_motion_is_not_testable() {
     let folder = Folder::with(&rates(4), |recording| {
-        recording.gimbal = None;
-        recording.manifest.rig = None;
+        without_rig(recording);
         // Turning throughout: no rest whose attitude could be determined.
         cut(recording, 40 * 50, 100 * 50);
     });

@@ -3,7 +3,7 @@
 use imucal_host::effect;
 use serde_json::Value;
 
-use super::{Folder, afflicted, causes, rates};
+use super::{Folder, afflicted, causes, rates, without_rig};
 
 const VERDICTS: [&str; 6] = ["explained", "ambiguous", "partly", "unknown", "none", "not-testable"];
 
@@ -147,7 +147,7 @@ fn what_is_withheld_is_not_asserted() {
 
 #[test]
 fn a_recording_that_lacks_what_the_question_needs_ends_with_1() {
-    let folder = Folder::with(&rates(3), |recording| recording.gimbal = None);
+    let folder = Folder::with(&rates(3), without_rig);
     let diagnosis = folder.diagnosed(1);
     assert_keeps_contract(&diagnosis);
     assert_eq!(diagnosis["verdict"], "not-testable");

@@ -18,6 +18,12 @@ mod formulas;
 mod printing;
 mod user_effects;
 
+/// Takes a rig's angles away, and its axes.
+fn without_rig(recording: &mut Recording) {
+    recording.gimbal = None;
+    recording.manifest.rig = None;
+}
+
 /// A short run of rates at 50 Hz: 150 s.
 fn rates(seed: u64) -> Simulation {
     Simulation {

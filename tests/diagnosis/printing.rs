@@ -3,7 +3,7 @@
 use imucal_host::effect::CATALOGUE;
 use serde_json::Value;
 
-use super::{Folder, afflicted, rates};
+use super::{Folder, afflicted, rates, without_rig};
 
 #[test]
 fn the_report_is_all_that_is_printed_and_the_json_file_says_the_same() {
@@ -22,7 +22,7 @@ fn the_report_is_all_that_is_printed_and_the_json_file_says_the_same() {
 
 #[test]
 fn json_on_standard_output_stands_alone() {
-    let folder = Folder::with(&rates(5), |recording| recording.gimbal = None);
+    let folder = Folder::with(&rates(5), without_rig);
     let ended = folder.run("diagnose run.csv --json -").with(1);
     let value: Value = serde_json::from_str(&ended.out).expect("JSON and nothing else");
     assert_eq!((&value["format"], ended.err.as_str()), (&"imucal-diagnosis/1".into(), ""));
