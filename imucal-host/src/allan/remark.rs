@@ -96,8 +96,8 @@ pub enum Remark {
     /// Rounding hides the noise.
     #[error(
         "{sensor}, axis {axis}: samples are rounded to steps of {step:.3e} {unit}, {:.1} times as large as what they scatter by: \
-         where between two steps the bias lies decides on what N, B and K come out, and the axis has no coefficients; record with \
-         finer steps, as of a smaller range", .step / .deviation
+         N, B and K would depend on where between two steps the bias lies, and the axis has no coefficients; record with finer \
+         steps, such as those of a smaller range", .step / .deviation
     )]
     Rounded {
         /// Which sensor.
