@@ -58,7 +58,7 @@ impl Weighing<'_> {
 
     /// A noise whose drift begins again, from what the samples do, where it is many times all that a fit leaves: it was estimated
     /// without the effects of that fit, and a descent of a few steps would not leave it.
-    pub fn begun_again(&self, mut noise: Noise, residual: &Means) -> Noise {
+    pub fn drift_begun_again(&self, mut noise: Noise, residual: &Means) -> Noise {
         let white = self.white(residual);
         for kind in SensorKind::ALL {
             let Some(left) = &residual[kind as usize] else { continue };

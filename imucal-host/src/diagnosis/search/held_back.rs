@@ -169,6 +169,17 @@ mod tests {
     }
 
     #[test]
+    fn a_drift_many_times_what_a_fit_leaves_begins_again_and_another_stays() {
+        hold(Some(ARM), |linear, fit, noise| {
+            let begun = |noise: &Noise| linear.weighing.drift_begun_again(noise.clone(), &fit.residual);
+            assert_eq!(begun(noise), *noise);
+            let mut far = noise.clone();
+            far.sensors[SensorKind::Acc as usize].drift = [1e5; 2];
+            assert_eq!(begun(&far), *noise);
+        });
+    }
+
+    #[test]
     fn an_arm_that_no_step_finds_is_found_from_a_perfect_sensor() {
         hold(None, |linear, fit, noise| {
             let from = linear.judge(&[], noise, &[], &FAR).unwrap();

@@ -163,7 +163,7 @@ impl<'s> Solution<'s> {
             }
             None => fit,
         };
-        next.noise = found_in.weighing.begun_again(next.noise, &fit.residual);
+        next.noise = found_in.weighing.drift_begun_again(next.noise, &fit.residual);
         let linear = Linearisation::new(scene, candidates, &fit, &next.noise, Some(&self.linear))?;
         Ok(Self { best: next, none: self.none.clone(), fit, linear, idle: self.idle.clone() })
     }
