@@ -146,7 +146,7 @@ fn calibrations_are_compared_only_where_they_estimate_the_same_terms() {
     let recording = recording(1, true);
     let (linear, (bent, _)) =
         (stored(&calibrated(&recording, "I14")).0, stored(&calibrated(&recording, "I23")));
-    assert_eq!(compare(&linear, &bent, false), Err(CompareFault::Nothing));
+    assert!(matches!(compare(&linear, &bent, false), Err(CompareFault::Nothing { .. })));
     let mut moved = bent.clone();
     let terms = moved.acc.as_mut().and_then(|acc| acc.nonlinearity.as_mut()).expect("stored");
     terms.cubic[2] += 20.0 * terms.cubic_std[2];

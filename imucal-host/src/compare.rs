@@ -10,7 +10,7 @@
 //! | p, σ | an entry of gain or bias and its standard error |
 //! | A, b | gain and bias: calibrated = A (raw − b) |
 //! | y, y_A | what is measured, if B is right, and what A still makes of it |
-//! | β | error of the bias, calibrated unit |
+//! | β | error of the bias, unit of A's calibrated values |
 //! | M − 1 | its diagonal: error of the scale; its antisymmetric part: rotation; the rest: angles between axes |
 //!
 //! A parameter has moved where |z| is beyond what the largest of so many healthy ones exceeds once in a hundred times (Bonferroni).
@@ -27,16 +27,19 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
+pub use self::parameters::Moved;
+use self::parameters::{bent, both_estimate};
 use crate::{
     recording::{SensorKind, Unit},
     store::{StoredCalibration, StoredTriad},
 };
 
+mod parameters;
+
 /// What the JSON begins with.
 pub const FORMAT: &str = "imucal-compare/1";
 /// How often the largest of the parameters of two calibrations of an unchanged unit is taken for moved.
 const FALSE_ALARMS: f64 = 0.01;
-const AXES: [char; 3] = ['x', 'y', 'z'];
 
 /// Why two calibrations are not compared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -72,26 +75,14 @@ pub enum CompareFault {
     },
     /// They have no sensor in common that can be compared.
     #[error(
-        "no sensor is calibrated in both by models with the same nonlinear terms and terms of temperature"
+        "no sensor is calibrated in both with standard errors, by models with the same nonlinear terms and terms of temperature"
     )]
-    Nothing,
-}
-
-/// One parameter.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Moved {
-    /// `gain_xy` or `bias_x`.
-    pub name: String,
-    /// In the first.
-    pub a: f64,
-    /// In the second.
-    pub b: f64,
-    /// Standard error of the difference.
-    pub std_error: f64,
-    /// The difference in standard errors.
-    pub z: f64,
-    /// Beyond chance.
-    pub moved: bool,
+    Nothing {
+        /// Sensors of which one has nonlinear terms, or terms of temperature, that the other has not.
+        other_terms: Vec<SensorKind>,
+        /// Sensors of which one states no standard errors.
+        without_errors: Vec<SensorKind>,
+    },
 }
 
 /// One sensor.
@@ -99,7 +90,7 @@ pub struct Moved {
 pub struct SensorComparison {
     /// Whose.
     pub sensor: SensorKind,
-    /// Unit of calibrated values, in which `bias_error` is.
+    /// Unit of the first calibration's values, in which `bias_error` is.
     pub unit: Unit,
     /// Each parameter that both have estimated.
     pub parameters: Vec<Moved>,
@@ -144,6 +135,8 @@ pub struct Comparison {
     /// Sensors of which one of them estimates nonlinear terms that the other does not, or terms of temperature: their gains and
     /// biases differ by that alone.
     pub other_terms: Vec<SensorKind>,
+    /// Sensors without a parameter whose standard error both state.
+    pub without_errors: Vec<SensorKind>,
 }
 
 /// Compares an earlier calibration with a later one.
@@ -160,7 +153,8 @@ pub fn compare(
     if !other_serial && serials.iter().all(|serial| !serial.is_empty()) && serials[0] != serials[1] {
         return Err(CompareFault::Serials { a: serials[0].clone(), b: serials[1].clone() });
     }
-    let (mut sensors, mut only_one, mut other_terms) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut sensors, mut only_one) = (Vec::new(), Vec::new());
+    let (mut other_terms, mut without_errors) = (Vec::new(), Vec::new());
     // The other sensors are in the axes of the accelerometer.
     let acc = a.acc.as_ref().zip(b.acc.as_ref());
     for kind in SensorKind::ALL {
@@ -170,17 +164,20 @@ pub fn compare(
                 let axes = acc.unwrap_or((a, b));
                 let alike = [(a, b), axes].iter().all(|(a, b)| estimated(a) == estimated(b));
                 let comparable = alike && a.field_norm.is_some() == b.field_norm.is_some();
-                sensors.push(of_sensor(kind, a, b, comparable)?);
+                match of_sensor(kind, a, b, comparable)? {
+                    compared if compared.parameters.is_empty() => without_errors.push(kind),
+                    compared => sensors.push(compared),
+                }
             }
             (None, None) => {}
             _ => only_one.push(kind),
         }
     }
     if sensors.is_empty() {
-        return Err(CompareFault::Nothing);
+        return Err(CompareFault::Nothing { other_terms, without_errors });
     }
     let days = i64::from(b.date.days()) - i64::from(a.date.days());
-    Ok(Comparison { format: FORMAT, days, sensors, only_one, other_terms })
+    Ok(Comparison { format: FORMAT, days, sensors, only_one, other_terms, without_errors })
 }
 
 /// Both have terms of temperature or neither has, and both the same nonlinear ones.
@@ -192,36 +189,6 @@ fn has_terms_of(a: &StoredTriad, b: &StoredTriad) -> bool {
 /// Which entries of the gain are estimated: what its axes are.
 fn estimated(triad: &StoredTriad) -> [[bool; 3]; 3] {
     triad.gain_std.map(|row| row.map(|std| std > 0.0))
-}
-
-/// A coefficient and its standard error, 0 where it is not estimated.
-#[derive(Clone, Copy)]
-struct Estimate(f64, f64);
-
-impl Estimate {
-    fn known(self) -> bool {
-        self.1 > 0.0
-    }
-}
-
-/// Nonlinear terms: quadratic, cubic, and the products in each axis.
-fn bent(triad: &StoredTriad) -> [Estimate; 15] {
-    let Some(found) = &triad.nonlinearity else { return [Estimate(0.0, 0.0); 15] };
-    let all = |axial: [[f64; 3]; 2], cross: [[f64; 3]; 3]| axial.into_iter().chain(cross).flatten();
-    let value = all([found.quadratic, found.cubic], found.cross);
-    let std = all([found.quadratic_std, found.cubic_std], found.cross_std);
-    let mut pairs = value.zip(std).map(|(value, std)| Estimate(value, std));
-    std::array::from_fn(|_| pairs.next().unwrap_or(Estimate(0.0, 0.0)))
-}
-
-/// Name of each of [`bent`].
-fn bent_name(at: usize) -> String {
-    let (row, column) = (at / 3, at % 3);
-    match row {
-        0 => format!("quadratic_{}", AXES[column]),
-        1 => format!("cubic_{}", AXES[column]),
-        _ => format!("cross_{}_{}", AXES[row - 2], ["xy", "yz", "zx"][column]),
-    }
 }
 
 fn of_sensor(
@@ -237,13 +204,13 @@ fn of_sensor(
     let a = at_reference.as_ref().unwrap_or(a);
     let (gain_a, gain_b) = (a.triad().gain, b.triad().gain);
     let inverse = gain_b.try_inverse().ok_or(CompareFault::Singular { sensor: kind })?;
-    let mut parameters = parameters(a, b, comparable);
+    let mut parameters = both_estimate(a, b, comparable);
     let chances = Normal::standard();
     let limit = -chances.inverse_cdf(0.5 * FALSE_ALARMS / parameters.len().max(1) as f64);
     parameters.iter_mut().for_each(|parameter| parameter.moved = parameter.z.abs() > limit);
     Ok(SensorComparison {
         sensor: kind,
-        unit: b.unit_out,
+        unit: a.unit_out,
         parameters,
         limit,
         bias_error: (gain_a * (Vector3::from(b.bias) - Vector3::from(a.bias))).into(),
@@ -263,34 +230,6 @@ impl GainComparison {
             skew: [2.0 * half(1, 2, 1.0), 2.0 * half(2, 0, 1.0), 2.0 * half(0, 1, 1.0)],
         }
     }
-}
-
-/// The parameters that both have estimated; without a verdict.
-fn parameters(a: &StoredTriad, b: &StoredTriad, with_gains: bool) -> Vec<Moved> {
-    let of = |name: String, (a, a_std): (f64, f64), (b, b_std): (f64, f64)| {
-        let std_error = a_std.hypot(b_std);
-        (a_std > 0.0 && b_std > 0.0).then(|| Moved {
-            name,
-            a,
-            b,
-            std_error,
-            z: (b - a) / std_error,
-            moved: false,
-        })
-    };
-    let gains = (0..3).flat_map(|row| (0..3).map(move |column| (row, column))).filter_map(|(row, column)| {
-        let name = format!("gain_{}{}", AXES[row], AXES[column]);
-        let pair = |triad: &StoredTriad| (triad.gain[row][column], triad.gain_std[row][column]);
-        of(name, pair(a), pair(b))
-    });
-    let biases = (0..3).filter_map(|axis| {
-        let name = format!("bias_{}", AXES[axis]);
-        of(name, (a.bias[axis], a.bias_std[axis]), (b.bias[axis], b.bias_std[axis]))
-    });
-    let (bent_a, bent_b) = (bent(a), bent(b));
-    let terms = bent_a.into_iter().zip(bent_b).enumerate();
-    let terms = terms.filter_map(|(at, (a, b))| of(bent_name(at), (a.0, a.1), (b.0, b.1)));
-    gains.filter(|_| with_gains).chain(biases).chain(terms).collect()
 }
 
 #[cfg(test)]
@@ -335,6 +274,10 @@ mod tests {
         let moved: Vec<&str> = acc.parameters.iter().filter(|p| p.moved).map(|p| p.name.as_str()).collect();
         assert_eq!(moved, ["bias_y"]);
         assert!((acc.bias_error[1] / STANDARD_GRAVITY - 5e-3).abs() < 1e-4, "{:?}", acc.bias_error);
+        // The error is one of the first's values, whatever the second puts out.
+        after.acc.as_mut().expect("calibrated").unit_out = Unit::Gravity;
+        let unit = compare(&before, &after, false).expect("of one unit").sensors[0].unit;
+        assert_eq!(unit, Unit::MetrePerSecondSquared);
     }
 
     #[test]
@@ -419,7 +362,13 @@ mod tests {
         assert!(matches!(fault, CompareFault::Serials { .. }), "{fault}");
         b.acc.as_mut().expect("one").unit_in = Unit::Gravity;
         assert!(matches!(compare(&a, &b, true), Err(CompareFault::Units { .. })));
+        let mut unknown = a.clone();
+        let acc = unknown.acc.as_mut().expect("one");
+        (acc.gain_std, acc.bias_std) = ([[0.0; 3]; 3], [0.0; 3]);
+        let comparison = compare(&a, &unknown, false).expect("the gyroscope can be compared");
+        assert_eq!(comparison.without_errors, [SensorKind::Acc]);
+        assert!(comparison.sensors.iter().all(|sensor| sensor.sensor != SensorKind::Acc));
         let nothing = StoredCalibration { acc: None, gyr: None, mag: None, ..b };
-        assert_eq!(compare(&a, &nothing, true), Err(CompareFault::Nothing));
+        assert!(matches!(compare(&a, &nothing, true), Err(CompareFault::Nothing { .. })));
     }
 }

@@ -62,6 +62,34 @@ fn a_calibration_still_fits_another_recording_of_its_unit_and_a_moved_one_does_n
 }
 
 #[test]
+fn what_is_not_compared_is_never_said_to_fit() {
+    let folder = Folder::with_calibration();
+    let other = simulated::tumbled(simulated::RESTS, 77);
+    other.write(&folder.path("other.csv")).expect("room");
+    // Six parameters: the fit to the other recording leaves the angles between the axes, as that of the first did.
+    folder.run("calibrate other.csv --model acc=T6 --accept-suspect --out six.toml").with(0);
+    let checked = folder.run("check other.csv --calibration six.toml");
+    assert!(!checked.out.contains("accelerometer: the calibration still fits"), "{}", checked.out);
+    assert!(checked.out.contains("accelerometer: not checked; its fit to this recording is suspect"));
+
+    let mut text = String::new();
+    for line in folder.text("cal.toml").lines() {
+        let unknown = match line.split(" = ").next() {
+            Some("gain_std") => "gain_std = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]",
+            Some("bias_std") => "bias_std = [0.0, 0.0, 0.0]",
+            _ => line,
+        };
+        text += &format!("{unknown}\n");
+    }
+    folder.write("unknown.toml", text);
+    folder
+        .run("check other.csv --calibration unknown.toml")
+        .with(1)
+        .printing(&["accelerometer: not checked; one calibration states no standard errors"])
+        .telling(&["nothing is checked"]);
+}
+
+#[test]
 fn a_recording_that_calibrates_nothing_checks_nothing() {
     let folder = Folder::with_calibration();
     let few = simulated::tumbled(2, 5);

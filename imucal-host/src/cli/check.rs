@@ -16,8 +16,8 @@ use super::{
 };
 use crate::{
     apply,
-    calibrate::{Calibration, Options, calibrate, known_attitudes::ladder},
-    compare::{CompareFault, Comparison, compare},
+    calibrate::{Calibration, calibrate},
+    compare::{CompareFault, Comparison, SensorComparison, compare},
     recording::{Recording, SensorKind, median},
     report::{self, table::words},
     store::StoredCalibration,
@@ -59,25 +59,27 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Ok(warning) => warning.iter().for_each(|warning| warn(warning)),
         Err(refusal) => return Ok(refuse(&refusal)),
     }
-    let calibration = calibrate(&recording, &options(&stored), &|_| {});
+    let calibration = calibrate(&recording, &stored.models(), &|_| {});
     calibration.warnings.iter().for_each(|warning| warn(warning));
     let now = StoredCalibration::of(&calibration, today());
     let stored = at_temperature_of(&recording, stored, &now);
     let comparison = match compare(&stored, &now, arguments.other_serial) {
         Ok(comparison) => comparison,
-        Err(CompareFault::Nothing) => {
-            output::text(&unchecked(&stored, &calibration, &SensorKind::ALL))?;
+        Err(CompareFault::Nothing { other_terms, without_errors }) => {
+            output::text(&unchecked(&stored, &calibration, &other_terms, &without_errors))?;
             return Ok(refuse(&"this recording calibrates none of the sensors, so that nothing is checked"));
         }
         Err(fault) => return Ok(refuse(&fault)),
     };
     let text = || {
-        let unchecked = unchecked(&stored, &calibration, &comparison.other_terms);
+        let unchecked = unchecked(&stored, &calibration, &comparison.other_terms, &comparison.without_errors);
         verdicts(&comparison) + &unchecked + &report::compare::compared(&comparison)
     };
     arguments.json.give(&mut files, &comparison, &text)?;
     files.commit()?;
-    let fits = comparison.sensors.iter().all(|sensor| !sensor.has_moved());
+    // What states no errors can be off by anything.
+    let fits =
+        comparison.without_errors.is_empty() && comparison.sensors.iter().all(|sensor| !sensor.has_moved());
     Ok(if fits { Ending::Done } else { Ending::Refused })
 }
 
@@ -100,34 +102,36 @@ fn at_temperature_of(
     stored
 }
 
-/// On a rig, the model of an accelerometer's nonlinear terms where the calibration has some: a linear gain would differ from its own.
-fn options(stored: &StoredCalibration) -> Options {
-    let bent = stored.acc.as_ref().filter(|acc| acc.nonlinearity.is_some());
-    let model = bent.and_then(|acc| ladder::ACCELEROMETER.iter().find(|(name, _)| *name == acc.model));
-    let usual = Options::default();
-    Options { rig_acc: model.map_or(usual.rig_acc, |(name, _)| Some(name)), ..usual }
-}
-
 /// A line for each sensor that was compared; ends its lines.
 fn verdicts(comparison: &Comparison) -> String {
-    let line = |kind: SensorKind, moved: bool| {
-        let verdict = if moved { "no longer fits" } else { "still fits, within the errors of both" };
-        format!("{}: the calibration {verdict}\n", words(kind))
+    let line = |sensor: &SensorComparison| {
+        let verdict = match (sensor.has_moved(), sensor.gain) {
+            (true, _) => "the calibration no longer fits",
+            (false, Some(_)) => "the calibration still fits, within the errors of both",
+            (false, None) => "its biases still fit, within the errors of both; its gains are not checked",
+        };
+        format!("{}: {verdict}\n", words(sensor.sensor))
     };
-    comparison.sensors.iter().map(|sensor| line(sensor.sensor, sensor.has_moved())).collect()
+    comparison.sensors.iter().map(line).collect()
 }
 
-/// A line for each calibrated sensor that this recording does not calibrate, or by other terms, with the reason.
-fn unchecked(stored: &StoredCalibration, calibration: &Calibration, other_terms: &[SensorKind]) -> String {
+/// A line for each calibrated sensor that this recording does not calibrate, or that cannot be compared, with the reason.
+fn unchecked(
+    stored: &StoredCalibration,
+    calibration: &Calibration,
+    other_terms: &[SensorKind],
+    without_errors: &[SensorKind],
+) -> String {
     let mut text = String::new();
     for kind in SensorKind::ALL.into_iter().filter(|kind| stored.triad(*kind).is_some()) {
         let outcome = calibration.sensors.iter().find(|outcome| outcome.kind == kind);
         let why = match outcome {
             None => "it is not in this recording".to_owned(),
-            Some(outcome) if outcome.accepted().is_some() && other_terms.contains(&kind) => {
-                report::compare::OTHER_TERMS.to_owned()
-            }
-            Some(outcome) if outcome.accepted().is_some() => continue,
+            Some(outcome) if outcome.accepted().is_some() => match kind {
+                kind if other_terms.contains(&kind) => report::compare::OTHER_TERMS.to_owned(),
+                kind if without_errors.contains(&kind) => report::compare::WITHOUT_ERRORS.to_owned(),
+                _ => continue,
+            },
             Some(outcome) => match &outcome.verdict {
                 Err(refused) => format!("this recording does not calibrate it: {}", refused.refusal),
                 Ok(()) => "its fit to this recording is suspect: its residual is not the noise".to_owned(),

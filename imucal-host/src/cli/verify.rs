@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     apply,
-    calibrate::{AccModel, Options, calibrate, gyr::rig, known_attitudes::ladder},
+    calibrate::{Options, calibrate},
     device::{Address, Session},
     equivalence::{
         FitEquivalence, SampleEquivalence, board, board::BoardSamples, fits, samples, samples::Samples,
@@ -35,7 +35,7 @@ pub(super) struct Arguments {
     /// The calibration: TOML or record
     #[arg(long, value_name = "CAL")]
     calibration: PathBuf,
-    /// Replay through a device as well, and compare bits: `serial:PATH[@BAUD]`, `tcp:HOST:PORT`, `qemu[:IMAGE]`
+    /// Replay through a device as well, and compare bits: `serial:PATH[@BAUD]`, `tcp:HOST:PORT`, `qemu[:IMAGE]`, `an505[:IMAGE]`
     /// or `microbit[:IMAGE]`. It stores the calibration's record
     #[arg(long, value_name = "WHERE")]
     device: Option<Address>,
@@ -131,29 +131,13 @@ fn bits(equal: bool) -> &'static str {
 
 /// Fits again whatever the recording and the calibration share, by the models that the calibration names.
 fn refit(recording: &Recording, stored: &StoredCalibration) -> Vec<FitEquivalence> {
-    let calibration = calibrate(recording, &options(stored), &|_| {});
+    let calibration = calibrate(recording, &stored.models(), &|_| {});
     calibration
         .sensors
         .iter()
         .filter(|outcome| stored.triad(outcome.kind).is_some())
         .filter_map(|outcome| fits::compare(recording, outcome))
         .collect()
-}
-
-/// The models of a stored calibration; a name that stands on no ladder is that of a field form.
-fn options(stored: &StoredCalibration) -> Options {
-    let rung = |kind: SensorKind, ladder: &[(&'static str, &str)]| {
-        let model = stored.triad(kind).map(|triad| triad.model.clone())?;
-        ladder.iter().find(|(name, _)| *name == model).map(|(name, _)| *name)
-    };
-    let six = stored.triad(SensorKind::Acc).is_some_and(|triad| triad.model == AccModel::T6.name());
-    Options {
-        acc: if six { AccModel::T6 } else { AccModel::T9 },
-        rig_acc: rung(SensorKind::Acc, &ladder::ACCELEROMETER),
-        rig_gyr: rung(SensorKind::Gyr, &rig::MODELS),
-        rig_mag: rung(SensorKind::Mag, &ladder::MAGNETOMETER),
-        ..Options::default()
-    }
 }
 
 fn print_samples(s: &SampleEquivalence) -> anyhow::Result<()> {

@@ -121,6 +121,12 @@ impl Unit {
         String::deserialize(text)?.parse().map_err(|unknown| D::Error::custom(of_sensor(unknown)))
     }
 
+    /// As [`Self::per_si`], and `None` for arbitrary units as well, which have no size of their own.
+    #[must_use]
+    pub fn per_known_si(self) -> Option<f64> {
+        self.per_si().filter(|_| self != Self::Arbitrary)
+    }
+
     /// How many of this unit make one of the SI side (m/s², rad/s, µT); `None` for counts, which only
     /// the manifest's `[counts]` can say. Arbitrary units count one for one.
     #[must_use]

@@ -10,7 +10,10 @@ use crate::{
 };
 
 /// Why a sensor is not compared.
-pub const OTHER_TERMS: &str = "one calibration has nonlinear terms, or terms of temperature, that the other has not, and gain and bias are fitted with them";
+pub const OTHER_TERMS: &str = "one calibration has nonlinear terms, or terms of temperature, that the other has not, \
+                               and gain and bias are fitted with them";
+/// As well.
+pub const WITHOUT_ERRORS: &str = "one calibration states no standard errors";
 
 /// All sensors; ends its lines.
 pub fn compared(comparison: &Comparison) -> String {
@@ -30,7 +33,10 @@ pub fn not_compared(comparison: &Comparison) -> Vec<String> {
         comparison.other_terms.iter().map(|kind| format!("{}: not compared; {OTHER_TERMS}", words(*kind)));
     let only_one =
         comparison.only_one.iter().map(|kind| format!("{}: calibrated in one of them only", words(*kind)));
-    other_terms.chain(only_one).collect()
+    let without_errors = comparison.without_errors.iter();
+    let without_errors =
+        without_errors.map(|kind| format!("{}: not compared; {WITHOUT_ERRORS}", words(*kind)));
+    other_terms.chain(without_errors).chain(only_one).collect()
 }
 
 fn of_sensor(sensor: &SensorComparison) -> String {
@@ -62,10 +68,15 @@ fn of_sensor(sensor: &SensorComparison) -> String {
 pub(crate) fn meaning(sensor: &SensorComparison) -> String {
     let three =
         |values: [f64; 3], decimals: usize| values.map(|value| format!("{value:+.decimals$}")).join(", ");
-    let (bias, unit, decimals) = match sensor.sensor {
-        SensorKind::Acc => (sensor.bias_error.map(|value| 1e3 * value / STANDARD_GRAVITY), "mg", 3),
-        SensorKind::Gyr => (sensor.bias_error.map(f64::to_degrees), "°/s", 4),
-        SensorKind::Mag => (sensor.bias_error, "µT", 3),
+    let error = sensor.bias_error;
+    let si = sensor.unit.per_known_si();
+    let (bias, unit, decimals) = match (sensor.sensor, si) {
+        (SensorKind::Acc, Some(si)) => {
+            (error.map(|value| 1e3 * value / si / STANDARD_GRAVITY), "mg".into(), 3)
+        }
+        (SensorKind::Gyr, Some(si)) => (error.map(|value| (value / si).to_degrees()), "°/s".into(), 4),
+        (SensorKind::Mag, Some(si)) => (error.map(|value| value / si), "µT".into(), 3),
+        (_, None) => (error, sensor.unit.to_string(), 6),
     };
     let mut text = format!(
         "  With the first calibration, where the second is right:\n    bias off by     {} {unit}\n",

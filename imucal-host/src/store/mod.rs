@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 pub mod covariance_file;
 pub mod form;
 pub mod higher_order;
+mod models;
 pub mod noise_file;
 pub mod record_form;
 mod triad;
@@ -135,6 +136,21 @@ pub enum LoadError {
         /// Why.
         cause: DecodeError,
     },
+    /// The file holds more than one record, as a copy of a device's flash does.
+    #[error(
+        "{path}: found the records of two calibrations, made on {first} and, from byte {at} on, on {date}, expected one; \
+         write the one that is meant to a file of its own"
+    )]
+    Several {
+        /// The file.
+        path: PathBuf,
+        /// When the first calibration was made.
+        first: record::Date,
+        /// Where the next record begins, bytes.
+        at: usize,
+        /// When its calibration was made.
+        date: record::Date,
+    },
 }
 
 /// Why a calibration could not be written.
@@ -235,7 +251,12 @@ impl StoredCalibration {
                 DecodeError::Unusable(defect) => LoadError::Unusable { path: path.into(), defect },
                 cause => LoadError::Record { path: path.into(), cause },
             })?;
-            Ok(Self::from_record(&record))
+            match record_form::another(&bytes) {
+                Some((at, date)) => {
+                    Err(LoadError::Several { path: path.into(), first: record.date, at, date })
+                }
+                None => Ok(Self::from_record(&record)),
+            }
         }
     }
 

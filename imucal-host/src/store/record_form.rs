@@ -4,7 +4,8 @@ use std::path::Path;
 
 use imucal_core::{
     record::{
-        CalibrationRecord, FitQuality, HigherOrder, Provenance, RawUnit, Sensor, SensorIdentity, TriadRecord,
+        self, CalibrationRecord, Date, FitQuality, HigherOrder, Provenance, RawUnit, Sensor, SensorIdentity,
+        TriadRecord,
     },
     temperature::TemperatureTerms,
 };
@@ -47,6 +48,14 @@ fn text<const N: usize>(
     text: &str,
 ) -> Result<heapless::String<N>, SaveError> {
     text.parse().map_err(|_| SaveError::TooLong { path: path.into(), field, text: text.into(), limit: N })
+}
+
+/// Where another intact record begins behind the first byte, and when its calibration was made.
+pub(super) fn another(bytes: &[u8]) -> Option<(usize, Date)> {
+    (1..bytes.len()).find_map(|at| {
+        let record = record::decode_as::<HigherOrder>(bytes.get(at..)?).ok()?;
+        Some((at, record.date))
+    })
 }
 
 impl StoredCalibration {
@@ -234,6 +243,24 @@ mod tests {
         let text = toml::to_string(&original).unwrap();
         assert!(text.contains("date = \"2026-11-21\""), "{text}");
         assert_eq!(toml::from_str::<StoredCalibration>(&text).unwrap(), original);
+    }
+
+    #[test]
+    fn a_file_with_two_records_is_refused_and_one_with_an_erased_rest_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("dump.bin");
+        let load = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            StoredCalibration::load(&path)
+        };
+        let first = stored().record(&path).unwrap();
+        let erased = [first.clone(), vec![0xFF; 300]].concat();
+        assert!(load(&erased).is_ok());
+        let later = StoredCalibration { date: Date::from_days(20_800), ..stored() };
+        let message = load(&[erased.clone(), later.record(&path).unwrap()].concat()).unwrap_err().to_string();
+        for part in ["dump.bin", "2026-11-21", &format!("byte {}", erased.len()), "2026-12-13"] {
+            assert!(message.contains(part), "{message}");
+        }
     }
 
     #[test]
