@@ -3,11 +3,18 @@
 //! An Allan variance takes samples as equally spaced. Jitter of their times is not noise of a sensor that is still, so
 //! that it is counted and not corrected. Missing samples are: a few in a row are bridged by the straight line between
 //! their neighbours, a longer gap ends a stretch, and no average goes across.
+//!
+//! Times that are rounded to about an interval step by one or two of what they are rounded to, as evenly as they can; the interval is then
+//! their mean. Not recognised: single samples that are missing there.
 
 /// Samples over which an interval is averaged: times may come in bursts of as many.
 const BURST: usize = 16;
 /// A single interval that departs from the mean by more than this share is one of a burst.
 const UNEVEN: f64 = 0.3;
+/// Rounded times have so many steps that are longer than the others, at least: as many samples are not lost as evenly by chance.
+const LONGER: f64 = 8.0;
+/// A step is of a missing sample from so many intervals on, and where times are rounded to about an interval.
+const LATE: (f64, f64) = (1.5, 2.5);
 /// A gap of more samples is not bridged.
 const BRIDGED: u64 = 10;
 
@@ -27,6 +34,8 @@ pub enum Before {
 pub struct SampleClock {
     /// From sample to sample, as the first of them have it.
     nominal: f64,
+    /// A longer step is of a missing sample, s.
+    late: f64,
     last: Option<f64>,
     /// The last intervals, without what is missing.
     ring: [f64; BURST],
@@ -62,9 +71,12 @@ impl SampleClock {
         };
         // Where times come in bursts, single intervals are far from their mean.
         let (single, mean) = (over(1)?, over(span)?);
-        let nominal = if (mean / single - 1.0).abs() < UNEVEN { single } else { mean };
+        let rounded = even_mean(first, single);
+        let usual = if (mean / single - 1.0).abs() < UNEVEN { single } else { mean };
+        let nominal = rounded.unwrap_or(usual);
         Some(Self {
             nominal,
+            late: if rounded.is_some() { LATE.1 } else { LATE.0 } * nominal,
             last: None,
             ring: [nominal; BURST],
             filled: 0,
@@ -81,7 +93,7 @@ impl SampleClock {
         let step = time - last;
         let others: f64 = self.ring.iter().sum::<f64>() - self.ring[self.filled % BURST];
         // A late sample after a burst of early ones lacks nothing.
-        let missing = match step > 1.5 * self.nominal {
+        let missing = match step > self.late {
             true => ((others + step) / self.nominal).round() - BURST as f64,
             false => 0.0,
         };
@@ -127,12 +139,24 @@ impl SampleClock {
     }
 }
 
+/// The mean interval of times that are rounded to about an interval, the usual one of which is `single`: a decimal, as milliseconds are.
+/// `None` of others: samples that are lost as regularly leave the same times.
+fn even_mean(times: &[f64], single: f64) -> Option<f64> {
+    let (first, last, count) = (times.first()?, times.last()?, times.len() - 1);
+    let mean = (last - first) / count as f64;
+    let longer = (last - first) / single - count as f64;
+    let is_decimal = (single.log10() - single.log10().round()).abs() < 1e-6;
+    let off = |(k, time): (usize, &f64)| (time - first - k as f64 * mean).abs();
+    let farthest = times.iter().enumerate().map(off).fold(0.0, f64::max);
+    (is_decimal && longer >= LONGER && farthest < 1.01 * single).then_some(mean)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn run(times: &[f64]) -> (SampleClock, Vec<Before>) {
-        let mut clock = SampleClock::new(&times[..times.len().min(200)]).unwrap();
+        let mut clock = SampleClock::new(&times[..times.len().min(1024)]).unwrap();
         let before = times.iter().map(|time| clock.before(*time)).collect();
         (clock, before)
     }
@@ -166,5 +190,22 @@ mod tests {
         let (clock, before) = run(&times);
         assert!(before.iter().all(|before| *before == Before::Nothing));
         assert!((clock.interval() - 0.00498).abs() < 1e-6, "{}", clock.interval());
+    }
+
+    #[test]
+    fn times_that_are_rounded_to_about_an_interval_lack_nothing_and_random_losses_are_some() {
+        for rate in [952.0, 833.0] {
+            let times: Vec<f64> =
+                (0..20_000).map(|k| (1000.0 * f64::from(k) / rate).round() / 1000.0).collect();
+            let (clock, before) = run(&times);
+            assert!(before.iter().all(|before| *before == Before::Nothing), "{rate}");
+            assert!((clock.interval() * rate - 1.0).abs() < 1e-3, "{rate}: {}", clock.interval());
+        }
+        let mut random = crate::simulator::random::Random::new(3, crate::simulator::random::Purpose::Noise);
+        let kept = (0..20_000).filter(|_| random.normal() < 1.5);
+        let times: Vec<f64> = kept.map(|k| f64::from(k) / 1000.0).collect();
+        let lost = 20_000 - times.len() as u64;
+        let bridged = run(&times).0.gaps().bridged;
+        assert!(bridged.abs_diff(lost) < lost / 50, "{bridged} {lost}");
     }
 }

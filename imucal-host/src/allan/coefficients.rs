@@ -15,8 +15,6 @@ const LONGEST: f64 = 0.25;
 const SEEN: f64 = 12.0;
 /// Quantisation is in few recordings, and wrongly assumed it costs certainty: three standard errors.
 const QUANTISED: f64 = 18.0;
-/// A misfit less probable than this is one.
-const MISFIT: f64 = 1e-3;
 /// A filter colours averages shorter than this, s; they are left out where they do not fit.
 const FILTERED: f64 = 1.0;
 /// And of the longest average at most this share.
@@ -228,7 +226,7 @@ impl<'a> Estimator<'a> {
         let mut best: Option<(usize, Fit)> = None;
         for first in firsts {
             let Some(fit) = self.parsimonious(variances, first) else { continue };
-            if fit.chance() >= MISFIT {
+            if fit.chance() >= fit::MISFIT {
                 return Some((first, fit));
             }
             if best.as_ref().is_none_or(|(_, known)| fit.chance() > known.chance()) {
@@ -250,7 +248,7 @@ impl<'a> Estimator<'a> {
     }
 
     fn coefficients(&self, mean: f64, variances: &[f64], fitted: Option<&(usize, Fit)>) -> Axis {
-        let inflation = fitted.map_or(1.0, |(_, fit)| inflation(fit));
+        let inflation = fitted.map_or(1.0, |(_, fit)| fit::inflation(fit.misfit, fit.freedom));
         let of = |kind: Kind, unit: f64| match fitted {
             Some((first, fit)) => {
                 let error_at =
@@ -370,14 +368,9 @@ impl<'a> Estimator<'a> {
             axis.misfit.chi_square = forgetting.misfit;
             axis.misfit.freedom = forgetting.freedom;
             axis.misfit.chance = forgetting.chance;
-            axis.misfit.inflation = 1.0;
+            axis.misfit.inflation = fit::inflation(forgetting.misfit, forgetting.freedom);
         }
     }
-}
-
-/// Where the misfit is no chance, standard errors are too small by its root.
-fn inflation(fit: &Fit) -> f64 {
-    if fit.chance() >= MISFIT { 1.0 } else { (fit.misfit / fit.freedom.max(1) as f64).sqrt().max(1.0) }
 }
 
 impl Coefficient {

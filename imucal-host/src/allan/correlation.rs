@@ -29,7 +29,7 @@ const ENDS: f64 = 3.841;
 pub struct Correlation {
     /// T.
     pub time: f64,
-    /// Ends of its 95 % interval; no upper one where the recording is too short for it.
+    /// Ends of its 95 % interval, which a misfit that is no chance widens; no upper one where the recording is too short for it.
     pub interval: (f64, Option<f64>),
     /// σ² of the bias, and its standard error.
     pub size: (f64, f64),
@@ -146,14 +146,16 @@ impl<'a> Profile<'a> {
             times(from, to, FINE).filter_map(|time| Some((time.ln(), self.at(time, quantised)?.0))).collect();
         let at = points.iter().position(|(x, _)| *x >= time.ln())?;
         let (best, least) = vertex(&points, at);
-        let low = crossing(&mut points[..=at].iter().rev(), least + ENDS).unwrap_or(points[0].0);
-        let high = crossing(&mut points[at..].iter(), least + ENDS);
         let time = best.exp();
         let (misfit, sizes) = self.at(time, quantised)?;
-        let covariance = self.covariance(time, &sizes, quantised)?;
-        let known = |at: usize| (sizes[at], covariance[(at, at)].max(0.0).sqrt());
-        let white = usize::from(quantised);
         let freedom = self.lengths.len().saturating_sub(sizes.len() + 1);
+        let inflation = fit::inflation(misfit, freedom);
+        let level = least + ENDS * inflation.powi(2);
+        let low = crossing(&mut points[..=at].iter().rev(), level).unwrap_or(points[0].0);
+        let high = crossing(&mut points[at..].iter(), level);
+        let covariance = self.covariance(time, &sizes, quantised)?;
+        let known = |at: usize| (sizes[at], inflation * covariance[(at, at)].max(0.0).sqrt());
+        let white = usize::from(quantised);
         Some(Correlation {
             time,
             interval: (low.exp(), high.map(f64::exp)),
@@ -211,9 +213,12 @@ fn crossing(points: &mut dyn Iterator<Item = &(f64, f64)>, level: f64) -> Option
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use crate::allan::{
+        cascade::Cascade,
         coefficients::{Axis, Coefficient, Estimator, NotSeen, Sums},
-        drawn::{Drawn, cascade},
+        drawn::{Drawn, Source, cascade},
     };
 
     fn axis(drawn: Drawn, seed: u64, axis: usize) -> Axis {
@@ -253,5 +258,25 @@ mod tests {
         assert!(many && flicker.bias_instability.value().is_some(), "{flicker:?}");
         let none = axis(Drawn { white: 1.0, ..Drawn::default() }, 3, 0);
         assert!(matches!(none.correlation_time, Coefficient::NotSeen { why: NotSeen::NoDrift { .. }, .. }));
+    }
+
+    #[test]
+    fn a_misfit_next_to_a_bias_that_forgets_raises_its_standard_errors() {
+        let drawn = Drawn { white: 1.0, markov: Some((0.5, 300.0)), ..Drawn::default() };
+        let mut source = Source::new(drawn, 4);
+        let mut samples = Cascade::default();
+        for row in 0..120_000 {
+            let sine = (std::f64::consts::TAU * f64::from(row) / 2500.0).sin();
+            samples.push(&(source.sample() + Vector3::new(0.0, 1.0, 3.0) * sine));
+        }
+        let points = samples.points();
+        let sums = Sums::new(&points, 120_000);
+        let estimator = Estimator::new(&points, &sums, 120_000, 0.01);
+        let misfits = [0, 1, 2].map(|axis| estimator.axis(axis, 0.0, 1.0).misfit);
+        assert!(misfits[0].inflation == 1.0 && misfits[2].chance < 1e-3, "{misfits:?}");
+        for misfit in misfits.iter().filter(|misfit| misfit.chance < 1e-3) {
+            let expected = (misfit.chi_square / misfit.freedom as f64).sqrt();
+            assert!((misfit.inflation / expected - 1.0).abs() < 1e-12, "{misfit:?}");
+        }
     }
 }

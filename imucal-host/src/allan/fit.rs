@@ -19,6 +19,8 @@ use super::{covariance::Products, process::Kind};
 /// Rounds at most, and what one may still change, of a size.
 const ROUNDS: usize = 50;
 const SETTLED: f64 = 1e-7;
+/// A misfit less probable than this is one.
+pub(super) const MISFIT: f64 = 1e-3;
 
 /// Sizes of some kinds of noise.
 #[derive(Clone, Debug)]
@@ -178,6 +180,12 @@ pub(super) fn misfit(
 /// Probability of so large a χ².
 pub(super) fn chance(misfit: f64, freedom: usize) -> f64 {
     ChiSquared::new(freedom.max(1) as f64).map_or(0.0, |chi| chi.sf(misfit))
+}
+
+/// By how much standard errors are too small: the root of a misfit that is no chance.
+pub(super) fn inflation(misfit: f64, freedom: usize) -> f64 {
+    let of_misfit = || (misfit / freedom.max(1) as f64).sqrt().max(1.0);
+    if chance(misfit, freedom) >= MISFIT { 1.0 } else { of_misfit() }
 }
 
 /// 95 % interval of a squared coefficient with so many equivalent degrees of freedom.

@@ -34,7 +34,7 @@ use self::{
 };
 use crate::{
     file::Limits,
-    recording::{Manifest, Mapping, ReadError, Recording, SensorKind, Source, Warning},
+    recording::{Manifest, Mapping, ReadError, Recording, SensorKind, Source, Unit, Warning},
 };
 
 /// A sensor with its noise, or why there is none.
@@ -85,6 +85,9 @@ pub fn noise(path: &Path, mapping: &Mapping, limits: &Limits) -> Result<Noise, R
         span = Some((span.map_or(part.time.first().copied().unwrap_or_default(), |(first, _)| first), last));
         for (kind, stream) in SensorKind::ALL.into_iter().zip(&mut streams) {
             let Some(triple) = part.sensor(kind) else { continue };
+            if triple.unit == Unit::Arbitrary {
+                stream.of_arbitrary_unit();
+            }
             for (time, sample) in part.time.iter().zip(&triple.values) {
                 // A row in which the sensor was not read is none of its samples.
                 if sample.iter().all(|value| value.is_finite()) {

@@ -96,6 +96,8 @@ pub struct SensorNoise {
 #[derive(Debug)]
 pub struct SensorStream {
     kind: SensorKind,
+    /// Of the samples: the SI unit, or arbitrary.
+    unit: Unit,
     head: Vec<(f64, Vector3<f64>)>,
     running: Option<Running>,
 }
@@ -118,7 +120,12 @@ struct Running {
 impl SensorStream {
     /// Before the first sample.
     pub fn new(kind: SensorKind) -> Self {
-        Self { kind, head: Vec::new(), running: None }
+        Self { kind, unit: Unit::si(kind), head: Vec::new(), running: None }
+    }
+
+    /// Its samples have no unit.
+    pub fn of_arbitrary_unit(&mut self) {
+        self.unit = Unit::Arbitrary;
     }
 
     /// A sample, SI unit, and its time, s, later than those before.
@@ -138,7 +145,7 @@ impl SensorStream {
         let Some(clock) = SampleClock::new(&times) else { return };
         let origin = self.head.iter().map(|(_, sample)| sample).sum::<Vector3<f64>>() / times.len() as f64;
         let mut running = Running {
-            stillness: Stillness::new(self.kind, clock.nominal()),
+            stillness: Stillness::new(self.unit, clock.nominal()),
             clock,
             cascade: Cascade::default(),
             origin,
@@ -175,9 +182,9 @@ impl SensorStream {
         };
         let moved = running.stillness.moved();
         if let Some(moved) = moved.filter(|moved| moved.spoils) {
-            return Err(Refusal::NotStill { moved, unit: Unit::si(self.kind) });
+            return Err(Refusal::NotStill { moved, unit: self.unit });
         }
-        running.noise(self.kind, moved)
+        running.noise((self.kind, self.unit), moved)
     }
 }
 
@@ -203,7 +210,11 @@ impl Running {
         self.last = sample;
     }
 
-    fn noise(&self, kind: SensorKind, moved: Option<Moved>) -> Result<(SensorNoise, Vec<Remark>), Refusal> {
+    fn noise(
+        &self,
+        (kind, unit): (SensorKind, Unit),
+        moved: Option<Moved>,
+    ) -> Result<(SensorNoise, Vec<Remark>), Refusal> {
         let (interval, gaps) = (self.clock.interval(), self.clock.gaps());
         let samples = self.samples + gaps.bridged;
         let duration = samples as f64 * interval;
@@ -228,8 +239,7 @@ impl Running {
                 return None;
             }
             if let Some(Hidden { step, deviation }) = self.rounding.hidden(axis) {
-                let (sensor, unit) = (kind, Unit::si(kind));
-                remarks.push(Remark::Rounded { sensor, axis: AXES[axis], step, deviation, unit });
+                remarks.push(Remark::Rounded { sensor: kind, axis: AXES[axis], step, deviation, unit });
                 return None;
             }
             let found = estimator.axis(axis, mean[axis], shortest);

@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use crate::recording::SensorKind;
+use crate::recording::Unit;
 
 /// Length of a block, s, and its samples at least.
 const BLOCK: f64 = 1.0;
@@ -21,7 +21,7 @@ const FURTHER: f64 = 10.0;
 /// What moved may add to the sum of the others, in all.
 const HARMLESS: f64 = 0.01;
 
-/// Sizes below which nothing has moved, and above which everything has, for a kind of sensor: SI units.
+/// Sizes below which nothing has moved, and above which everything has, for the SI unit of a kind of sensor; of arbitrary units there are none.
 struct Bounds {
     /// Standard deviation within a block or step of its mean that noise of any such sensor reaches.
     least: f64,
@@ -32,11 +32,12 @@ struct Bounds {
 }
 
 impl Bounds {
-    fn of(kind: SensorKind) -> Self {
-        match kind {
-            SensorKind::Acc => Self { least: 0.02, noise: 1.0, step: 0.1 },
-            SensorKind::Gyr => Self { least: 0.002, noise: 0.1, step: 0.02 },
-            SensorKind::Mag => Self { least: 0.5, noise: 10.0, step: 5.0 },
+    fn of(unit: Unit) -> Self {
+        match unit {
+            Unit::MetrePerSecondSquared => Self { least: 0.02, noise: 1.0, step: 0.1 },
+            Unit::RadianPerSecond => Self { least: 0.002, noise: 0.1, step: 0.02 },
+            Unit::MicroTesla => Self { least: 0.5, noise: 10.0, step: 5.0 },
+            _ => Self { least: 0.0, noise: f64::INFINITY, step: f64::INFINITY },
         }
     }
 }
@@ -84,7 +85,7 @@ impl Classes {
 /// Follows one sensor's blocks.
 #[derive(Clone, Debug)]
 pub struct Stillness {
-    kind: SensorKind,
+    unit: Unit,
     /// Samples of a block.
     length: usize,
     count: usize,
@@ -117,11 +118,11 @@ pub struct Moved {
 }
 
 impl Stillness {
-    /// Of a sensor whose samples are `interval` s apart.
-    pub fn new(kind: SensorKind, interval: f64) -> Self {
+    /// Of a sensor whose samples are in this unit and `interval` s apart.
+    pub fn new(unit: Unit, interval: f64) -> Self {
         let classes = Classes { counts: vec![(0, 0.0); 2 * ONE], largest: (0.0, 0.0) };
         Self {
-            kind,
+            unit,
             length: ((BLOCK / interval).round() as usize).max(LEAST),
             count: 0,
             begin: 0.0,
@@ -157,7 +158,7 @@ impl Stillness {
 
     /// What moved; `None` where nothing did.
     pub fn moved(&self) -> Option<Moved> {
-        let bounds = Bounds::of(self.kind);
+        let bounds = Bounds::of(self.unit);
         let (usual, usual_step) = (self.within.median(), self.steps.median());
         let floor = bounds.least * bounds.least;
         let (noisy, noise) = self.within.above((NOISIER * NOISIER * usual).max(floor));
@@ -179,11 +180,12 @@ impl Stillness {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recording::SensorKind;
     use crate::simulator::random::{Purpose, Random};
 
     fn judged(kind: SensorKind, signal: impl Fn(f64) -> Vector3<f64>) -> Option<Moved> {
         let mut random = Random::new(2, Purpose::Noise);
-        let mut stillness = Stillness::new(kind, 0.01);
+        let mut stillness = Stillness::new(Unit::si(kind), 0.01);
         for row in 0..60_000 {
             let time = f64::from(row) * 0.01;
             stillness.push(time, &(random.normals() * 0.005 + signal(time)));
@@ -216,5 +218,20 @@ mod tests {
     fn what_moves_all_the_time_is_not_still() {
         let shaken = judged(SensorKind::Acc, |t| Vector3::x() * 3.0 * (20.0 * t).sin());
         assert!(shaken.is_some_and(|moved| moved.spoils && moved.blocks == moved.of));
+    }
+
+    #[test]
+    fn in_arbitrary_units_a_sensor_is_judged_by_what_is_usual_for_it() {
+        let mut random = Random::new(5, Purpose::Noise);
+        let (mut still, mut knocked) =
+            (Stillness::new(Unit::Arbitrary, 0.01), Stillness::new(Unit::Arbitrary, 0.01));
+        for k in 0..12_000 {
+            let sample = random.normals() * 2000.0;
+            still.push(0.01 * f64::from(k), &sample);
+            let by = if k == 6000 { 1e6 } else { 0.0 };
+            knocked.push(0.01 * f64::from(k), &(sample + Vector3::x() * by));
+        }
+        assert_eq!(still.moved(), None);
+        assert!(knocked.moved().is_some());
     }
 }
