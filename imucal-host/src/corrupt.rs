@@ -50,6 +50,19 @@ pub enum CorruptError {
         /// Which sensor.
         sensor: SensorKind,
     },
+    /// Calibrated values are in a unit of no known size, or the stream is.
+    #[error(
+        "{recording}: the calibration of {sensor} gives {found}, and how much of the stream's unit that is is not known; calibrate a \
+         recording in a unit of the field whose manifest states the site"
+    )]
+    NoSize {
+        /// The stream.
+        recording: String,
+        /// Which sensor.
+        sensor: SensorKind,
+        /// Unit of calibrated values.
+        found: Unit,
+    },
     /// The calibration cannot be inverted.
     #[error("the calibration of {sensor} has no inverse at {temperature} degC; calibrate again")]
     Singular {
@@ -143,10 +156,17 @@ fn ideal_values(
     kind: SensorKind,
     expected: Unit,
 ) -> Result<Option<Vec<Vector3<f64>>>, CorruptError> {
+    let of_no_size = || CorruptError::NoSize { recording: ideal.name.clone(), sensor: kind, found: expected };
     if let Some(simulated) = ideal.simulated.as_ref().and_then(|simulated| simulated.sensor(kind)) {
-        return Ok(Some(simulated.to_vec()));
+        return if expected.per_known_si().is_some() {
+            Ok(Some(simulated.to_vec()))
+        } else {
+            Err(of_no_size())
+        };
     }
+    let arbitrary = |unit: Unit| unit == Unit::Arbitrary;
     match ideal.sensor(kind) {
+        Some(triple) if arbitrary(triple.unit) != arbitrary(expected) => Err(of_no_size()),
         Some(triple) if triple.unit == Unit::Counts && expected != Unit::Counts => {
             Err(CorruptError::Raw { recording: ideal.name.clone(), sensor: kind })
         }

@@ -4,7 +4,7 @@ use imucal_host::export::{self, ExportError, Inputs, Target};
 use imucal_host::recording::{SensorKind, Unit};
 use imucal_host::store::{
     StoredCalibration, StoredCurvature, StoredNonlinearity, StoredTemperature, StoredTriad,
-    noise_file::NoiseFile,
+    noise_file::{NoiseFile, NoiseOfSensor},
 };
 
 mod code;
@@ -150,4 +150,46 @@ fn what_a_target_needs_and_does_not_get_is_refused() {
     let acc = StoredCalibration { acc: None, ..plain() };
     let given = Inputs { calibration: Some(&acc), ..Inputs::default() };
     assert!(matches!(refused(Target::Ros, &given), ExportError::NoSensor { .. }));
+    let arbitrary =
+        NoiseFile { mag: noise().acc.map(|of| NoiseOfSensor { unit: "a.u.".into(), ..of }), ..noise() };
+    let plain = plain();
+    let given = Inputs { calibration: Some(&plain), noise: Some(&arbitrary), ..Inputs::default() };
+    for target in [Target::Sdf, Target::Python] {
+        assert!(matches!(refused(target, &given), ExportError::NoiseUnit { sensor: SensorKind::Mag, .. }));
+    }
+    let mut mirrored = plain.clone();
+    let mag = mirrored.mag.as_mut().expect("a magnetometer");
+    mag.gain = [[0.0, -0.1, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, -0.1]];
+    let given = Inputs { calibration: Some(&mirrored), ..Inputs::default() };
+    for target in [Target::Px4, Target::Ardupilot] {
+        assert!(matches!(refused(target, &given), ExportError::OtherAxes { sensor: SensorKind::Mag, .. }));
+    }
+}
+
+#[test]
+fn an_axis_whose_noise_is_hidden_is_named_and_is_not_perfect() {
+    let mut hidden = noise();
+    hidden.acc.as_mut().expect("noise").axes[1] = None;
+    let plain = plain();
+    let inputs = Inputs { calibration: Some(&plain), noise: Some(&hidden), ..Inputs::default() };
+    for target in [Target::Kalibr, Target::Sdf, Target::Python, Target::Ros] {
+        let document = export::document(target, &inputs).expect("a document");
+        assert!(document.cannot.iter().any(|line| line.contains("axis")), "{:?}", document.cannot);
+        assert!(!document.text.contains("0.000000e0, 0, 0, 0"), "{}", document.text);
+    }
+    let text = export::document(Target::Ros, &inputs).expect("a document").text;
+    assert!(
+        text.contains("angular_velocity_covariance: [")
+            && !text.contains("linear_acceleration_covariance: [")
+    );
+}
+
+#[test]
+fn noise_in_microtesla_is_added_in_the_unit_of_calibrated_values() {
+    let mut in_gauss = plain();
+    in_gauss.mag = Some(triad(Unit::Gauss, Unit::Gauss, 1.0, [0.1, -0.05, 0.03]));
+    let noise = NoiseFile { mag: noise().acc, ..noise() };
+    let inputs = Inputs { calibration: Some(&in_gauss), noise: Some(&noise), ..Inputs::default() };
+    let text = export::document(Target::Python, &inputs).expect("a document").text;
+    assert!(text.contains("\"white\": [1e-5, 2e-5, 3e-5],  # N, G/sqrt(Hz)"), "{text}");
 }

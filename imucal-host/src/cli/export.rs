@@ -20,9 +20,7 @@ use crate::{
 };
 
 #[derive(Args, Debug)]
-#[command(
-    after_help = "Example:\n  imucal export cal.toml --noise noise.json --to c-header --out imu_calibration.h"
-)]
+#[command(after_help = "Example:\n  imucal export cal.toml --to c-header --out imu_calibration.h")]
 pub(super) struct Arguments {
     /// The calibration: TOML or record
     calibration: PathBuf,
@@ -61,6 +59,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Err(damaged) => return Ok(refuse(&damaged)),
     };
     let noise = arguments.noise.as_ref().map(|path| NoiseFile::read(path, &limits)).transpose()?;
+    anyhow::ensure!(
+        arguments.noise.is_none() || arguments.to.takes_noise(),
+        "--noise: found another target, expected `kalibr`, `sdf`, `python`, `ros` or `csv`; the others have no place for noise"
+    );
     anyhow::ensure!(
         arguments.covariance.is_none() || arguments.to.takes_covariance(),
         "--covariance: found another target, expected `python`; the others have no place for covariances"

@@ -8,7 +8,7 @@ use std::fmt::Write;
 
 use super::{
     Document, ExportError, Inputs,
-    affine::{self, higher_terms, no_errors, polar, skew},
+    affine::{self, higher_terms, no_errors, skew},
 };
 use crate::recording::{SensorKind, Unit};
 
@@ -26,6 +26,7 @@ pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
         let _ = writeln!(text, "# {name}: {what}\n{name},{value:.9}");
     };
     if let Some(acc) = affine::si_triad(inputs, SensorKind::Acc, TARGET)? {
+        affine::refuse_other_axes(&acc.gain, SensorKind::Acc, TARGET)?;
         for (at, axis) in AXES.into_iter().enumerate() {
             line(format!("INS_ACCOFFS_{axis}"), acc.bias[at], "m/s^2, taken from the reading");
             line(format!("INS_ACCSCAL_{axis}"), acc.gain[(at, at)], "no unit, after the offset");
@@ -43,7 +44,7 @@ pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
     }
     if let Some(mag) = affine::si_triad(inputs, SensorKind::Mag, TARGET)? {
         let milligauss = Unit::MilliGauss.per_si().unwrap_or(f64::NAN);
-        let (rotation, symmetric) = polar(&mag.gain).unwrap_or((nalgebra::Rotation3::identity(), mag.gain));
+        let (rotation, symmetric) = affine::symmetric(&mag.gain, SensorKind::Mag, TARGET)?;
         for (at, axis) in AXES.into_iter().enumerate() {
             line(
                 format!("COMPASS_OFS_{axis}"),

@@ -80,6 +80,8 @@ fn of_noise(text: &mut String, kind: SensorKind, row: usize, axis: &NoiseOfAxis)
         ("noise_white", &axis.white),
         ("noise_bias_instability", &axis.bias_instability),
         ("noise_random_walk", &axis.random_walk),
+        ("noise_quantisation", &axis.quantisation),
+        ("noise_bias_std", &axis.bias_std),
         ("noise_correlation_time", &axis.correlation_time),
     ] {
         if let Some(value) = figure.value {

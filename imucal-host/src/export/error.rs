@@ -55,6 +55,31 @@ pub enum ExportError {
         /// What the target takes.
         expected: Unit,
     },
+    /// The noise is in units of no known size, or in others than calibrated values.
+    #[error(
+        "{target}: the noise of {sensor} is in {found}, expected {expected}; estimate it from a recording in {expected}"
+    )]
+    NoiseUnit {
+        /// The target.
+        target: &'static str,
+        /// Which sensor.
+        sensor: SensorKind,
+        /// Unit of the noise.
+        found: String,
+        /// What is expected.
+        expected: Unit,
+    },
+    /// Calibrated axes are not the raw ones but for small angles.
+    #[error(
+        "{target}: the gain of {sensor} swaps, mirrors or turns its axes, which the target's parameters cannot; bring the raw \
+         values into the unit's axes and calibrate again"
+    )]
+    OtherAxes {
+        /// The target.
+        target: &'static str,
+        /// Which sensor.
+        sensor: SensorKind,
+    },
     /// The rate is not one.
     #[error("--rate: found {found}, expected a number of samples a second from 0.01 to 1000000")]
     Rate {

@@ -24,11 +24,13 @@ pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
     // Writing to a string cannot fail.
     let _ = writeln!(text, "rostopic: /imu0    # the topic of the bag; change it");
     let _ = writeln!(text, "update_rate: {rate:.6}    # Hz");
+    let mut hidden = Vec::new();
     for (kind, name, sensor, units) in [
         (SensorKind::Acc, "accelerometer", acc, ["m/s^2/sqrt(Hz)", "m/s^3/sqrt(Hz)"]),
         (SensorKind::Gyr, "gyroscope", gyr, ["rad/s/sqrt(Hz)", "rad/s^2/sqrt(Hz)"]),
     ] {
         let (white, walk) = levels(kind, sensor)?;
+        hidden.extend(level::hidden(kind, sensor, "the root mean square is that of the others"));
         let _ = writeln!(
             text,
             "{name}_noise_density: {:.6e}    # {}: N, the density of white noise{}",
@@ -49,6 +51,7 @@ pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
             .to_owned(),
         "differences between axes".to_owned(),
     ];
+    cannot.extend(hidden);
     cannot.extend(terms_without_a_place(inputs));
     Ok(Document { text, cannot })
 }

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use super::{ExportError, Inputs};
 use crate::{
-    recording::SensorKind,
+    recording::{SensorKind, Unit},
     store::noise_file::{Figure, NoiseOfAxis, NoiseOfSensor},
 };
 
@@ -57,9 +57,21 @@ pub(super) fn sensor<'a>(
     let found = noise.sensor(kind).ok_or_else(|| missing("the recording has no such sensor".into()))?;
     match &found.detail {
         Some(detail) => Err(missing(detail.clone())),
+        None if found.unit == Unit::Arbitrary.to_string() => Err(ExportError::NoiseUnit {
+            target,
+            sensor: kind,
+            found: found.unit.clone(),
+            expected: Unit::si(kind),
+        }),
         None if found.known_axes().next().is_none() => Err(missing("no axis shows any".into())),
         None => Ok(found),
     }
+}
+
+/// A sentence for each axis whose noise is not known, with what that means for the target.
+pub(super) fn hidden(kind: SensorKind, sensor: &NoiseOfSensor, so: &str) -> Vec<String> {
+    let axes = ["x", "y", "z"].into_iter().zip(&sensor.axes).filter(|(_, axis)| axis.is_none());
+    axes.map(|(name, _)| format!("{kind}, axis {name}: rounding hides its noise; {so}")).collect()
 }
 
 /// Samples a second of the target: as given, or as recorded.

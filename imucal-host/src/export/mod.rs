@@ -103,6 +103,11 @@ impl Target {
         self == Self::Python
     }
 
+    /// Whether its file holds noise.
+    pub fn takes_noise(self) -> bool {
+        matches!(self, Self::Kalibr | Self::Sdf | Self::Python | Self::Ros | Self::Csv)
+    }
+
     /// Whether its file depends on how fast the target samples.
     pub fn takes_rate(self) -> bool {
         matches!(self, Self::Kalibr | Self::Sdf | Self::Ros)

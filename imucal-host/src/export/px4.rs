@@ -9,7 +9,7 @@ use std::fmt::Write;
 
 use super::{
     Document, ExportError, Inputs,
-    affine::{self, higher_terms, no_errors, polar, skew},
+    affine::{self, higher_terms, no_errors, skew},
 };
 use crate::recording::{SensorKind, Unit};
 
@@ -28,6 +28,7 @@ pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
         let _ = writeln!(text, "# {name}: {what}\n1\t1\t{name}\t{value:.9e}\t9");
     };
     if let Some(acc) = affine::si_triad(inputs, SensorKind::Acc, TARGET)? {
+        affine::refuse_other_axes(&acc.gain, SensorKind::Acc, TARGET)?;
         for (at, axis) in AXES.into_iter().enumerate() {
             line(format!("CAL_ACC0_{axis}OFF"), acc.bias[at], "m/s^2, taken from the reading");
             line(format!("CAL_ACC0_{axis}SCALE"), acc.gain[(at, at)], "no unit, after the offset");
@@ -50,7 +51,7 @@ pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
     }
     if let Some(mag) = affine::si_triad(inputs, SensorKind::Mag, TARGET)? {
         let gauss = Unit::Gauss.per_si().unwrap_or(f64::NAN);
-        let (rotation, symmetric) = polar(&mag.gain).unwrap_or((nalgebra::Rotation3::identity(), mag.gain));
+        let (rotation, symmetric) = affine::symmetric(&mag.gain, SensorKind::Mag, TARGET)?;
         for (at, axis) in AXES.into_iter().enumerate() {
             line(format!("CAL_MAG0_{axis}OFF"), mag.bias[at] * gauss, "gauss, taken from the reading");
             line(format!("CAL_MAG0_{axis}SCALE"), symmetric[(at, at)], "no unit, after the offset");

@@ -5,9 +5,9 @@
 
 use std::fmt::Write;
 
-use super::{Document, ExportError, Inputs};
+use super::{Document, ExportError, Inputs, level};
 use crate::{
-    recording::SensorKind,
+    recording::{SensorKind, Unit},
     store::{
         StoredTriad,
         covariance_file::EntryCovariance,
@@ -15,11 +15,12 @@ use crate::{
     },
 };
 
+const TARGET: &str = "python";
 /// The functions.
 const CODE: &str = include_str!("python.txt");
 
 pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
-    let calibration = inputs.calibration.ok_or(ExportError::NoCalibration { target: "python" })?;
+    let calibration = inputs.calibration.ok_or(ExportError::NoCalibration { target: TARGET })?;
     let mut text = String::from(
         "\"\"\"A calibrated unit. calibrated = f * gain @ sense(raw - bias); apply() is the inverse, with noise.\"\"\"\n\n",
     );
@@ -38,7 +39,11 @@ pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
             )),
         }
         match inputs.noise.and_then(|noise| noise.sensor(kind)).filter(|noise| noise.axes.len() == 3) {
-            Some(noise) => of_noise(&mut text, kind, noise, &mut cannot),
+            Some(noise) => {
+                let scale = per_calibrated(kind, triad, noise)?;
+                cannot.extend(level::hidden(kind, noise, "it has none here"));
+                of_noise(&mut text, kind, noise, (scale, triad.unit_out), &mut cannot);
+            }
             None => cannot.push(format!("the noise of {kind}: no --noise with an estimate for it was given")),
         }
         text.push_str("    },\n");
@@ -99,7 +104,23 @@ fn of_covariance(text: &mut String, covariance: &EntryCovariance) {
     );
 }
 
-fn of_noise(text: &mut String, kind: SensorKind, noise: &NoiseOfSensor, cannot: &mut Vec<String>) {
+/// How many calibrated units make one of the noise's, which is added to calibrated values.
+fn per_calibrated(kind: SensorKind, triad: &StoredTriad, noise: &NoiseOfSensor) -> Result<f64, ExportError> {
+    let unit = triad.unit_out;
+    let is_alike = (unit == Unit::Arbitrary) == (noise.unit == Unit::Arbitrary.to_string());
+    let refused =
+        || ExportError::NoiseUnit { target: TARGET, sensor: kind, found: noise.unit.clone(), expected: unit };
+    unit.per_si().filter(|_| is_alike).ok_or_else(refused)
+}
+
+/// Scaled into the unit of calibrated values.
+fn of_noise(
+    text: &mut String,
+    kind: SensorKind,
+    noise: &NoiseOfSensor,
+    (scale, unit): (f64, Unit),
+    cannot: &mut Vec<String>,
+) {
     let each = |of: &dyn Fn(&NoiseOfAxis) -> f64| -> [f64; 3] {
         std::array::from_fn(|at| noise.axes[at].as_ref().map_or(0.0, of))
     };
@@ -111,15 +132,15 @@ fn of_noise(text: &mut String, kind: SensorKind, noise: &NoiseOfSensor, cannot: 
     let flicker = |axis: &NoiseOfAxis| {
         if forgets(axis).is_some() { 0.0 } else { axis.bias_instability.value.unwrap_or(0.0) }
     };
-    let unit = &noise.unit;
+    let scaled = |values: [f64; 3]| values.map(|value| scale * value);
     text.push_str("        \"noise\": {\n");
     for (name, values, unit) in [
-        ("white", each(&|axis| axis.white.value.unwrap_or(0.0)), format!("N, {unit}/sqrt(Hz)")),
-        ("bias_instability", each(&flicker), format!("B, {unit}")),
-        ("random_walk", each(&walk), format!("K, {unit}*sqrt(Hz)")),
+        ("white", scaled(each(&|axis| axis.white.value.unwrap_or(0.0))), format!("N, {unit}/sqrt(Hz)")),
+        ("bias_instability", scaled(each(&flicker)), format!("B, {unit}")),
+        ("random_walk", scaled(each(&walk)), format!("K, {unit}*sqrt(Hz)")),
         (
             "bias_std",
-            each(&|axis| forgets(axis).map_or(0.0, |(std, _)| std)),
+            scaled(each(&|axis| forgets(axis).map_or(0.0, |(std, _)| std))),
             format!("of a Gauss–Markov bias, {unit}"),
         ),
         (
@@ -136,6 +157,7 @@ fn of_noise(text: &mut String, kind: SensorKind, noise: &NoiseOfSensor, cannot: 
         let hidden =
             axis.as_ref().is_some_and(|axis| forgets(axis).is_none() && axis.random_walk.value.is_none());
         if let Some(most) = axis.as_ref().and_then(|axis| axis.random_walk.at_most).filter(|_| hidden) {
+            let most = scale * most;
             cannot.push(format!(
                 "{kind}, axis {name}: a walk of the bias below {most:.2e} {unit}*sqrt(Hz), which was not seen"
             ));

@@ -38,7 +38,9 @@ pub(super) fn document(inputs: &Inputs<'_>) -> Result<Document, ExportError> {
             Some(line) => {
                 let _ = writeln!(text, "{field}: {line}");
             }
-            None => cannot.push(format!("{field}: no --noise with an estimate for {kind} was given")),
+            None => {
+                cannot.push(format!("{field}: no --noise with an estimate for each axis of {kind} was given"))
+            }
         }
     }
     cannot.extend(higher_terms(inputs, SensorKind::Acc));
@@ -58,12 +60,13 @@ fn covariance(inputs: &Inputs<'_>, kind: SensorKind) -> Result<Option<String>, E
         return Ok(None);
     };
     let rate = level::rate(inputs, sensor)?;
-    let variance = |axis: &Option<_>| {
-        let level =
-            axis.as_ref().and_then(|axis: &crate::store::noise_file::NoiseOfAxis| Level::of(&axis.white));
-        level.map_or(0.0, |level| per_sample(level.value, rate).powi(2))
-    };
-    let [x, y, z] = [variance(&sensor.axes[0]), variance(&sensor.axes[1]), variance(&sensor.axes[2])];
+    // A zero would say that an axis has no noise.
+    let variances: Option<Vec<f64>> = sensor
+        .axes
+        .iter()
+        .map(|axis| Some(per_sample(Level::of(&axis.as_ref()?.white)?.value, rate).powi(2)))
+        .collect();
+    let Some([x, y, z]) = variances.as_deref() else { return Ok(None) };
     let unit = &sensor.unit;
     Ok(Some(format!(
         "[{x:.6e}, 0, 0, 0, {y:.6e}, 0, 0, 0, {z:.6e}]    # ({unit})^2 of a sample at {rate:.3} Hz: N^2 * rate"

@@ -68,17 +68,12 @@ fn of_sensor(
         let _ = writeln!(text, "    <{element}>");
     }
     for (at, axis) in sensor.axes.iter().enumerate() {
-        match axis {
-            Some(axis) => {
-                let mean = bias(inputs, kind, at, cannot);
-                let about = About { kind, name: AXES[at], rate: level::rate(inputs, sensor)?, mean };
-                of_axis(text, &about, axis, inputs, cannot)?;
-            }
-            None => {
-                cannot.push(format!("{kind}, axis {}: rounding hides its noise; it has none here", AXES[at]))
-            }
-        }
+        let Some(axis) = axis else { continue };
+        let mean = bias(inputs, kind, at, cannot);
+        let about = About { kind, name: AXES[at], rate: level::rate(inputs, sensor)?, mean };
+        of_axis(text, &about, axis, inputs, cannot)?;
     }
+    cannot.extend(level::hidden(kind, sensor, "it has none here"));
     if let Some(element) = element {
         let _ = writeln!(text, "    </{element}>");
     }
@@ -172,7 +167,7 @@ fn drift(axis: &NoiseOfAxis, duration: f64) -> Option<(f64, f64, String)> {
 /// What the sensor reads at zero, SI unit; 0 where the calibration does not say it.
 fn bias(inputs: &Inputs<'_>, kind: SensorKind, axis: usize, cannot: &mut Vec<String>) -> f64 {
     let Some(triad) = inputs.calibration.and_then(|calibration| calibration.triad(kind)) else { return 0.0 };
-    match triad.unit_in.per_si() {
+    match triad.unit_in.per_known_si() {
         Some(per_si) => triad.bias[axis] / per_si,
         None => {
             let line = format!(
