@@ -20,7 +20,7 @@ const OFF: f64 = 6.0;
 
 /// Effects of the catalogue at their usual size that no model of a rig's ladder has, in groups. Of the accelerometer's quadratic and
 /// cubic terms, which one has, a warning speaks (`tests/nonlinear`).
-const EFFECTS: [(&str, &[&str]); 4] = [
+const EFFECTS: [(&str, &[&str]); 5] = [
     (
         "gains that differ by sign; gyroscope, magnetometer: quadratic and cubic terms",
         &[
@@ -34,6 +34,7 @@ const EFFECTS: [(&str, &[&str]); 4] = [
         ],
     ),
     ("accelerometer: a bias that drifts, or settles after switching on", &["acc.bias_drift", "acc.warmup"]),
+    ("accelerometer: hysteresis", &["acc.hysteresis"]),
     (
         "magnetometer: a field that drifts, a scale that follows temperature, soft iron on a gimbal",
         &["mag.field_drift", "mag.temp_scale", "mag.gimbal_soft_iron_outer", "mag.gimbal_soft_iron_middle"],

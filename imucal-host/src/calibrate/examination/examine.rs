@@ -24,6 +24,7 @@ use super::{
     norm_residual::{Shell, terms},
     pose_score,
     residual_driver::Course,
+    side,
     tested::{Tested, judged},
     turning_rest::Turning,
 };
@@ -186,7 +187,9 @@ impl Scene<'_> {
         let middle = |span: &Span| time.partition_point(|t| *t < 0.5 * (span.start + span.end));
         let at: Vec<usize> = of.1.spans.iter().map(middle).collect();
         let name = |pose: usize| format!("the pose at {:.0} s", time[at[pose]]);
-        pose_score::of_rig(of, fit.warm_parameters(), &self.courses(&at), &name)
+        let values = self.recording.sensor(of.0).map_or(&[][..], |triple| &triple.values);
+        let sides = side::sides(time, values, &of.1.spans);
+        pose_score::of_rig(of, &sides, fit.warm_parameters(), &self.courses(&at), &name)
     }
 
     fn of_motions(&self, data: &[MotionData], of: &MotionFit, fit: &FitSummary) -> Vec<Suspicion> {

@@ -16,6 +16,7 @@ pub mod norm_residual;
 pub mod pose_residual;
 mod pose_score;
 pub mod residual_driver;
+pub mod side;
 mod tested;
 mod turn_score;
 pub mod turning_rest;

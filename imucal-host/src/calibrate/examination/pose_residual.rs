@@ -5,7 +5,7 @@
 //! z = ∂m/∂p d φ        d = e_j for b, q, c, x, the base's tilt and e
 //!                      d = e_j e_jᵀ K and K [e_j]× for K: a gain, and the mounting
 //! z = e_j |y_j|        gains that differ by sign
-//! z = e_j y'_j         hysteresis; y': at the pose before
+//! z = e_j s_j          hysteresis; s: the side from which the output came to the pose ([`super::side`])
 //! z = ∂m/∂ψ (1, sin θ_k, cos θ_k)      an encoder that is off by a constant, or by one period a turn
 //! z = ∂m/∂ψ                             axes of two gimbals that are not at right angles
 //! z = ∂m/∂d_i (C e)_j                   soft iron on a gimbal; C e: the field in the gimbal's axes
@@ -47,6 +47,8 @@ pub(super) struct PoseFit<'a, G: Pose<f64>> {
     pub poses: &'a [G],
     pub axes: G::Axes,
     pub parameters: &'a UnifiedParameters<f64>,
+    /// Of each pose; none where no hysteresis is tested.
+    pub sides: &'a [Vector3<f64>],
 }
 
 /// How an output could differ; see the module's equation.
@@ -70,7 +72,7 @@ pub enum Alteration {
     CrossProduct,
     /// Gains that differ by sign.
     BySign,
-    /// The output before.
+    /// The side that the output came from.
     Hysteresis,
 }
 
@@ -149,7 +151,7 @@ impl<G: Pose<f64>> PoseFit<'_, G> {
         let first = of.start;
         let mut columns = match term.alteration {
             Alteration::BySign => self.diagonal(of, |k| self.linear(k).abs()),
-            Alteration::Hysteresis => self.diagonal(of, |k| self.linear(k.saturating_sub(1))),
+            Alteration::Hysteresis => self.diagonal(of, |k| self.sides.get(k).copied().unwrap_or_default()),
             linear => {
                 let along = directions(linear, &self.parameters.sensitivity);
                 let of_row = |row: usize, k: usize| rows.jacobian[row].dot(&along[k]);
@@ -323,7 +325,7 @@ mod tests {
     #[test]
     fn columns_are_how_outputs_differ_where_parameters_do() {
         let (poses, parameters) = (poses(), parameters());
-        let fit = PoseFit { poses: &poses, axes: AXES, parameters: &parameters };
+        let fit = PoseFit { poses: &poses, axes: AXES, parameters: &parameters, sides: &[] };
         let rows = fit.rows(0..poses.len());
         let k = parameters.sensitivity;
         let gain = |axis: usize, step: f64| {
@@ -356,7 +358,7 @@ mod tests {
     #[test]
     fn an_encoder_s_columns_are_how_outputs_differ_where_its_angle_does() {
         let (poses, parameters) = (poses(), parameters());
-        let fit = PoseFit { poses: &poses, axes: AXES, parameters: &parameters };
+        let fit = PoseFit { poses: &poses, axes: AXES, parameters: &parameters, sides: &[] };
         for gimbal in 0..3 {
             let factors: [fn(f64) -> f64; 3] = [|_| 1.0, f64::sin, f64::cos];
             let columns = fit.encoder(gimbal);
@@ -372,7 +374,7 @@ mod tests {
     #[test]
     fn axes_at_right_angles_have_parents_and_change_all_that_they_carry() {
         let (poses, parameters) = (poses(), parameters());
-        let fit = PoseFit { poses: &poses, axes: AXES, parameters: &parameters };
+        let fit = PoseFit { poses: &poses, axes: AXES, parameters: &parameters, sides: &[] };
         assert!(fit.oblique(0).is_none());
         for gimbal in 1..3 {
             // z, y, x: the third axis of a pair is about which they are oblique, and no encoder turns about it.

@@ -6,7 +6,7 @@ use imucal_core::model::{
     rig::{GimbalPose, ReferencePose},
     unified::UNIFIED,
 };
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
 use super::{
@@ -30,7 +30,7 @@ use crate::{
     recording::{GIMBALS, SensorKind},
 };
 
-/// What speaks against a fit to poses on a rig. `warm` parameters of temperature were estimated with it; `name` says which
+/// What speaks against a fit to poses on a rig, which were reached from these sides. `warm` parameters of temperature were estimated with it; `name` says which
 /// pose it is.
 ///
 /// Terms that a higher rung of the accelerometer's ladder has are no suspicion: a warning names that rung
@@ -38,11 +38,12 @@ use crate::{
 /// they were estimated.
 pub(super) fn of_rig(
     (kind, poses, fit): (SensorKind, &Poses, &RigFit),
+    sides: &[Vector3<f64>],
     warm: usize,
     courses: &[Course],
     name: &dyn Fn(usize) -> String,
 ) -> Vec<Suspicion> {
-    let of = PoseFit { poses: &poses.poses, axes: poses.axes, parameters: &fit.parameters };
+    let of = PoseFit { poses: &poses.poses, axes: poses.axes, parameters: &fit.parameters, sides };
     let count = poses.poses.len();
     let (rows, free) = (of.rows(0..count), fit.free_entries());
     let (of_ladder, others): (Vec<_>, Vec<_>) =
@@ -113,7 +114,7 @@ pub(super) fn along_reference(
     (kind, poses, fit): (SensorKind, &[ReferencePose<f64>], &RigFit),
     courses: &[Course],
 ) -> Vec<Suspicion> {
-    let of_poses = PoseFit { poses, axes: (), parameters: &fit.parameters };
+    let of_poses = PoseFit { poses, axes: (), parameters: &fit.parameters, sides: &[] };
     let free = fit.free_entries();
     let entries = indices(&free);
     let terms = of_courses(kind, courses);
