@@ -284,7 +284,7 @@ fn set_unit(recording: &mut Recording, kind: SensorKind, unit: Unit) {
     *slot = unit;
     let after = unit.per_si().or(counts.map(|c| c.per_unit));
     if let (Some(range), Some(before), Some(after)) = (range.as_mut(), before, after) {
-        *range *= after / before;
+        *range *= (after / before).abs();
     }
     match (unit, counts.as_mut()) {
         (Unit::Counts, Some(counts)) => counts.offset = 0.0,

@@ -30,6 +30,11 @@ fn two_files_of_imu_tk_become_a_recording_that_calibrates_as_the_original() {
     imucal(&["import", &acc, &gyro, "--manifest", &manifest, "--out", &out])
         .with(0)
         .printing(&["imported.csv"]);
+    for option in ["--map=acc=a,b,c", "--unit=gyr=deg/s", "--time=t", "--topic=imu=/imu"] {
+        imucal(&["import", &acc, &gyro, "--manifest", &manifest, "--out", &out, "--force", option])
+            .with(2)
+            .telling(&["found it for imu_tk", "leave it out"]);
+    }
     let imported = Recording::read(&folder.path("imported.csv")).expect("it was imported");
     assert_eq!(imported.rows(), original.rows());
     imucal(&["calibrate", &out])

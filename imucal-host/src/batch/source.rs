@@ -96,7 +96,11 @@ pub fn find(from: &[PathBuf], excluded: &[PathBuf], method: &Method) -> Result<V
         }
     }
     found.sort_by(|a, b| (&a.place, &a.name).cmp(&(&b.place, &b.name)));
-    found.dedup_by(|a, b| a.place == b.place && a.name == b.name);
+    // Twice by two methods is a fault that the names show.
+    let is_same = |a: &Found, b: &Found| {
+        a.place == b.place && a.name == b.name && a.method.options() == b.method.options()
+    };
+    found.dedup_by(|a, b| is_same(a, b));
     named(found, &common(&search.roots))
 }
 

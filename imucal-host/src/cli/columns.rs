@@ -41,6 +41,20 @@ impl Columns {
     pub(super) fn mapping(&self) -> anyhow::Result<Mapping> {
         Ok(Mapping::parse(&self.map, &self.unit, self.time.as_deref())?.with_topics(&self.topic)?)
     }
+
+    /// An error where an option is given for files that have no use for it.
+    pub(super) fn refuse_for(&self, files: &str, why: &str) -> anyhow::Result<()> {
+        let given = [
+            ("--map", !self.map.is_empty()),
+            ("--unit", !self.unit.is_empty()),
+            ("--time", self.time.is_some()),
+            ("--topic", !self.topic.is_empty()),
+        ];
+        match given.into_iter().find(|(_, given)| *given) {
+            Some((option, _)) => anyhow::bail!("{option}: found it for {files}, {why}; leave it out"),
+            None => Ok(()),
+        }
+    }
 }
 
 /// Reads a recording, or another program's file as one, and warns of what is odd in it.

@@ -53,7 +53,7 @@ pub(super) struct Arguments {
     /// What the samples are: a recording's TOML with units, site and sensor; needed for imu_tk
     #[arg(long, value_name = "NAME.toml")]
     manifest: Option<PathBuf>,
-    /// The recording to write: .csv, .csv.gz or .parquet
+    /// The recording to write: .csv, .csv.gz, .parquet or .mcap
     #[arg(long, value_name = "REC")]
     out: PathBuf,
     #[command(flatten)]
@@ -76,17 +76,24 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         }
         None => None,
     };
+    let is_euroc = |folder: &Path| match arguments.from {
+        None => euroc::is_folder(folder),
+        from => from == Some(Layout::Euroc),
+    };
     let rows = match (arguments.files.as_slice(), arguments.from) {
-        ([folder], Some(Layout::Euroc)) => {
-            whole(&euroc::read_folder(folder, manifest, &limits)?, arguments, &mut files)?
-        }
-        ([folder], None) if euroc::is_folder(folder) => {
+        ([folder], _) if is_euroc(folder) => {
+            arguments
+                .columns
+                .refuse_for("a folder of EuRoC", "whose columns, units and topics are its own")?;
             whole(&euroc::read_folder(folder, manifest, &limits)?, arguments, &mut files)?
         }
         ([file], None | Some(Layout::Csv | Layout::Log)) => {
             by_parts(file, manifest.as_ref(), arguments, &mut files)?
         }
         ([acc, gyr], None | Some(Layout::ImuTk)) => {
+            arguments
+                .columns
+                .refuse_for("imu_tk", "whose columns are `t x y z` and whose units --manifest states")?;
             let manifest = manifest.context("imu_tk: its files say no units; add --manifest")?;
             whole(&imu_tk::read_pair(acc, gyr, manifest, &limits)?, arguments, &mut files)?
         }

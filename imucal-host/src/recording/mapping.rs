@@ -129,12 +129,6 @@ impl Mapping {
         Ok((Self::default().with_topics(&options)?, None))
     }
 
-    /// Whether a log's magnetometer is in a unit of its own, which this or its manifest states.
-    #[cfg(feature = "logs")]
-    pub(super) fn states_field(&self, manifest: &Manifest) -> bool {
-        self.states(SensorKind::Mag) || manifest.units.mag != Manifest::default().units.mag
-    }
-
     /// Columns are named.
     pub(super) fn has_columns(&self) -> bool {
         !self.columns.is_empty()

@@ -189,7 +189,10 @@ impl Recording {
         manifest: Option<Manifest>,
         limits: &Limits,
     ) -> Result<Self, ReadError> {
-        let (format, manifest, warnings) = parts::opened(path, mapping, manifest, limits)?;
+        let parts::Opened { format, manifest, warnings, field_is_stated } =
+            parts::opened(path, mapping, manifest, limits)?;
+        #[cfg(not(feature = "logs"))]
+        let _ = field_is_stated;
         let unit = manifest.units.t;
         let mut table = match format {
             Format::Csv | Format::CsvGz => read::csv::read(path, unit, mapping, limits)?,
@@ -201,7 +204,7 @@ impl Recording {
             }
             Format::Mat => read::matlab::read(path, unit, mapping, limits)?,
             #[cfg(feature = "logs")]
-            Format::Log => read::logs::read(path, &mapping.topics, mapping.states_field(&manifest), limits)?,
+            Format::Log => read::logs::read(path, &mapping.topics, field_is_stated, limits)?,
             #[cfg(not(feature = "logs"))]
             Format::Log => return Err(ReadError::LogsNotBuilt { path: path.to_path_buf() }),
         };

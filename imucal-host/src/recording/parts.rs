@@ -46,11 +46,12 @@ impl Recording {
         take: &mut dyn FnMut(Self) -> ControlFlow<()>,
     ) -> Result<Vec<Warning>, ReadError> {
         let Source { path, mapping, manifest, limits } = source;
-        let (format, manifest, warnings) = opened(path, mapping, manifest.cloned(), limits)?;
+        let Opened { format, manifest, warnings, field_is_stated } =
+            opened(path, mapping, manifest.cloned(), limits)?;
+        #[cfg(not(feature = "logs"))]
+        let _ = field_is_stated;
         let misled = misled(&warnings);
         let unit = manifest.units.t;
-        #[cfg(feature = "logs")]
-        let field_is_stated = mapping.states_field(&manifest);
         let mut parts = Parts {
             path,
             manifest,
@@ -83,13 +84,23 @@ impl Recording {
     }
 }
 
+/// What is known of a samples file before it is read.
+pub(super) struct Opened {
+    pub(super) format: Format,
+    /// With what a mapping states.
+    pub(super) manifest: Manifest,
+    pub(super) warnings: Vec<Warning>,
+    /// A log's magnetometer is in a unit that its manifest or the mapping states, in place of ROS's.
+    pub(super) field_is_stated: bool,
+}
+
 /// The format of a samples file, its manifest with what a mapping states, and what is odd in that. A mapped file needs no manifest.
 pub(super) fn opened(
     path: &Path,
     mapping: &Mapping,
     manifest: Option<Manifest>,
     limits: &Limits,
-) -> Result<(Format, Manifest, Vec<Warning>), ReadError> {
+) -> Result<Opened, ReadError> {
     let format = Format::of(path).map_err(|found| unknown(path, found))?;
     if !path.exists() {
         let found = "there is no such file".to_owned();
@@ -99,15 +110,23 @@ pub(super) fn opened(
     if format == Format::Mat {
         read::matlab::refuse_others(path)?;
     }
-    let (manifest, mut warnings) = match manifest {
-        Some(manifest) => (manifest, Vec::new()),
+    let (manifest, mut warnings, states_field) = match manifest {
+        // What it was read from is not known, nor whether that states microtesla.
+        Some(manifest) => {
+            let is_unusual = manifest.units.mag != Manifest::default().units.mag;
+            (manifest, Vec::new(), is_unusual)
+        }
         None if format == Format::Log => manifest_of_log(path, limits)?,
-        None => manifest_of(path, mapping, limits)?,
+        None => {
+            let (manifest, warnings) = manifest_of(path, mapping, limits)?;
+            (manifest, warnings, false)
+        }
     };
+    let field_is_stated = states_field || mapping.states(SensorKind::Mag);
     let mut manifest = mapping.over(manifest);
     if format == Format::Log {
         stamped(path, TimeUnit::Nanosecond, &mut manifest, &mut warnings);
-        warnings.extend(of_driver(path, &manifest, mapping));
+        warnings.extend(of_driver(path, &manifest, field_is_stated));
     }
     #[cfg(feature = "parquet")]
     if format == Format::Parquet
@@ -115,7 +134,7 @@ pub(super) fn opened(
     {
         stamped(path, unit, &mut manifest, &mut warnings);
     }
-    Ok((format, manifest, warnings))
+    Ok(Opened { format, manifest, warnings, field_is_stated })
 }
 
 /// A file whose ending is of no format.
@@ -146,15 +165,18 @@ fn refuse_options(path: &Path, format: Format, mapping: &Mapping) -> Result<(), 
     Err(ReadError::Topics { path: path.to_path_buf(), fault: Box::new(fault) })
 }
 
-/// A log may go without; its messages say their units.
-fn manifest_of_log(path: &Path, limits: &Limits) -> Result<(Manifest, Vec<Warning>), ReadError> {
+/// A log may go without, since its messages say their units; and whether it states that of the magnetometer.
+fn manifest_of_log(path: &Path, limits: &Limits) -> Result<(Manifest, Vec<Warning>, bool), ReadError> {
     let manifest_path = Manifest::path_for(path).unwrap_or_else(|| path.with_extension("toml"));
     match Manifest::read_within(&manifest_path, limits) {
-        Err(ReadError::ManifestMissing { .. }) => Ok((Manifest::default(), Vec::new())),
+        Err(ReadError::ManifestMissing { .. }) => Ok((Manifest::default(), Vec::new(), false)),
         read => {
             let (manifest, mut warnings) = read?;
+            let assumes_field = warnings.iter().any(|warning| {
+                matches!(warning, Warning::UnitsAssumed { assumed, .. } if assumed.iter().any(|(key, _)| *key == "mag"))
+            });
             warnings.retain(|warning| !matches!(warning, Warning::UnitsAssumed { .. }));
-            Ok((manifest, warnings))
+            Ok((manifest, warnings, !assumes_field))
         }
     }
 }
@@ -175,10 +197,11 @@ pub(super) fn stamped(path: &Path, found: TimeUnit, manifest: &mut Manifest, war
 }
 
 /// Units that a driver uses in place of ROS's.
-fn of_driver(path: &Path, manifest: &Manifest, mapping: &Mapping) -> Vec<Warning> {
+fn of_driver(path: &Path, manifest: &Manifest, field_is_stated: bool) -> Vec<Warning> {
     let usual = Manifest::default().units;
-    let stated = |kind: &SensorKind| {
-        manifest.units.of(*kind) != usual.of(*kind) || (*kind == SensorKind::Mag && mapping.states(*kind))
+    let stated = |kind: &SensorKind| match kind {
+        SensorKind::Mag => field_is_stated,
+        kind => manifest.units.of(*kind) != usual.of(*kind),
     };
     let warning = |kind: SensorKind| Warning::UnitOfDriver {
         path: path.to_path_buf(),

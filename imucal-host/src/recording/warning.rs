@@ -201,6 +201,14 @@ pub enum Warning {
         /// Each with what it is.
         others: Vec<String>,
     },
+    /// Columns of a Parquet file whose values have no text.
+    #[error("{path}: left out {}, expected one number or text in a row", listed(.columns))]
+    NotOneValue {
+        /// The Parquet file.
+        path: PathBuf,
+        /// Each with its type.
+        columns: Vec<String>,
+    },
     /// Columns that the messages of a log do not hold.
     #[error(
         "{path}: left out {}, which messages of sensors, temperatures and poses do not hold; write CSV or Parquet to keep all columns", .columns.join(", ")

@@ -96,6 +96,20 @@ fn lists_as_toml_and_as_csv_say_the_same() {
 }
 
 #[test]
+fn a_recording_that_is_found_with_two_methods_is_named_twice() {
+    let folder = folder(&["in/x.csv"]);
+    write(&folder, "list.csv", "path,model\nin/x.csv,acc=T6\n");
+    let found = |from: &[&str]| {
+        let from: Vec<_> = from.iter().map(|name| folder.path().join(name)).collect();
+        find(&from, &[], &method()).map(|found| found.len())
+    };
+    assert!(matches!(found(&["in", "list.csv"]), Err(SourceFault::Twice { .. })));
+    assert!(matches!((found(&["in", "in/x.csv"]), found(&["list.csv"])), (Ok(1), Ok(1))));
+    write(&folder, "list.csv", "path,name,model\nin/x.csv,six,acc=T6\nin/x.csv,nine,\n");
+    assert!(matches!(found(&["list.csv"]), Ok(2)));
+}
+
+#[test]
 fn a_bag_of_several_files_is_one_recording() {
     let folder = folder(&["in/walk/walk_0.mcap", "in/walk/walk_1.mcap", "in/x.csv"]);
     write(&folder, "in/walk/metadata.yaml", "rosbag2_bagfile_information:\n");

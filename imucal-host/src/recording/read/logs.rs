@@ -189,6 +189,16 @@ mod tests {
         assert_eq!(recording.mag.unwrap().values[0].x, 2e-5);
         let texts: Vec<String> = recording.warnings.iter().map(ToString::to_string).collect();
         assert_says(&texts.join("\n"), &["none.bag, sensor mag: uT is stated", "ROS are in T"]);
+        let folder = tempfile::tempdir().unwrap();
+        let bag = folder.path().join("none.bag");
+        std::fs::copy(fixture("none.bag"), &bag).unwrap();
+        for (units, expected) in [("mag = \"uT\"", 2e-5), ("acc = \"m/s^2\"", 20.0)] {
+            let manifest = format!("format = \"imucal-recording/1\"\n[units]\n{units}\n");
+            std::fs::write(folder.path().join("none.toml"), manifest).unwrap();
+            let recording = Recording::read(&bag).unwrap();
+            let found = recording.mag.unwrap().values[0].x;
+            assert!((found / expected - 1.0).abs() < 1e-12, "{units}: {found}");
+        }
         let error = read_topics("none.bag", &["imu=/imu/data"], &["acc=g"]).unwrap_err();
         assert_says(&error, &["m/s^2", "the median length"]);
     }

@@ -7,7 +7,7 @@ use std::{
 };
 
 use ::parquet::{
-    basic::{ConvertedType, LogicalType, TimeUnit as Stamp},
+    basic::{ConvertedType, LogicalType, TimeUnit as Stamp, Type as Physical},
     column::reader::{ColumnReader, ColumnReaderImpl},
     data_type::{ByteArray, DataType},
     errors::ParquetError,
@@ -25,7 +25,7 @@ use super::{
 };
 use crate::{
     file::Limits,
-    recording::{mapping::Mapping, place::Places, read_error::ReadError, unit::TimeUnit},
+    recording::{mapping::Mapping, place::Places, read_error::ReadError, unit::TimeUnit, warning::Warning},
 };
 
 /// How the library begins to say that it cannot decompress a column.
@@ -127,16 +127,23 @@ fn groups(
     let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
     let fault = |fault| ReadError::Mapping { path: path.to_path_buf(), line: None, fault };
     let renamed = mapping.renamed(&names.iter().map(String::as_str).collect::<Vec<_>>()).map_err(fault)?;
-    let layout = Layout::new(&renamed.iter().map(String::as_str).collect::<Vec<_>>(), path, None)?;
+    let kept = |at: usize| NAMES.contains(&renamed[at].as_str()) || has_text(&schema.column(at));
+    let (kept, left_out): (Vec<usize>, Vec<usize>) = (0..renamed.len()).partition(|at| kept(*at));
+    let layout = Layout::new(&kept.iter().map(|at| renamed[*at].as_str()).collect::<Vec<_>>(), path, None)?;
     let found = &reader.metadata().row_groups()[which.clone()];
     let rows: u64 = found.iter().map(|group| group.num_rows().max(0) as u64).sum();
     let memory = Memory::new(path, limits.size);
     memory.take(rows.saturating_mul(layout.row_size() as u64));
     memory.check()?;
     let mut table = layout.table(rows as usize, Places::WHOLE, clock);
+    if which.start == 0 && !left_out.is_empty() {
+        let columns =
+            left_out.iter().map(|at| format!("`{}` ({})", names[*at], type_of(&schema.column(*at))));
+        table.warnings.push(Warning::NotOneValue { path: path.to_path_buf(), columns: columns.collect() });
+    }
     for group in which {
         let group = reader.get_row_group(group).map_err(damaged)?;
-        for (at, target) in layout.targets.iter().enumerate() {
+        for (&at, target) in kept.iter().zip(&layout.targets) {
             let descriptor = &schema.column(at);
             let column = ColumnOfGroup { path, at, group: group.as_ref(), descriptor, memory: &memory };
             match *target {
@@ -154,6 +161,22 @@ fn groups(
     }
     table.refuse_infinite(path)?;
     Ok(table)
+}
+
+/// Whether the values of a column that the contract does not know can be kept as text: one in a row, of a type that has a text.
+fn has_text(column: &ColumnDescriptor) -> bool {
+    let physical = column.physical_type();
+    column.max_rep_level() == 0 && !matches!(physical, Physical::INT96 | Physical::FIXED_LEN_BYTE_ARRAY)
+}
+
+/// What a column holds.
+fn type_of(column: &ColumnDescriptor) -> String {
+    let list = if column.max_rep_level() > 0 { "list of " } else { "" };
+    let converted = match column.converted_type() {
+        ConvertedType::NONE => String::new(),
+        converted => format!(", {converted}"),
+    };
+    format!("{list}{}{converted}", column.physical_type())
 }
 
 fn damaged(path: &Path, cause: &ParquetError) -> ReadError {
@@ -242,14 +265,10 @@ impl ColumnOfGroup<'_> {
     }
 
     fn type_error(&self) -> ReadError {
-        let converted = match self.descriptor.converted_type() {
-            ConvertedType::NONE => String::new(),
-            converted => format!(" ({converted})"),
-        };
         ReadError::ColumnType {
             path: self.path.to_path_buf(),
             column: self.descriptor.path().string(),
-            found: format!("{}{converted}", self.descriptor.physical_type()),
+            found: type_of(self.descriptor),
         }
     }
 

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use ::parquet::{
-    basic::{Compression, Repetition, Type as Physical},
-    data_type::{DoubleType, FloatType, Int64Type},
+    basic::{Compression, Repetition},
+    data_type::{DoubleType, FixedLenByteArrayType, FloatType, Int64Type},
     file::{properties::WriterProperties, writer::SerializedFileWriter},
     schema::types::Type,
 };
@@ -113,6 +113,58 @@ fn integers_since_1970_are_exact_and_a_lost_position_is_not_measured() {
     let message =
         Fixture::new("run.parquet", "", of_numbers(&[("t", &[0.0]), ("temp", &[f64::INFINITY])], &[]));
     assert_says(&message.error(), &["column `temp`", "infinite"]);
+}
+
+/// Times, a temperature, a list of numbers in each row, and bytes of fixed length.
+fn with_list(name_of_list: &str) -> Vec<u8> {
+    let number = |name| Arc::new(Type::primitive_type_builder(name, Physical::DOUBLE).build().unwrap());
+    let list =
+        Type::primitive_type_builder(name_of_list, Physical::DOUBLE).with_repetition(Repetition::REPEATED);
+    let bytes = Type::primitive_type_builder("id", Physical::FIXED_LEN_BYTE_ARRAY).with_length(2);
+    let fields =
+        vec![number("t"), Arc::new(list.build().unwrap()), number("temp"), Arc::new(bytes.build().unwrap())];
+    let schema = Arc::new(Type::group_type_builder("schema").with_fields(fields).build().unwrap());
+    let mut file = Vec::new();
+    let mut writer = SerializedFileWriter::new(&mut file, schema, Arc::default()).unwrap();
+    for start in [0.0, 2.0] {
+        let mut group = writer.next_row_group().unwrap();
+        for at in 0..4 {
+            let mut column = group.next_column().unwrap().unwrap();
+            match at {
+                0 => column.typed::<DoubleType>().write_batch(&[start, start + 1.0], Some(&[1; 2]), None),
+                1 => column.typed::<DoubleType>().write_batch(
+                    &[7.0, 8.0, 9.0],
+                    Some(&[1; 3]),
+                    Some(&[0, 1, 0]),
+                ),
+                2 => column.typed::<DoubleType>().write_batch(&[20.0, 21.0], Some(&[1; 2]), None),
+                _ => {
+                    let ids = [vec![1, 2], vec![3, 4]].map(|id| ByteArray::from(id).into());
+                    column.typed::<FixedLenByteArrayType>().write_batch(&ids, Some(&[1; 2]), None)
+                }
+            }
+            .unwrap();
+            column.close().unwrap();
+        }
+        group.close().unwrap();
+    }
+    writer.close().unwrap();
+    file
+}
+
+#[test]
+fn a_column_without_a_value_of_its_own_in_each_row_is_left_out_once_and_refused_as_a_sensors() {
+    let fixture = Fixture::new("run.parquet", "", with_list("samples"));
+    let recording = fixture.read();
+    assert_eq!(recording.time, [0.0, 1.0, 2.0, 3.0]);
+    assert_eq!(recording.temperature.unwrap()[3], 21.0);
+    assert!(recording.extra.is_empty());
+    let left_out: Vec<String> =
+        fixture.warnings().into_iter().filter(|warning| warning.contains("left out")).collect();
+    assert_eq!(left_out.len(), 1, "{left_out:?}");
+    assert_says(&left_out[0], &["`samples` (list of DOUBLE)", "`id` (FIXED_LEN_BYTE_ARRAY)", "run.parquet"]);
+    let message = Fixture::new("run.parquet", "", with_list("segment")).error();
+    assert_says(&message, &["column `segment`", "list of DOUBLE"]);
 }
 
 #[test]
