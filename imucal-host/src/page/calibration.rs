@@ -6,7 +6,11 @@ use super::{
     Answer, Part, Tone, figure, residuals::residuals, segmentation::segmentation, sentences, sphere::sphere,
 };
 use crate::{
-    calibrate::{Calibration, FitSummary, SensorOutcome, Status, outcome::entry_name, residuals as leftover},
+    calibrate::{
+        Calibration, FitSummary, SensorOutcome, Status,
+        outcome::{Evidence, entry_name},
+        residuals as leftover,
+    },
     recording::{Recording, SensorKind, Unit},
     report::{
         measure::{percent, plain, rounded},
@@ -170,13 +174,21 @@ fn drawings(
     let what = if is_of_turns { "Axes of the turns" } else { "Directions that were measured" };
     let (residual, unit, scale) = match (outcome.kind, fit.unit_out) {
         (SensorKind::Gyr, _) => ("attitude error of a turn", "°".to_owned(), 1f64.to_degrees()),
-        (_, unit) => ("length less the norm", shown(unit), 1.0),
+        (_, unit) => ("length less the norm", shown(unit), of_field(outcome, fit)),
     };
     html! {
         div class="figures" {
             (figure(what, &sphere(&directions, what), &html! { "Coverage " (percent(fit.coverage)) " of the sphere; two halves of equal area." }))
             (residuals(&observations, residual, &unit, scale, fit.rms))
         }
+    }
+}
+
+/// How many units of a fit's results make one of its observations': in a field of unknown length results are in raw units.
+fn of_field(outcome: &SensorOutcome, fit: &FitSummary) -> f64 {
+    match (&outcome.evidence, fit.field_norm) {
+        (Some(Evidence::Shell { norm, .. }), Some(field)) => field / norm,
+        _ => 1.0,
     }
 }
 
