@@ -3,7 +3,7 @@
 //! An effect many times its usual size may leave a gap so large that it counts as noise, which a gain many times too large takes up in
 //! part. In a noise as large as what an effect does, the data say little against its usual size: it comes out too small, or no step of the
 //! search gains by it. Both are mended the same way: the fit begins with a perfect sensor and a hundredth of the noise, and is taken only
-//! if it leaves far less.
+//! if it leaves far less. A fit that cannot be computed from there is not taken; the search goes on without it.
 
 use super::{
     hypothesis::Scored,
@@ -11,10 +11,7 @@ use super::{
     refit::{Fit, refit},
 };
 use crate::{
-    diagnosis::{
-        error::DiagnosisError,
-        mixed_model::noise::{FAR, Noise},
-    },
+    diagnosis::mixed_model::noise::{FAR, Noise},
     effect::Effect,
     recording::SensorKind,
     simulator::Dose,
@@ -29,14 +26,10 @@ const TRIED: usize = 3;
 
 /// A fit whose effects are not held at their usual sizes, and its noise; `None` unless the noise holds a misfit of which that fit leaves
 /// far less.
-pub fn released(
-    linear: &Linearisation<'_>,
-    fit: &Fit,
-    noise: &Noise,
-) -> Result<Option<(Fit, Noise)>, DiagnosisError> {
+pub fn released(linear: &Linearisation<'_>, fit: &Fit, noise: &Noise) -> Option<(Fit, Noise)> {
     let held = holding(linear, noise);
     if held.is_empty() {
-        return Ok(None);
+        return None;
     }
     far_less(linear, from_perfect(linear, fit, &held)?, noise)
 }
@@ -47,33 +40,30 @@ pub fn begun_again<'s>(
     linear: &Linearisation<'s>,
     fit: &Fit,
     from: &Scored,
-) -> Result<Option<(Scored, Fit, Linearisation<'s>)>, DiagnosisError> {
+) -> Option<(Scored, Fit, Linearisation<'s>)> {
     let (scene, candidates) = (linear.scene, linear.candidates);
     let held = holding(linear, &from.noise);
     if held.is_empty() || from.set.len() >= scene.settings.search.most {
-        return Ok(None);
+        return None;
     }
     let start = from_perfect(linear, fit, &held)?;
     let quiet = from.noise.clone().scaled(RELEASED);
-    let about = Linearisation::new(scene, candidates, &start, &quiet, None)?;
-    let (own, ranked) = about.ranked(&from.set, &quiet)?;
+    let about = Linearisation::new(scene, candidates, &start, &quiet, None).ok()?;
+    let (own, ranked) = about.ranked(&from.set, &quiet).ok()?;
     let acts_there = |effect: &Effect| matches!(effect.sensors, [kind] if held.contains(kind));
     let likely = ranked.into_iter().filter(|(value, effect)| *value > own && acts_there(effect));
-    let mut best: Option<(Scored, Fit, Linearisation<'s>)> = None;
-    for (_, effect) in likely.take(TRIED) {
-        let values = about.refined(effect, &start.doses, &from.set, &quiet)?;
+    let with = |effect: &'static Effect| {
+        let values = about.refined(effect, &start.doses, &from.set, &quiet).ok()?;
         let doses = start.doses.iter().cloned().chain([Dose { effect, values }]).collect();
-        let with = start.clone().with(scene, doses)?;
-        let Some((free, lower)) = far_less(linear, with, &from.noise)? else { continue };
-        let problem = Linearisation::new(scene, candidates, &free, &lower, None)?;
+        let (free, lower) = far_less(linear, start.clone().with(scene, doses).ok()?, &from.noise)?;
+        let problem = Linearisation::new(scene, candidates, &free, &lower, None).ok()?;
         let set: Vec<&'static Effect> = from.set.iter().copied().chain([effect]).collect();
-        let scored = problem.judge(&set, &lower, &SensorKind::ALL, &FAR)?;
-        let most = best.as_ref().map_or(from.log_evidence, |(best, ..)| best.log_evidence);
-        if scored.log_evidence > most {
-            best = Some((scored, free, problem));
-        }
-    }
-    Ok(best)
+        let scored = problem.judge(&set, &lower, &SensorKind::ALL, &FAR).ok()?;
+        Some((scored, free, problem))
+    };
+    let tried = likely.take(TRIED).filter_map(|(_, effect)| with(effect));
+    let best = tried.max_by(|(a, ..), (b, ..)| a.log_evidence.total_cmp(&b.log_evidence));
+    best.filter(|(best, ..)| best.log_evidence > from.log_evidence)
 }
 
 /// Sensors whose noise holds a misfit.
@@ -82,23 +72,19 @@ fn holding(linear: &Linearisation<'_>, noise: &Noise) -> Vec<SensorKind> {
 }
 
 /// What a fit holds, with these sensors perfect and without the effects on them.
-fn from_perfect(linear: &Linearisation<'_>, fit: &Fit, held: &[SensorKind]) -> Result<Fit, DiagnosisError> {
+fn from_perfect(linear: &Linearisation<'_>, fit: &Fit, held: &[SensorKind]) -> Option<Fit> {
     let begins_again = |dose: &Dose| matches!(dose.effect.sensors, [kind] if held.contains(kind));
     let begun = |dose: &Dose| if begins_again(dose) { dose.without_amplitudes() } else { dose.clone() };
     let doses = fit.doses.iter().map(begun).collect();
-    fit.clone().with(linear.scene, doses)
+    fit.clone().with(linear.scene, doses).ok()
 }
 
 /// A start fitted in a hundredth of a noise, and what it leaves of that noise, where that is far less.
-fn far_less(
-    linear: &Linearisation<'_>,
-    start: Fit,
-    noise: &Noise,
-) -> Result<Option<(Fit, Noise)>, DiagnosisError> {
-    let free = refit(linear.scene, start, Some(&noise.clone().scaled(RELEASED)))?;
+fn far_less(linear: &Linearisation<'_>, start: Fit, noise: &Noise) -> Option<(Fit, Noise)> {
+    let free = refit(linear.scene, start, Some(&noise.clone().scaled(RELEASED))).ok()?;
     let lower = linear.weighing.white(&free.residual).at_most(noise);
     let is_far_less = |kind| lower.largest(kind) < FAR_LESS * noise.largest(kind);
-    Ok(SensorKind::ALL.into_iter().any(is_far_less).then_some((free, lower)))
+    SensorKind::ALL.into_iter().any(is_far_less).then_some((free, lower))
 }
 
 #[cfg(test)]
@@ -161,10 +147,10 @@ mod tests {
     #[test]
     fn an_arm_that_its_usual_length_holds_back_is_released_where_the_noise_holds_a_misfit() {
         hold(Some([0.02, 0.01, -0.01]), |linear, fit, noise| {
-            let (free, lower) = released(linear, fit, noise).unwrap().expect("it leaves far less");
+            let (free, lower) = released(linear, fit, noise).expect("it leaves far less");
             assert_is_the_arm(&free);
             assert!(lower.largest(SensorKind::Acc) < 1.0, "{lower:?}");
-            assert!(released(linear, &free, &lower).unwrap().is_none(), "nothing is held any more");
+            assert!(released(linear, &free, &lower).is_none(), "nothing is held any more");
         });
     }
 
@@ -183,10 +169,10 @@ mod tests {
     fn an_arm_that_no_step_finds_is_found_from_a_perfect_sensor() {
         hold(None, |linear, fit, noise| {
             let from = linear.judge(&[], noise, &[], &FAR).unwrap();
-            let (best, free, about) = begun_again(linear, fit, &from).unwrap().expect("an arm is likelier");
+            let (best, free, about) = begun_again(linear, fit, &from).expect("an arm is likelier");
             assert_is_the_arm(&free);
             assert!(best.noise.largest(SensorKind::Acc) < 1.0, "{:?}", best.noise);
-            assert!(begun_again(&about, &free, &best).unwrap().is_none(), "nothing is held any more");
+            assert!(begun_again(&about, &free, &best).is_none(), "nothing is held any more");
         });
     }
 }

@@ -73,7 +73,7 @@ pub fn search<'s>(
     loop {
         at = at.settled()?;
         let Some(Step { to, found_in }) = improved(&at)? else {
-            let again = held_back::begun_again(&at.linear, &at.fit, &at.best)?;
+            let again = held_back::begun_again(&at.linear, &at.fit, &at.best);
             let Some((best, fit, linear)) = again else { break };
             trace("begun again from a perfect sensor, with what its noise held back");
             at = Solution { best, fit, linear, ..at };
@@ -156,7 +156,7 @@ impl<'s> Solution<'s> {
         }
         let fit = refit(scene, self.fit.clone().with(scene, doses)?, Some(&next.noise))?;
         next.noise = next.noise.at_most(&found_in.weighing.white(&fit.residual));
-        let fit = match held_back::released(found_in, &fit, &next.noise)? {
+        let fit = match held_back::released(found_in, &fit, &next.noise) {
             Some((free, lower)) => {
                 next.noise = lower;
                 free
