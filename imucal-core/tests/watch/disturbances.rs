@@ -99,8 +99,8 @@ fn a_magnet_that_goes_while_the_unit_is_carried_is_over_once_the_poses_after_it_
     poses.sort_unstable();
     let (half, most) = (quantile(&poses, 0.5), poses.last().unwrap());
     println!(
-        "\na magnet that goes while the unit is carried: over in {over} of {seen} units, half after {half} poses, \
-         all after {most}\na magnet that stays on the unit: over in {} of {seen} after 30 poses",
+        "\na magnet that goes while the unit is carried: over in {over} of {seen} units, in the median after {half} poses, \
+         at most after {most}\na magnet that stays on the unit: over in {} of {seen} after 30 poses",
         seen - kept
     );
     assert!(u64::from(seen) * 4 >= SEEDS * 3, "{seen}");

@@ -30,7 +30,7 @@ impl Score {
                 [&must, aim],
             );
         }
-        text += "\nIn addition to the contract's figures:\n";
+        text += "\nFurther figures:\n";
         self.further.iter().for_each(|share| text += &line(share));
         text += "\nProbability of a cause, where all that is there is of the catalogue: said, and\nhow often it was there.\n";
         for bin in self.calibration.iter().filter(|bin| bin.causes > 0) {

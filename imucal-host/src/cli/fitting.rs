@@ -11,7 +11,7 @@ pub(super) struct Fitting {
     /// bias) or T6 (scale and bias, from six faces), gyr=K9 (gain), mag=E9 (ellipsoid). On a rig: acc=I14 (gain, bias and
     /// tilt of the base) or T12, I17, I20, I23; gyr=G12 (gain and bias) or G21; mag=X21 (gain, bias, hard iron on gimbals
     /// and field) or M12, M15, X18. With an optical reference: gyr=G12 or G21, mag=M15 or M12. The exit status is 0 only
-    /// if every sensor named here is accepted
+    /// if every sensor named here is accepted, or suspect with --accept-suspect, and no other is suspect without that option
     #[arg(long, value_delimiter = ',')]
     model: Vec<ModelOf>,
     /// Use this multiple of the initial rest's variance for the rest test instead of trying 2 to 10

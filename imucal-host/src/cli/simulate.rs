@@ -31,7 +31,7 @@ use crate::{
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  imucal simulate --programme full --effect acc.scale_cubic --out rig.csv")]
 pub(super) struct Arguments {
-    /// The recording: NAME.csv or NAME.csv.gz; the manifest NAME.toml is written to the same folder
+    /// The recording: NAME.csv, .csv.gz or .parquet, and with --si .mcap; the manifest NAME.toml is written to the same folder
     #[arg(long, value_name = "REC", required_unless_present = "list")]
     out: Option<PathBuf>,
     /// List all effects: what causes them, and the usual size of their parameters
@@ -54,7 +54,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME", default_value = "full", value_parser = programme)]
     programme: Programme,
     /// An effect beyond the baseline, e.g. acc.lever_arm or mag.bias_step=3: its size in multiples of its usual one.
-    /// Several parameters point in a direction drawn from the seed; for P.axis_swap the size is the code of the order
+    /// Several parameters point in a direction drawn from the seed; for acc.axis_swap, gyr.axis_swap and mag.axis_swap the size
+    /// is the code of the order, 8·order + signs, 0 to 47
     #[arg(long = "effect", value_name = "ID[=SIZE]", value_parser = size)]
     doses: Vec<(String, f64)>,
     /// Your own effects, in TOML, for --effect and --list (see docs/user_effects.md)

@@ -16,7 +16,7 @@ pub(super) struct Arguments {
 enum Study {
     /// How far noise shifts an ellipsoid's centre where only a part of the sphere is seen, by estimator
     Coverage {
-        /// Clouds a figure at 30 % is the mean of; the sweep takes a fifth
+        /// Clouds that the table at 30 % averages over; the other table takes a fifth of them
         #[arg(long, value_name = "N", default_value_t = 500)]
         runs: u32,
         /// Seed of all random numbers

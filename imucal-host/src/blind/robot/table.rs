@@ -12,7 +12,7 @@ impl RobotScore {
         );
         text += &head();
         self.shares.iter().for_each(|share| text += &line(share));
-        text += "\nIn addition to the contract's figures:\n";
+        text += "\nFurther figures:\n";
         self.further.iter().for_each(|share| text += &line(share));
         let [median, largest] = self.seconds;
         text +=
