@@ -46,6 +46,7 @@ fn the_effects_of_the_labelled_recordings_are_named_and_no_others() {
         if effects.contains_key("outside the catalogue") {
             let honest = matches!(diagnosis.verdict, Verdict::Unknown | Verdict::Partly);
             assert!(honest && found.is_empty(), "{number}: {:?} {found:?}", diagnosis.verdict);
+            println!("{number:>2} {:?} {found:?}", diagnosis.verdict);
             continue;
         }
         let mut expected: Vec<&str> = effects.keys().map(String::as_str).collect();
@@ -53,6 +54,7 @@ fn the_effects_of_the_labelled_recordings_are_named_and_no_others() {
         assert_eq!(found, expected, "{number}: {:?}", diagnosis.verdict);
         let verdict = if expected.is_empty() { Verdict::None } else { Verdict::Explained };
         assert_eq!(diagnosis.verdict, verdict, "{number}");
+        println!("{number:>2} {verdict:?} {found:?}");
         for cause in &diagnosis.causes {
             assert!(diagnosis.credible_set.contains(&cause.effect), "{number}");
         }
@@ -60,6 +62,7 @@ fn the_effects_of_the_labelled_recordings_are_named_and_no_others() {
             assert!(closed > 0.9, "{number}: {closed}");
         }
     }
+    println!("labelled recordings answered as labelled: {0} of {0}", DIAGNOSES.len());
 }
 
 #[test]
