@@ -14,6 +14,8 @@ use crate::{
 
 /// Samples of one message at the most.
 pub const SAMPLES: usize = 8;
+/// How long a pose may have to be held, s: less than how long a rest is timed for.
+const LONGEST_HOLD: f32 = 60.0;
 
 /// A session to begin.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,7 +77,7 @@ impl CaptureTask {
         };
         let field = self.field.unwrap_or(1.0);
         let sized = [self.gravity, field, self.hold].iter().all(|size| size.is_finite() && *size > 0.0);
-        let possible = sized && self.sensors.iter().all(usable);
+        let possible = sized && self.hold <= LONGEST_HOLD && self.sensors.iter().all(usable);
         possible.then(|| SessionSettings {
             gravity: self.gravity,
             field: self.field,

@@ -212,7 +212,8 @@ impl<T: Scalar, const B: usize> TurnObserver<T, B> {
     /// Something is missing: the turn under way is none. True where there was one.
     pub fn interrupt(&mut self) -> bool {
         let turning = matches!(self.way, Way::Turning(..));
-        self.way = Way::Lost;
+        // A rate from before the gap belongs to no turn after it.
+        (self.way, self.held) = (Way::Lost, None);
         turning
     }
 

@@ -206,7 +206,7 @@ pub struct FitQuality {
     pub condition: f32,
     /// Share of equal-area cells of the sphere of directions within reach of a sample, 0 to 1.
     pub coverage: f32,
-    /// Magnitude of the field in `unit_in` where the field was not known (gain of determinant 1); `None` elsewhere.
+    /// Magnitude of the field in `unit_out` where the field was not known (gain of determinant 1); `None` elsewhere.
     pub field_norm: Option<f32>,
 }
 

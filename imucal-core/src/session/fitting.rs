@@ -65,9 +65,9 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
     fn begin(&mut self) -> bool {
         self.fit = if self.is_due(Sensor::Accelerometer) {
             self.mark(Sensor::Gyroscope);
-            self.begin_accelerometer()
+            self.begin_accelerometer().or_else(|| self.without(Sensor::Accelerometer))
         } else if self.is_due(Sensor::Gyroscope) {
-            self.begin_gyroscope()
+            self.begin_gyroscope().or_else(|| self.without(Sensor::Gyroscope))
         } else if self.is_due(Sensor::Magnetometer) {
             self.new_points = 0;
             self.begin_magnetometer()
@@ -75,6 +75,14 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             return false;
         };
         true
+    }
+
+    /// What an estimate was made from is no longer there: it does not stand, and there is no fit.
+    fn without(&mut self, sensor: Sensor) -> Option<Fit> {
+        if let Some(estimate) = self.estimates.get_mut(sensor as usize) {
+            *estimate = None;
+        }
+        None
     }
 
     fn begin_accelerometer(&self) -> Option<Fit> {

@@ -13,7 +13,7 @@ use super::{
 use crate::{
     accept::{Quantity, Refusal, relative_error},
     fit::Units,
-    record::{Order, Sensor, TriadRecord},
+    record::{FitQuality, Order, Sensor, TriadRecord},
     temperature::TemperatureTerms,
     triad::Triad,
 };
@@ -90,8 +90,9 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
                 (false, true) => return Ok(new),
                 _ => {}
             }
-            let length = self.length(sensor);
-            let (old, now) = (stated_error(stored, length), stated_error(&new, length));
+            let length = |record: &FitQuality| record.field_norm.unwrap_or(self.length(sensor));
+            let old = stated_error(stored, length(&stored.quality));
+            let now = stated_error(&new, length(&new.quality));
             let surer = now < old;
             if !surer {
                 return Err(NotStored::Surer { stored: old, new: now });
@@ -199,7 +200,7 @@ pub fn bias_of_the_day<O>(still: &MeanRate<f32>, stored: &TriadRecord<O>, most: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{FitQuality, RawUnit};
+    use crate::record::RawUnit;
 
     /// A gyroscope in counts, a thousand a rad/s, whose bias is known to 2 counts.
     fn stored() -> TriadRecord {

@@ -26,10 +26,20 @@ fn hand(seed: u64, angle: f64) -> Vec<Vector3<f64>> {
 
 /// The turn as it is observed, between two rests of two seconds.
 fn observed<const B: usize>(rates: &[Vector3<f64>], best: &Triad<f64>) -> ObservedTurn<f64, B> {
-    let (mut observer, bias) = (TurnObserver::new(), &best.bias);
+    observed_after(TurnObserver::new(), 8, rates, best)
+}
+
+/// The same where an observer has lost a turn before, and the first rest goes on for so many quarters once it is seen to be one.
+fn observed_after<const B: usize>(
+    mut observer: TurnObserver<f64, B>,
+    quarters: usize,
+    rates: &[Vector3<f64>],
+    best: &Triad<f64>,
+) -> ObservedTurn<f64, B> {
+    let bias = &best.bias;
     let still = |observer: &mut TurnObserver<f64, B>| (0..25).for_each(|_| observer.push(bias, 0.01));
     assert!(observer.quarter(Stage::Resting, best).is_none());
-    for _ in 0..8 {
+    for _ in 0..quarters {
         still(&mut observer);
         assert!(observer.quarter(Stage::Resting, best).is_none());
     }
@@ -79,4 +89,22 @@ fn few_blocks_have_the_residual_of_all_samples_at_any_gain() {
         let near = largest_error::<5>(angle, gain_error, 0.95);
         assert!(five < unknown && near < known, "{angle} rad, gain {gain_error}: {five:.1e}, {near:.1e}");
     }
+}
+
+#[test]
+fn a_rate_from_before_a_gap_is_in_no_turn_after_it() {
+    let best = Triad::identity();
+    let mut lost = TurnObserver::<f64, 5>::new();
+    assert!(lost.quarter(Stage::Resting, &best).is_none());
+    (0..25).for_each(|_| lost.push(&Vector3::new(3.0, -2.0, 1.0), 0.01));
+    assert!(lost.quarter(Stage::Moving, &best).is_none() && lost.interrupt());
+    let rates = hand(1, 1.6);
+    let [clean, after] =
+        [TurnObserver::new(), lost].map(|observer| observed_after::<5>(observer, 2, &rates, &best));
+    let before = Vector3::new(0.6, -0.5, 0.2).normalize();
+    let carried = |turn: &ObservedTurn<f64, 5>| {
+        exp(&turn.remainder()) * attitude(&best, &turn.between(before, before)).tr_mul(&before)
+    };
+    let off = (carried(&after) - carried(&clean)).norm();
+    assert!(off < 1e-12, "{off:.1e}");
 }
