@@ -16,7 +16,7 @@ use imucal_core::{
         store::{NotStored, bias_of_the_day},
         temperature::WarmthFit,
     },
-    watch::{CalibratedSample, Look, LookObserver, Watch, WatchSettings, WatchSummary},
+    watch::{CalibratedSample, GRAVITY_ANYWHERE, LookObserver, Mean, Watch, WatchSettings, WatchSummary},
 };
 use nalgebra::Vector3;
 
@@ -184,7 +184,8 @@ impl<const N: usize> Alone<N> {
         let sample = CalibratedSample { time, acc, gyr, mag, temperature };
         let look = watching.looks.push(&sample, still)?;
         watching.watch.push(&look);
-        Some(of_the_day(&look, record.gyr.as_ref()?))
+        let rate = look.gyr.filter(Mean::is_finite)?;
+        Some(of_the_day(&rate, record.gyr.as_ref()?))
     }
 
     /// Out of line: a watch is larger than a stack's frame should be.
@@ -196,7 +197,11 @@ impl<const N: usize> Alone<N> {
         let _room = self.watches.push(Watching {
             rests: RestObserver::new(RestSettings::default()),
             looks: LookObserver::default(),
-            watch: Watch::new(record, WatchSettings::default()),
+            // A record does not say where the device is.
+            watch: Watch::new(
+                record,
+                WatchSettings { gravity_error: GRAVITY_ANYWHERE, ..WatchSettings::default() },
+            ),
         });
     }
 }
@@ -211,8 +216,7 @@ fn is_si(record: &HeldRecord) -> bool {
     record.triads().all(units)
 }
 
-fn of_the_day(look: &Look, stored: &HeldTriad) -> Option<Vector3<f32>> {
-    let mean = look.gyr?;
+fn of_the_day(mean: &Mean, stored: &HeldTriad) -> Option<Vector3<f32>> {
     let rate = MeanRate { mean: mean.value, variance: mean.variance, count: 1 };
     bias_of_the_day(&rate, stored, MOST)
 }

@@ -77,7 +77,9 @@ impl Second {
     fn push(&mut self, sample: &CalibratedSample) {
         let values = [Some(sample.acc), sample.gyr, sample.mag];
         for (moments, value) in self.means.iter_mut().zip(values) {
-            value.iter().for_each(|value| moments.push(value));
+            // A sample that was missed is not one of the second.
+            let measured = value.filter(|value| value.iter().all(|part| part.is_finite()));
+            measured.iter().for_each(|value| moments.push(value));
         }
         if sample.temperature.is_finite() {
             self.temperature += sample.temperature;
@@ -136,5 +138,28 @@ impl LookObserver {
         let look = confirmed.look(!self.goes_on);
         self.goes_on = true;
         look
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_that_was_missed_is_none_of_its_second() {
+        let mut looks = LookObserver::default();
+        let sample = |k: u64| {
+            let rate = if k % 50 == 7 { f32::NAN } else { 0.25 };
+            CalibratedSample {
+                time: 10_000 * k,
+                acc: Vector3::new(0.0, 0.0, 9.5),
+                gyr: Some(Vector3::new(0.0, rate, 0.0)),
+                mag: None,
+                temperature: f32::NAN,
+            }
+        };
+        let found: std::vec::Vec<Look> = (0..500).filter_map(|k| looks.push(&sample(k), true)).collect();
+        assert!(found.len() >= 2);
+        assert!(found.iter().all(|look| look.gyr.is_some_and(|mean| mean.value.y == 0.25)));
     }
 }

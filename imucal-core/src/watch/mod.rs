@@ -46,7 +46,7 @@ mod summary;
 
 pub use codec::{MAX_LEN, SummaryError, VERSION, decode, encode};
 pub use look::{CalibratedSample, Look, LookObserver, Mean};
-pub use settings::WatchSettings;
+pub use settings::{GRAVITY_ANYWHERE, WatchSettings};
 pub use shift::{Compared, Shift};
 pub use summary::{Spell, StatisticSummary, TemperatureSeen, TriadState, WatchSummary};
 
@@ -121,6 +121,10 @@ pub struct Watch {
     /// Last value of each triad, and seconds in a row in which all of its samples were alike.
     last: [Vector3<f32>; 3],
     alike: [u16; 3],
+    /// It was put down while nothing was judged.
+    moved: bool,
+    /// Charts that have not been given a reading since it was put down; whether in another pose.
+    put_down: [Option<bool>; 6],
     seen: Seen,
 }
 
@@ -154,6 +158,8 @@ impl Watch {
             up: None,
             last: [Vector3::repeat(f32::NAN); 3],
             alike: [0; 3],
+            moved: false,
+            put_down: [None; 6],
             seen: Seen::default(),
             settings,
             reference,
@@ -167,10 +173,12 @@ impl Watch {
         self.heed_temperature(look.temperature);
         if self.is_outside(look.temperature) {
             self.seen.outside = self.seen.outside.saturating_add(1);
+            self.moved |= look.moved;
             return false;
         }
         let since = look.time.checked_sub(self.seen.judged.replace(look.time).unwrap_or(look.time));
-        let moved = look.moved || back || self.seen.watched == 0;
+        let late = core::mem::take(&mut self.moved);
+        let moved = look.moved || late || back || self.seen.watched == 0;
         let turned = moved && !self.is_same_pose(look);
         self.seen.watched = self.seen.watched.saturating_add(1);
         self.seen.rests = self.seen.rests.saturating_add(u32::from(moved));
@@ -178,10 +186,17 @@ impl Watch {
         let readings = self.reference.readings(look, usable);
         let now = self.now(look, since.unwrap_or(0));
         let mut heard = false;
-        for ((statistic, reading), chart) in Statistic::ALL.into_iter().zip(readings).zip(&mut self.charts) {
+        let charts = self.charts.iter_mut().zip(&mut self.put_down);
+        for ((statistic, reading), (chart, put_down)) in Statistic::ALL.into_iter().zip(readings).zip(charts)
+        {
+            if moved {
+                *put_down = Some(turned || *put_down == Some(true));
+            }
             let Some(reading) = reading.filter(Reading::is_usable) else { continue };
-            if moved || !chart.is_begun() {
-                let allowance = self.reference.allowance(&self.settings, statistic, look);
+            let begins = put_down.take();
+            if begins.is_some() || !chart.is_begun() {
+                let (allowance, turned) =
+                    (self.reference.allowance(&self.settings, statistic, look), begins == Some(true));
                 heard |= chart.begin_rest(&allowance, turned, statistic.direction(look), now.time);
             }
             heard |= chart.push(&reading, &now, &self.thresholds);

@@ -161,6 +161,7 @@ impl Reference {
             Statistic::Force => {
                 let common = self.acc.map_or(0.0, |acc| acc.along(&unit(&look.acc.value), &look.acc.value));
                 let pose = self.acc.map_or(0.0, |acc| acc.residual);
+                let common = common + square(settings.gravity_error);
                 Allowance { common, pose, slow: of_acc, is_known: true }
             }
             Statistic::RateX => rate(self.gyr.map(|variance| variance.x)),

@@ -3,11 +3,17 @@
 /// Earth's rate, rad/s.
 const EARTH_RATE: f32 = 7.292e-5;
 
+/// Standard deviation of gravity over the Earth's surface about 9.80665 m/s², m/s²: from 9.764 to 9.834.
+pub const GRAVITY_ANYWHERE: f32 = 0.02;
+
 /// What is expected at the place, and how steady a healthy sensor is. All in the unit that the record's triad gives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WatchSettings {
     /// Local gravity.
     pub gravity: f32,
+    /// Standard deviation of its error; 0 where it is known as well as the record was made with, [`GRAVITY_ANYWHERE`] where the place is not
+    /// known.
+    pub gravity_error: f32,
     /// Length of the field; `None`: the record's, if it has one in the unit that it gives.
     pub field: Option<f32>,
     /// Dip of the field below the horizon, rad; `None`: not known.
@@ -33,6 +39,7 @@ impl Default for WatchSettings {
     fn default() -> Self {
         Self {
             gravity: 9.806_65,
+            gravity_error: 0.0,
             field: None,
             dip: None,
             instability: [5e-4, 5e-5, 0.05],
