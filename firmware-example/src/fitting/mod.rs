@@ -324,7 +324,9 @@ impl<
         form: Parameterisation<P>,
     ) -> Finished {
         let triad = form.triad(solver.theta());
-        let limits = Limits { rms: LARGEST_TURN, ..Limits::for_norm(9, LEAST_TURNS) };
+        // Each turn has two ends.
+        let observations = 2 * LEAST_TURNS;
+        let limits = Limits { rms: LARGEST_TURN, observations, ..Limits::for_norm(9, LEAST_TURNS) };
         let observed = Observed::TurnEnds(&self.memory.seen.ends);
         let criteria = Criteria { observed, limits, radius: 1.0, nonlinearity: true };
         let summary =

@@ -190,8 +190,11 @@ impl<F: NorFlash> Slots<F> {
         let before = self.newest.map_or(0, |newest| newest.sequence);
         let latest = before.max(self.lost.unwrap_or(0)).max(self.newer.unwrap_or(0));
         let mut writing = Writing::new(latest.saturating_add(1), bytes).ok_or(StorageError::TooLong)?;
-        if latest == before && before > 0 && self.holds(bytes)? {
-            writing.phase = Phase::Stored;
+        if let Some(newest) = self.newest.filter(|_| latest == before)
+            && self.holds(bytes)?
+        {
+            (writing.sequence, writing.at) = (before, newest.at);
+            writing.phase = if self.lacks_seal(&newest)? { Phase::Seal } else { Phase::Stored };
             return Ok(writing);
         }
         (writing.at, writing.phase) = match self.newest {
@@ -251,8 +254,17 @@ impl<F: NorFlash> Slots<F> {
         Ok(None)
     }
 
+    /// The power went before a whole record was sealed.
+    fn lacks_seal(&mut self, newest: &Newest) -> Result<bool, StorageError> {
+        let seal = newest.at + layout::SLOT - SEAL;
+        Ok(newest.end == newest.at + layout::SLOT && self.is_blank(seal, SEAL)?)
+    }
+
     /// The record counts from now on; its sequence number.
     fn count(&mut self, writing: &Writing) -> u32 {
+        if self.newest.is_some_and(|newest| newest.at == writing.at) {
+            return writing.sequence;
+        }
         self.previous = self.newest.replace(Newest {
             sequence: writing.sequence,
             length: writing.length() - HEADER - CHECKSUM,

@@ -243,6 +243,7 @@ fn a_session_of_figures_that_cannot_be_is_malformed() {
         with(&|task| task.gravity = f32::NAN),
         with(&|task| task.field = Some(-1.0)),
         with(&|task| task.hold = f32::INFINITY),
+        with(&|task| task.hold = 61.0),
         with(&|task| task.sensors[1].per_unit = 0.0),
         with(&|task| task.sensors[0].target = -1.0),
         with(&|task| task.sensors[2].full_scale = 0.0),

@@ -97,6 +97,29 @@ fn a_power_cut_at_any_word_leaves_the_old_record_or_the_new() {
 }
 
 #[test]
+fn a_record_that_was_cut_off_before_its_seal_is_sealed_when_it_is_stored_again() {
+    let mut nor = Nor::new(2);
+    store(&mut nor, b"first").expect("nothing cuts");
+    let cut_at = |cut: u64| {
+        let mut nor = Nor { left: Some(cut as _), torn: 0, ..nor.clone() };
+        assert!(store(&mut nor, b"second").is_err());
+        nor.left = None;
+        nor
+    };
+    let is_whole = |cut: &u64| stored(&mut cut_at(*cut)) == b"second";
+    let mut nor = cut_at((0..1_000).find(is_whole).expect("the seal comes last"));
+    store(&mut nor, b"second").expect("nothing cuts");
+    let again = nor.clone();
+    store(&mut nor, b"second").expect("nothing cuts");
+    assert!(nor.bytes == again.bytes, "it is stored");
+    // A bit flips: the device knows which record it has lost.
+    let at = nor.bytes.windows(6).position(|bytes| bytes == b"second").expect("it is there");
+    nor.bytes[at] ^= 1;
+    assert_eq!(stored(&mut nor), b"first");
+    assert_eq!(Slots::open(&mut nor).expect("it opens").lost(), Some(2));
+}
+
+#[test]
 fn one_cut_after_another_never_loses_the_record() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let mut nor = Nor::new(2);
