@@ -37,6 +37,7 @@ pub use self::acc::rests::AccModel;
 use self::{
     fit::{alignment::FieldAtRest, directions::Directions},
     mag::{declared_field, samples::MagInput},
+    outcome::Evidence,
 };
 
 /// What to calibrate, and how.
@@ -133,17 +134,20 @@ pub fn calibrate(recording: &Recording, options: &Options, progress: &(dyn Fn(&s
     calibration
 }
 
-/// Warns of rests that are hardly more than parameters: what they follow is then in the parameters.
+/// Warns of rests whose equations are hardly more than parameters: what they follow is then in the parameters.
 fn few_left_over(calibration: &mut Calibration) {
     let Some(outcome) = calibration.sensor(SensorKind::Acc) else { return };
     let Some(fit) = outcome.passed().filter(|_| outcome.evidence.is_some()) else { return };
-    if fit.observations < 2 * fit.parameters {
-        let (rests, parameters) = (fit.observations, fit.parameters);
+    // A rest's norm is one equation; at a known attitude there are three.
+    let each = if matches!(outcome.evidence, Some(Evidence::Shell { .. })) { 1 } else { 3 };
+    let (rests, parameters) = (fit.observations, fit.parameters);
+    let equations = each * rests;
+    if equations < 2 * parameters {
         let warning = format!(
             "acc: {rests} rests for {parameters} parameters leave {} degrees of freedom, in which few faults show; record {} \
              rests or more",
-            rests - parameters,
-            2 * parameters + 2
+            equations.saturating_sub(parameters),
+            (2 * parameters + 2).div_ceil(each)
         );
         calibration.warnings.push(warning);
     }

@@ -326,6 +326,12 @@ impl FitSummary {
         }
     }
 
+    /// Unit of `rms` and `held_out_rms`, but of a gyroscope: residuals are distances of raw values, in nominal SI, and in a field of unknown
+    /// length in the recording's unit.
+    pub fn rms_unit(&self) -> Unit {
+        if self.unit_in == Unit::Arbitrary { self.unit_in } else { self.unit_out }
+    }
+
     /// Standard errors of [`raw_triad`](Self::raw_triad): gain, bias.
     pub fn raw_std(&self) -> (Matrix3<f64>, Vector3<f64>) {
         let per = self.nominal.per_unit.abs();

@@ -330,7 +330,9 @@ fn judge(fit: &RigFit, summary: &FitSummary, coverage: &Coverage<f64>, norm: f64
         return Err(Refusal::Implausible { what: Quantity::Heading, value, limit: 1.0 });
     }
     accept::check_precision(summary.relative_error(norm), &limits)?;
-    accept::check_plausibility(&summary.triad, true, fit.report.rms / norm, &limits)?;
+    // Arbitrary units have no nominal gain.
+    let nominal = summary.unit_in != Unit::Arbitrary;
+    accept::check_plausibility(&summary.triad, nominal, fit.report.rms / norm, &limits)?;
     summary.nonlinear.as_ref().map_or(Ok(()), |found| found.check(&limits))
 }
 

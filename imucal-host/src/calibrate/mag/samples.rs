@@ -206,8 +206,9 @@ pub(crate) fn to_unit_determinant(summary: &mut FitSummary, norm: f64) {
     summary.triad.gain = gain / d;
     summary.field_norm = Some(norm / d * per_unit);
     summary.unit_out = summary.unit_in;
-    summary.rms *= per_unit / d;
-    summary.held_out_rms = summary.held_out_rms.map(|rms| rms * per_unit / d);
+    // Residuals are distances of raw values, which no gauge changes.
+    summary.rms *= per_unit;
+    summary.held_out_rms = summary.held_out_rms.map(|rms| rms * per_unit);
 }
 
 fn advice(refusal: &Refusal) -> String {

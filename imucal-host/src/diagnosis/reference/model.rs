@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::{
     apply,
     apply::ApplyError,
+    calibrate::known_attitudes::ladder,
     recording::{Nominal, Recording, SensorKind},
     store::{StoredCalibration, StoredTriad},
 };
@@ -94,8 +95,10 @@ fn errors(kind: SensorKind, stored: &StoredTriad, nominal: Nominal) -> (Matrix3<
 /// By how much a standard error is larger since the noise was estimated from few residuals: √(ν/(ν − 2)), the standard deviation
 /// of Student's t; with two degrees of freedom or fewer it says nothing.
 fn unsure(kind: SensorKind, stored: &StoredTriad) -> f64 {
-    // A motion turns about three axes; a rest's or a sample's norm is one number.
-    let equations = f64::from(stored.observations) * if kind == SensorKind::Gyr { 3.0 } else { 1.0 };
+    // A motion turns about three axes, and at a known attitude a sensor has three; a rest's or a sample's norm is one number.
+    let mut at_attitudes = ladder::ACCELEROMETER.iter().chain(&ladder::MAGNETOMETER);
+    let of_vectors = kind == SensorKind::Gyr || at_attitudes.any(|(name, _)| *name == stored.model);
+    let equations = f64::from(stored.observations) * if of_vectors { 3.0 } else { 1.0 };
     let freedom = equations - f64::from(stored.parameters);
     if freedom > 2.0 { (freedom / (freedom - 2.0)).sqrt() } else { f64::INFINITY }
 }
