@@ -25,7 +25,7 @@ use self::{
     },
     proposal::{confirmation, proposer},
     residual::forward_model::ForwardModel,
-    screening::{preparation::Preparation, recorded_values},
+    screening::{first_time, preparation::Preparation, recorded_values},
     search::{
         motion_mismatch::{self, LeftOut, Stretch},
         stepwise,
@@ -81,14 +81,15 @@ pub fn try_diagnose(
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis, DiagnosisError> {
     let (fresh, repeated) = recorded_values::fresh(recording);
-    let recording = &*fresh;
-    let source = Source::of(recording, options.stream.as_ref());
-    let own =
-        if source == Source::Simulator && options.stream.is_none() { Stream::of(recording) } else { None };
-    let stream = options.stream.as_ref().or(own.as_ref());
+    let (fresh, moved, begins) = first_time::from_zero(fresh, options.stream.as_ref());
+    let (recording, given) = (&*fresh, moved.as_ref().or(options.stream.as_ref()));
+    let source = Source::of(recording, given);
+    let own = if source == Source::Simulator && given.is_none() { Stream::of(recording) } else { None };
+    let stream = given.or(own.as_ref());
     let mut settings = options.settings.clone().unwrap_or_else(|| Settings::preset(source));
     let mut preparation = Preparation::new(recording, stream, options.model.as_ref(), &settings)?;
     preparation.remarks.extend(repeated);
+    preparation.remarks.extend(begins);
     if preparation.noisy_stream {
         // Noise of the stream is averaged over a block only where it is taken row by row, at rest too.
         settings.residual.resting_points = settings.residual.moving_points;

@@ -10,6 +10,7 @@
 //! | [`conventions`] | axis order and signs, units, gimbal order, clipping, repeated samples, noise bursts |
 //! | `constant_axis` | an axis that shows one value in all rows |
 //! | [`mounting`] | the small turn of a unit against the sensor that a simulator's stream is of |
+//! | [`first_time`] | times that begin far from zero |
 //! | [`held_values`] | rows that repeat the one before until a new value comes |
 //! | [`recorded_values`] | a sensor that is slower than the table, whose rows repeat its values |
 //! | [`pose_conventions`] | what a reference's attitudes and positions hold instead of what they should: order, frame, rate, jumps, steps, unit |
@@ -25,6 +26,7 @@
 pub mod bandwidth;
 mod constant_axis;
 pub mod conventions;
+pub mod first_time;
 pub mod held_values;
 pub mod mounting;
 pub mod pose_conventions;
