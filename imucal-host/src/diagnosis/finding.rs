@@ -210,7 +210,7 @@ pub struct ProfileBin {
     pub before: f64,
     /// And after.
     pub after: f64,
-    /// Standard error of both by white noise.
+    /// Standard error of both, as if the noise of blocks were independent.
     pub std: f64,
 }
 
@@ -275,7 +275,7 @@ pub struct Experiment {
     /// What to do.
     #[serde(rename = "do")]
     pub instruction: String,
-    /// Whitened distance between them in this recording.
+    /// Square of the whitened distance between them in this recording.
     pub distinguishability_from: f64,
     /// With the segment added.
     pub to: f64,

@@ -6,11 +6,7 @@ use super::{
     Answer, Part, Tone, figure, residuals::residuals, segmentation::segmentation, sentences, sphere::sphere,
 };
 use crate::{
-    calibrate::{
-        Calibration, FitSummary, SensorOutcome, Status,
-        outcome::{Evidence, entry_name},
-        residuals as leftover,
-    },
+    calibrate::{Calibration, FitSummary, SensorOutcome, Status, outcome::entry_name, residuals as leftover},
     recording::{Recording, SensorKind, Unit},
     report::{
         measure::{percent, plain, rounded},
@@ -172,23 +168,17 @@ fn drawings(
     let directions: Vec<_> = observations.iter().map(|one| one.direction).collect();
     let is_of_turns = outcome.kind == SensorKind::Gyr;
     let what = if is_of_turns { "Axes of the turns" } else { "Directions that were measured" };
-    let (residual, unit, scale) = match (outcome.kind, fit.unit_out) {
-        (SensorKind::Gyr, _) => ("attitude error of a turn", "°".to_owned(), 1f64.to_degrees()),
-        (_, unit) => ("length less the norm", shown(unit), of_field(outcome, fit)),
+    // In a field of unknown length, results are in the unit of raw values, and the rms with them.
+    let per_unit = if fit.field_norm.is_some() { fit.nominal.per_unit.abs() } else { 1.0 };
+    let (residual, unit, scale, rms) = match (outcome.kind, fit.unit_out) {
+        (SensorKind::Gyr, _) => ("attitude error of a turn", "°".to_owned(), 1f64.to_degrees(), fit.rms),
+        (_, unit) => ("length less the norm", shown(unit), per_unit, fit.rms / per_unit),
     };
     html! {
         div class="figures" {
             (figure(what, &sphere(&directions, what), &html! { "Coverage " (percent(fit.coverage)) " of the sphere; two halves of equal area." }))
-            (residuals(&observations, residual, &unit, scale, fit.rms))
+            (residuals(&observations, residual, &unit, scale, rms))
         }
-    }
-}
-
-/// How many units of a fit's results make one of its observations': in a field of unknown length results are in raw units.
-fn of_field(outcome: &SensorOutcome, fit: &FitSummary) -> f64 {
-    match (&outcome.evidence, fit.field_norm) {
-        (Some(Evidence::Shell { norm, .. }), Some(field)) => field / norm,
-        _ => 1.0,
     }
 }
 

@@ -275,7 +275,7 @@ fn write_experiments(text: &mut String, diagnosis: &Diagnosis) -> fmt::Result {
 
 pub(crate) fn experiment_words(experiment: &Experiment) -> String {
     let names: Vec<&str> = experiment.separates.iter().map(String::as_str).collect();
-    let [from, to] = [experiment.distinguishability_from, experiment.to].map(|d| finite(d, plain));
+    let [from, to] = [experiment.distinguishability_from, experiment.to].map(|d| finite(d.sqrt(), plain));
     format!(
         "{}: separates {} by {to} standard deviations of the noise instead of {from}",
         experiment.instruction,

@@ -79,7 +79,7 @@ fn fit_value(kind: SensorKind, fit: &FitSummary) -> Value {
     let (gain_std, bias_std) = fit.raw_std();
     let rms_unit = match kind {
         SensorKind::Gyr => "rad".into(),
-        _ => fit.unit_out.to_string(),
+        _ => fit.rms_unit().to_string(),
     };
     let rig = rig(kind, fit);
     json!({

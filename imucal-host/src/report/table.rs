@@ -180,7 +180,7 @@ pub(crate) fn rms_text(kind: SensorKind, fit: &FitSummary, rms: f64) -> String {
     match kind {
         SensorKind::Gyr if fit.rig.is_some() => format!("{} a motion", degrees(rms, 3)),
         SensorKind::Gyr => format!("{} a turn", degrees(rms, 3)),
-        _ => format!("{} {}", plain(rms), fit.unit_out),
+        _ => format!("{} {}", plain(rms), fit.rms_unit()),
     }
 }
 

@@ -140,7 +140,7 @@ const FURTHER: [Figure<RobotJudgement>; 16] = [
         |j| j.flagged,
     ),
     Figure::further(
-        "outside, an effect of the catalogue asserted",
+        "outside, not flagged, an effect of the catalogue or no answer",
         |j| matches!(j.label.content, Content::Spoken | Content::Unspoken),
         |j| j.alarmed && !j.flagged,
     ),

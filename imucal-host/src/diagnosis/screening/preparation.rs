@@ -205,8 +205,10 @@ fn undo(finding: &Finding, recording: &Recording, usable: &mut [Vec<bool>; 3], t
     let Some(kind) = finding.effect.sensors.first().copied() else { return };
     leave_out(finding, recording, kind, &mut usable[kind as usize]);
     if let Some(matrix) = finding.dose().and_then(|dose| response(finding.effect, &dose.values)) {
-        // The samples are M v: what undoes M comes first.
-        triads[kind as usize].gain *= matrix.try_inverse().unwrap_or_else(Matrix3::identity);
+        // The samples are M v: G (v − b) is G M⁻¹ (M v − M b).
+        let Some(inverse) = matrix.try_inverse() else { return };
+        let triad = &mut triads[kind as usize];
+        (triad.gain, triad.bias) = (triad.gain * inverse, matrix * triad.bias);
     }
 }
 

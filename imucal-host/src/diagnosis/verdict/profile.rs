@@ -1,7 +1,7 @@
 //! The residual over the driver that a sensor follows most: what a drawing shows of a gap before and after it is explained.
 //!
 //! Blocks are sorted by the driver and cut into bins of equal count; a bin has the means of both residuals, weighed by samples, and
-//! the standard error that white noise gives them. Drift is not in that error.
+//! the standard error that the noise of blocks gives them. That drifting noise is alike in neighbouring blocks is not in that error.
 
 use nalgebra::DVector;
 

@@ -196,19 +196,21 @@ fn best(
     let encoders = recording.gimbal.as_ref()?;
     let place = motion.place();
     let stride = rows.len().div_ceil(ROWS).max(1);
+    let reach = (REACH / recording.median_interval()?).round().max(1.0) as usize;
+    let about = |row: usize| [row.saturating_sub(reach), row, (row + reach).min(encoders.len() - 1)];
+    let known = |row: usize| encoders[row].iter().all(|angle| angle.is_finite());
     let chosen: Vec<(usize, &Truth)> = rows
         .iter()
         .copied()
         .zip(truth)
+        .filter(|(row, _)| about(*row).into_iter().all(known))
         .step_by(stride)
-        .filter(|(row, _)| encoders[*row].iter().all(|angle| angle.is_finite()))
         .collect();
     let at: Vec<usize> = chosen.iter().map(|(row, _)| *row).collect();
-    let reach = (REACH / recording.median_interval()?).round().max(1.0) as usize;
     let left = |reading: &Reading| {
         let replayed = |(row, truth): &(usize, &Truth)| {
             let mut machine = Machine::exact(reading.axes.map(direction));
-            let (before, after) = (row.saturating_sub(reach), (row + reach).min(encoders.len() - 1));
+            let [before, _, after] = about(*row);
             let span = recording.time[after] - recording.time[before];
             for ((gimbal, column), sign) in machine.gimbals.iter_mut().zip(reading.columns).zip(reading.signs)
             {
