@@ -106,8 +106,6 @@ pub struct Session<const N: usize, const B: usize, const M: usize> {
     thermometer: ThermometerObserver<f32>,
     /// The field while a rest goes on.
     field: Moments<f32>,
-    /// The last sample of the magnetometer, nominal, µT.
-    last_field: Option<Vector3<f32>>,
     poses: Poses<N, B>,
     /// A turn to the rest that goes on.
     pending: Option<ObservedTurn<f32, B>>,
@@ -137,7 +135,6 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             cloud: CloudObserver::new(settings.apart),
             thermometer: ThermometerObserver::default(),
             field: Moments::default(),
-            last_field: None,
             poses: Poses::default(),
             pending: None,
             fit: None,
@@ -195,8 +192,6 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             self.thrown.clipped = self.thrown.clipped.saturating_add(1);
             return;
         }
-        // The cloud judges a sample once the next has come.
-        let judged = self.last_field.replace(*field);
         match self.cloud.push(field) {
             Chosen::Unusable => return,
             Chosen::Near => {}
@@ -207,10 +202,8 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
                 }
             }
         }
-        if let Some(judged) = judged
-            && self.observer.rests().stage() != Stage::Moving
-        {
-            self.field.push(&judged);
+        if self.observer.rests().stage() != Stage::Moving {
+            self.field.push(field);
         }
     }
 
