@@ -100,13 +100,13 @@ fn a_power_cut_at_any_word_leaves_the_old_record_or_the_new() {
 fn a_record_that_was_cut_off_before_its_seal_is_sealed_when_it_is_stored_again() {
     let mut nor = Nor::new(2);
     store(&mut nor, b"first").expect("nothing cuts");
-    let cut_at = |cut: u64| {
-        let mut nor = Nor { left: Some(cut as _), torn: 0, ..nor.clone() };
+    let cut_at = |cut: u32| {
+        let mut nor = Nor { left: Some(cut), torn: 0, ..nor.clone() };
         assert!(store(&mut nor, b"second").is_err());
         nor.left = None;
         nor
     };
-    let is_whole = |cut: &u64| stored(&mut cut_at(*cut)) == b"second";
+    let is_whole = |cut: &u32| stored(&mut cut_at(*cut)) == b"second";
     let mut nor = cut_at((0..1_000).find(is_whole).expect("the seal comes last"));
     store(&mut nor, b"second").expect("nothing cuts");
     let again = nor.clone();

@@ -30,6 +30,8 @@ struct Hand {
     warmth: [TemperatureTerms<f64>; 2],
     /// Each so many samples of the accelerometer one of the gyroscope and of the magnetometer.
     every: [u64; 2],
+    /// How many times as much the accelerometer scatters.
+    shaken: f64,
 }
 
 const FORCE: Vector3<f64> = Vector3::new(0.0, 0.0, -9.80665);
@@ -70,6 +72,7 @@ impl Hand {
             climate: None,
             warmth: [none; 2],
             every: [1; 2],
+            shaken: 1.0,
         }
     }
 
@@ -81,7 +84,7 @@ impl Hand {
     }
 
     fn sample(&mut self, session: &mut Held, rate: &Vector3<f64>) {
-        let noise = [0.01, 0.002, 0.3].map(|size| self.normals(size));
+        let noise = [0.01 * self.shaken, 0.002, 0.3].map(|size| self.normals(size));
         let at = self.c_n_s.inverse();
         let true_values = [at * FORCE, *rate, at * self.field + self.magnet];
         let temperature = self.climate.map(|climate| climate(self.time as f64 * 1e-6));
@@ -224,6 +227,24 @@ fn a_clipped_turn_is_thrown_away_and_said() {
     hand.turn(&mut session, &(Vector3::z() * 3.0));
     let thrown = session.guide().thrown;
     assert!(thrown.clipped > 0 && thrown.turns > 0, "{thrown:?}");
+}
+
+#[test]
+fn an_estimate_whose_poses_are_thrown_away_does_not_stand() {
+    let (mut session, mut hand) = (Held::new(SessionSettings::default()), Hand::new(8));
+    hand.shaken = 15.0;
+    assert!(hand.follow(&mut session, 80).is_some(), "{:?}", session.guide());
+    let accepted =
+        |session: &Held, sensor| session.estimate(sensor).is_some_and(|found| found.verdict.is_ok());
+    assert!(accepted(&session, Sensor::Accelerometer) && accepted(&session, Sensor::Gyroscope));
+    // What shook the bench is switched off: rests that are so much noisier than this one are none.
+    hand.shaken = 1.0;
+    hand.pose(&mut session, &Vector3::x());
+    hand.rest(&mut session, 8.0);
+    session.finish();
+    while session.work() {}
+    assert!(session.poses().list().len() < 3, "{}", session.poses().list().len());
+    assert!(!accepted(&session, Sensor::Accelerometer) && !accepted(&session, Sensor::Gyroscope));
 }
 
 #[test]

@@ -2,7 +2,10 @@
 
 use imucal_core::{
     record::{CalibrationRecord, Sensor},
-    watch::{CalibratedSample, Look, LookObserver, Mean, Statistic, TriadState, Watch, WatchSettings},
+    watch::{
+        CalibratedSample, GRAVITY_ANYWHERE, Look, LookObserver, Mean, Statistic, TriadState, Watch,
+        WatchSettings,
+    },
 };
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -29,6 +32,47 @@ fn a_triad_that_the_record_lacks_is_unseen_and_the_others_are_watched() {
     rest(&mut unit, &mut watch, 600);
     let states = Sensor::ALL.map(|sensor| watch.summary().state(sensor));
     assert_eq!(states, [TriadState::Quiet, TriadState::Unseen, TriadState::Quiet]);
+}
+
+#[test]
+fn a_move_counts_from_the_first_second_that_is_judged() {
+    // Put down in another pose while a triad has no value, or at a temperature outside of the span.
+    let missed = |look: Look| Look { mag: None, ..look };
+    let warm = |look: Look| Look { temperature: 41.0, ..look };
+    let (mut found, units) = ([0u32; 3], 20u64);
+    let ways: [&dyn Fn(Look) -> Look; 3] = [&|look| look, &missed, &warm];
+    for seed in 0..units {
+        for (way, found) in ways.iter().zip(&mut found) {
+            let mut unit = Unit::new(GRADES[0], 0.0, seed);
+            let settings =
+                WatchSettings { place: 0.05, span: Some([15.0, 40.0]), dip: None, ..unit.settings };
+            let mut watch = Watch::new(&GRADES[0].record(), settings);
+            rest(&mut unit, &mut watch, 600);
+            unit.turn(0.01);
+            let first = unit.look();
+            watch.push(&way(first));
+            rest(&mut unit, &mut watch, 30);
+            *found += u32::from(alarms(&watch) > 0);
+        }
+    }
+    assert_eq!(found, [0; 3], "alarms of {units} units");
+}
+
+#[test]
+fn gravity_of_another_place_is_no_shift_where_the_place_is_not_known() {
+    let watched = |gravity_error| {
+        let mut unit = Unit::new(GRADES[0], 0.0, 3);
+        let settings =
+            WatchSettings { gravity: unit.settings.gravity + 0.02, gravity_error, ..unit.settings };
+        let mut watch = Watch::new(&GRADES[0].record(), settings);
+        for _ in 0..20 {
+            rest(&mut unit, &mut watch, 30);
+            unit.turn(0.0);
+        }
+        watch.summary().state(Sensor::Accelerometer)
+    };
+    assert_eq!(watched(GRAVITY_ANYWHERE), TriadState::Quiet);
+    assert_eq!(watched(0.0), TriadState::Moved);
 }
 
 #[test]

@@ -95,6 +95,28 @@ fn a_magnetometer_in_the_accelerometer_s_axes_takes_the_place_of_one_in_its_own_
     assert_eq!(better(&plain, Some(&turned)), Err(NotStored::OwnAxes));
 }
 
+#[test]
+fn a_magnetometer_is_compared_with_one_in_another_unit_by_the_field_of_each() {
+    let units = Units { raw: RawUnit::Counts, calibrated: RawUnit::MicroTesla, offset: 0.0, per_unit: 100.0 };
+    let (session, _) = session(3, &Vector3::new(0.3, 0.0, 0.0));
+    let better =
+        |stored: Option<&TriadRecord>| session.better(Sensor::Magnetometer, &units, stored, &Axes::Own);
+    let new = better(None).expect("accepted");
+    // As a host keeps it in a field of unknown length: in raw units, a hundred a microtesla. Its errors are so many times ours.
+    let in_counts = |times: f32| {
+        let mut stored = new.clone();
+        let field = new.quality.field_norm.expect("of the session");
+        stored.unit_out = RawUnit::Counts;
+        stored.gain = new.gain.map(|row| row.map(|entry| 100.0 * entry));
+        stored.quality.field_norm = Some(100.0 * field);
+        stored.quality.gain_std = new.quality.gain_std.map(|row| row.map(|std| 100.0 * times * std));
+        stored.quality.bias_std = new.quality.bias_std.map(|std| times * std);
+        stored
+    };
+    assert!(matches!(better(Some(&in_counts(0.5))), Err(NotStored::Surer { .. })));
+    assert_eq!(better(Some(&in_counts(2.0))), Ok(new.clone()));
+}
+
 /// What an alignment says, and the verdicts of accelerometer and magnetometer after it.
 fn verdicts(
     axes: [Matrix3<f64>; 2],

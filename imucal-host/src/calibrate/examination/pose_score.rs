@@ -30,8 +30,8 @@ use crate::{
     recording::{GIMBALS, SensorKind},
 };
 
-/// What speaks against a fit to poses on a rig, which were reached from these sides. `warm` parameters of temperature were estimated with it; `name` says which
-/// pose it is.
+/// What speaks against a fit to poses on a rig, which were reached from these sides. `warm` parameters of temperature were estimated with
+/// it; `name` says which pose it is.
 ///
 /// Terms that a higher rung of the accelerometer's ladder has are no suspicion: a warning names that rung
 /// ([`rig::accelerometer`](crate::calibrate::known_attitudes::rig::accelerometer)). Where they explain most, all else is tested as if
