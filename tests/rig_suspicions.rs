@@ -176,6 +176,24 @@ fn healthy_sensors_on_a_rig_are_hardly_suspected() {
 }
 
 #[test]
+fn few_poses_on_a_rig_are_warned_of_by_three_equations_each() {
+    let mut fewest = usize::MAX;
+    for seconds in [60, 80, 100, 120, 140, 160] {
+        let mut short = recording(FAULTY.start, None);
+        for triple in [&mut short.acc, &mut short.gyr, &mut short.mag].into_iter().flatten() {
+            triple.values[50 * seconds..].fill(Vector3::repeat(f64::NAN));
+        }
+        let calibration = calibrated(&short);
+        let acc = calibration.sensor(SensorKind::Acc).expect("recorded");
+        let Some(fit) = acc.passed() else { continue };
+        let warned = calibration.warnings.iter().any(|warning| warning.contains("degrees of freedom"));
+        assert_eq!(warned, 3 * fit.observations < 2 * fit.parameters, "{seconds} s: {}", fit.observations);
+        fewest = fewest.min(fit.observations);
+    }
+    assert!(fewest < 14, "fewer poses than parameters: {fewest}");
+}
+
+#[test]
 fn encoders_that_count_the_other_way_leave_no_sensor_accepted_in_a_mirrored_frame() {
     for gimbal in 1..3 {
         let mut recording = recording(FAULTY.start, None);

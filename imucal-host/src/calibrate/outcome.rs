@@ -326,10 +326,9 @@ impl FitSummary {
         }
     }
 
-    /// Unit of `rms` and `held_out_rms`, but of a gyroscope: residuals are distances of raw values, in nominal SI, and in a field of unknown
-    /// length in the recording's unit.
+    /// Unit of `rms` and `held_out_rms`, but of a gyroscope.
     pub fn rms_unit(&self) -> Unit {
-        if self.unit_in == Unit::Arbitrary { self.unit_in } else { self.unit_out }
+        Unit::of_residuals(self.unit_in, self.unit_out)
     }
 
     /// Standard errors of [`raw_triad`](Self::raw_triad): gain, bias.

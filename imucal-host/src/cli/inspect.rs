@@ -85,11 +85,9 @@ fn print_triad(kind: SensorKind, triad: &StoredTriad) -> anyhow::Result<()> {
     );
     let std = Triad { gain: rows(triad.gain_std), bias: triad.bias_std.into() };
     output::text(&parameters(&Triad { gain: rows(triad.gain), bias: triad.bias.into() }, &std))?;
-    // As of a fit: residuals are distances of raw values.
-    let unit = match (kind, triad.unit_in) {
-        (SensorKind::Gyr, _) => "rad a turn".into(),
-        (_, Unit::Arbitrary) => triad.unit_in.to_string(),
-        _ => triad.unit_out.to_string(),
+    let unit = match kind {
+        SensorKind::Gyr => "rad a turn".into(),
+        _ => Unit::of_residuals(triad.unit_in, triad.unit_out).to_string(),
     };
     let held = triad.held_out_rms.map_or_else(|| "not known".into(), plain);
     say!(

@@ -121,6 +121,13 @@ impl Unit {
         String::deserialize(text)?.parse().map_err(|unknown| D::Error::custom(of_sensor(unknown)))
     }
 
+    /// Unit of a fit's residuals, which are distances of raw values in nominal SI: that of calibrated values. Raw values in arbitrary units
+    /// have no nominal SI.
+    #[must_use]
+    pub fn of_residuals(raw: Self, calibrated: Self) -> Self {
+        if raw == Self::Arbitrary { raw } else { calibrated }
+    }
+
     /// As [`Self::per_si`], and `None` for arbitrary units as well, which have no size of their own.
     #[must_use]
     pub fn per_known_si(self) -> Option<f64> {

@@ -147,6 +147,16 @@ mod tests {
             let stored = StoredTriad { observations, bias_std: [0.5, 0.0, 0.2], ..stored() };
             errors(kind, &stored, Nominal { offset: 0.0, per_unit: 1.0 }).1
         };
+        // Fifteen poses on a rig are 45 equations of 14 parameters.
+        let on_rig = StoredTriad {
+            model: "I14".into(),
+            observations: 15,
+            parameters: 14,
+            bias_std: [0.5; 3],
+            ..stored()
+        };
+        let error = errors(SensorKind::Acc, &on_rig, Nominal { offset: 0.0, per_unit: 1.0 }).1;
+        assert!((error.x / 0.5 - (31.0f64 / 29.0).sqrt()).abs() < 1e-12, "{error}");
         let many = of(100_009, SensorKind::Acc);
         assert!((many - Vector3::new(0.5, 0.0, 0.2)).norm() < 1e-4, "{many}");
         let eight = of(17, SensorKind::Acc);

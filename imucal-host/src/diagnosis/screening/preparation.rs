@@ -205,11 +205,14 @@ fn undo(finding: &Finding, recording: &Recording, usable: &mut [Vec<bool>; 3], t
     let Some(kind) = finding.effect.sensors.first().copied() else { return };
     leave_out(finding, recording, kind, &mut usable[kind as usize]);
     if let Some(matrix) = finding.dose().and_then(|dose| response(finding.effect, &dose.values)) {
-        // The samples are M v: G (v − b) is G M⁻¹ (M v − M b).
-        let Some(inverse) = matrix.try_inverse() else { return };
         let triad = &mut triads[kind as usize];
-        (triad.gain, triad.bias) = (triad.gain * inverse, matrix * triad.bias);
+        *triad = of_altered(triad, &matrix).unwrap_or(*triad);
     }
+}
+
+/// The triad of samples M v, where that of v is known: G (v − b) = G M⁻¹ (M v − M b).
+fn of_altered(triad: &Triad<f64>, m: &Matrix3<f64>) -> Option<Triad<f64>> {
+    Some(Triad { gain: triad.gain * m.try_inverse()?, bias: m * triad.bias })
 }
 
 /// Rows of a sensor that can be used. In a wrong unit every sample may seem to lie beyond the range: then those count
@@ -302,4 +305,24 @@ fn shortcomings(recording: &Recording) -> Vec<String> {
         );
     }
     remarks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect;
+
+    #[test]
+    fn what_a_convention_does_to_samples_is_undone_in_gain_and_bias() {
+        let gain = Matrix3::new(1.02, 0.01, -0.02, 0.0, 0.97, 0.03, 0.01, 0.0, 1.05);
+        let triad = Triad { gain, bias: Vector3::new(0.3, -0.2, 0.1) };
+        let v = Vector3::new(2.0, -7.0, 5.0);
+        // Order 2 with its first axis reversed, and readings a power of ten too large.
+        for (id, values) in [("acc.axis_swap", [17.0]), ("acc.unit_error", [2.0])] {
+            let m = response(effect::find(id).unwrap(), &values).expect("it is linear");
+            let found = of_altered(&triad, &m).expect("it can be undone");
+            assert!((found.correct(&(m * v)) - triad.correct(&v)).norm() < 1e-9, "{id}: {found:?}");
+        }
+        assert!(of_altered(&triad, &Matrix3::zeros()).is_none());
+    }
 }
