@@ -4,18 +4,17 @@
 //! a multiple of that of the quietest window so far:
 //!
 //! ```text
-//! σ² = Σ_axes Var(f over four quarters)      still: σ² ≤ m · max(σ²_min, σ²_0),  |w̄ − b| ≤ w_0,  Σ_axes Var(w) ≤ w_1²
+//! σ² = Σ_axes Var(f over four quarters)      still: σ² ≤ m · σ²_q,  |w̄ − b| ≤ w_0,  Σ_axes Var(w) ≤ w_1²
 //! b ← b + clamp(w̄ − b, ±s)
 //! ```
 //!
 //! | symbol | meaning |
 //! | --- | --- |
 //! | m | [`RestSettings::multiple`] |
-//! | σ²_min | variance of the quietest window so far |
-//! | σ²_0 | [`RestSettings::least_variance`]: what an accelerometer of coarse steps may show of its noise |
+//! | σ²_q | variance of a window at rest: that of the quietest so far, or what the accelerometer's step hides (`rest/noise.rs`) |
 //! | w̄ | mean rate of the window |
 //! | b | median rate of the windows in which the accelerometer is still, followed by steps s (the first step reaches it) |
-//! | w_0 | [`RestSettings::turning`] |
+//! | w_0 | [`RestSettings::turning`]; of the first still window, against zero, [`LARGEST_OFFSET`] |
 //! | w_1 | [`SWINGING`]: a swing about the vertical comes back, and has no mean |
 //!
 //! A rest holds the quarters between the middles of its first and its last still window, so that it ends half a window before a
@@ -27,6 +26,7 @@
 
 use nalgebra::Vector3;
 
+mod noise;
 mod window;
 
 use super::{Sample, ring::Ring};
@@ -34,6 +34,7 @@ use crate::{
     observation::{Moments, Rest},
     scalar::Scalar,
 };
+use noise::RestNoise;
 use window::{Window, window};
 
 /// A quarter of the window, µs.
@@ -45,6 +46,8 @@ pub const NOISIEST: f64 = 0.25;
 /// A gyroscope whose rates deviate by more than this from their mean swings, rad/s (6°/s): ten times what most show at rest, and more
 /// than a hand that holds still does.
 pub const SWINGING: f64 = 0.1;
+/// Largest mean rate of the first still window, rad/s (29°/s): beyond the offset of any gyroscope, it turns.
+pub const LARGEST_OFFSET: f64 = 0.5;
 /// Time from one sample to the next that is so many times the usual one breaks a window.
 const GAP: u64 = 5;
 /// Steps by which the usual rate follows that of a window, rad/s: where they agree within [`RestSettings::turning`], and where
@@ -181,8 +184,9 @@ pub struct RestObserver<T: Scalar> {
     /// Time between two samples beyond which there is a gap, µs; the largest there is before the usual one is known.
     gap: u64,
     quarters: u32,
-    /// Variance of the quietest window so far, (m/s²)².
-    quietest: Option<T>,
+    noise: RestNoise<T>,
+    /// First sample of the accelerometer in the quarter that goes on, m/s².
+    first: Vector3<T>,
     /// Usual rate of the windows in which the accelerometer is still, rad/s.
     rate: Option<Vector3<T>>,
     lasting: Option<Lasting<T>>,
@@ -204,7 +208,8 @@ impl<T: Scalar> RestObserver<T> {
             until: 0,
             gap: u64::MAX,
             quarters: 0,
-            quietest: None,
+            noise: RestNoise::default(),
+            first: Vector3::zeros(),
             rate: None,
             lasting: None,
         }
@@ -251,7 +256,8 @@ impl<T: Scalar> RestObserver<T> {
         if let Some(interval) = lasted.checked_div(whole.rows.saturating_sub(1)) {
             self.gap = if interval > 0 { GAP.saturating_mul(interval.into()) } else { u64::MAX };
         }
-        let ended = self.quarter();
+        let ended = self.quarter(&sample.acc);
+        self.first = sample.acc;
         self.until = sample.time.saturating_add(QUARTER);
         self.stretches.turn(Stretch::new(sample.time)).push(sample);
         ended
@@ -299,28 +305,29 @@ impl<T: Scalar> RestObserver<T> {
         self.rate.unwrap_or_else(Vector3::zeros)
     }
 
-    /// Variance up to which a window is still, (m/s²)²; `None` before the first window.
-    pub fn threshold(&self) -> Option<T> {
-        let quietest = self.quietest?;
-        let least = self.settings.least_variance;
-        let allowed = self.settings.multiple * if quietest > least { quietest } else { least };
+    /// Variance up to which a window is still, (m/s²)²; [`NOISIEST`] before the first window.
+    pub fn threshold(&self) -> T {
+        let allowed = self.settings.multiple * self.noise.variance(self.settings.least_variance);
         let most = T::of(NOISIEST);
-        Some(if allowed < most { allowed } else { most })
+        if allowed < most { allowed } else { most }
     }
 
     fn begin(&mut self, sample: &Sample<T>) {
         let first = self.stretches.now();
         *first = Stretch::new(sample.time);
         first.push(sample);
+        self.first = sample.acc;
         (self.last, self.until) = (sample.time, sample.time.saturating_add(QUARTER));
     }
 
-    /// The quarter that went on is whole.
-    fn quarter(&mut self) -> Option<ObservedRest<T>> {
+    /// The quarter that went on is whole; `next`: the accelerometer's first sample after it, m/s².
+    fn quarter(&mut self, next: &Vector3<T>) -> Option<ObservedRest<T>> {
         self.quarters = self.quarters.wrapping_add(1);
         let before = |back| self.stretches.before(back);
-        let window = window([before(3)?, before(2)?, before(1)?, before(0)?]);
-        let Some(variance) = window.and_then(|window| self.still(&window)) else { return self.ended() };
+        let last = before(0)?;
+        self.noise.take_quarter(&last.acc);
+        let window = window([before(3)?, before(2)?, before(1)?, last]);
+        let Some(variance) = window.and_then(|window| self.still(&window, next)) else { return self.ended() };
         let lasting = self.lasting.get_or_insert(Lasting { held: None, quarters: 0, noise: variance });
         lasting.noise = if variance > lasting.noise { variance } else { lasting.noise };
         // From the middle of the window before to that of this one.
@@ -335,19 +342,26 @@ impl<T: Scalar> RestObserver<T> {
         None
     }
 
-    /// Variance of a window, if it is still.
-    fn still(&mut self, window: &Window<T>) -> Option<T> {
+    /// Variance of a window, if it is still; `next`: the accelerometer's first sample after it, m/s².
+    fn still(&mut self, window: &Window<T>, next: &Vector3<T>) -> Option<T> {
         let variance = window.variance;
-        if self.quietest.is_none_or(|quietest| variance < quietest) {
-            self.quietest = Some(variance);
+        self.noise.take(variance);
+        let mut most = self.threshold();
+        if variance > most && variance <= T::of(NOISIEST) {
+            self.noise.take_step(&self.first, next);
+            most = self.threshold();
         }
         let swings = window.swing > T::of(SWINGING * SWINGING);
-        (variance <= self.threshold()? && !swings && self.is_usual(window.rate)).then_some(variance)
+        (variance <= most && !swings && self.is_usual(window.rate)).then_some(variance)
     }
 
     /// The mean rate of a window in which the accelerometer is still is the usual one, which follows it.
     fn is_usual(&mut self, rate: Vector3<T>) -> bool {
-        let usual = self.rate.get_or_insert(rate);
+        let usual = match &mut self.rate {
+            Some(usual) => usual,
+            None if rate.norm() > T::of(LARGEST_OFFSET) => return false,
+            first => first.insert(rate),
+        };
         let off = rate - *usual;
         let agrees = off.norm() <= self.settings.turning;
         let step = T::of(if agrees { STEPS.0 } else { STEPS.1 });
@@ -363,7 +377,7 @@ impl<T: Scalar> RestObserver<T> {
     /// The rest that has ended, if it was one.
     fn ended(&mut self) -> Option<ObservedRest<T>> {
         let Lasting { held, quarters, noise } = self.lasting.take()?;
-        let held = held.filter(|_| quarters >= SHORTEST && Some(noise) <= self.threshold())?;
+        let held = held.filter(|_| quarters >= SHORTEST && noise <= self.threshold())?;
         Some(ObservedRest { rest: held.rest(), start: held.start, end: held.end, noise })
     }
 }

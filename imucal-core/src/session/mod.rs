@@ -260,7 +260,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         let field = (field.count() > 0).then(|| field.mean());
         let turn = self.pending.take();
         self.poses.push(rest, field, turn.as_ref());
-        let most = self.observer.rests().threshold().unwrap_or(f32::INFINITY);
+        let most = self.observer.rests().threshold();
         let noisy = self.poses.retain_quieter(most);
         self.thrown.rests = self.thrown.rests.saturating_add(u16::try_from(noisy).unwrap_or(u16::MAX));
         self.mark(Sensor::Accelerometer);
