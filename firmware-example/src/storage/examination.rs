@@ -31,23 +31,33 @@ impl<F: NorFlash> Slots<F> {
             return Ok(Found::Whole(sequence, length));
         }
         let claimed = header.map(|(sequence, _)| sequence);
-        let once = match (slot.sealed, self.sealed(at, slot)?) {
-            (false, _) => claimed,
-            (true, Some(sequence)) => Some(sequence),
-            // A seal that has lost bits itself; without one the writing was cut off.
-            (true, None) if !self.is_blank(at + slot.size - SEAL, SEAL)? => claimed,
-            (true, None) => None,
+        let once = if slot.sealed {
+            let (sealed, complement) = self.seal(at, slot)?;
+            // A seal that has lost bits itself confirms a header by either half. An erase that was cut leaves bits of both at
+            // random, and one that is blank has cut off the writing.
+            if sealed == complement {
+                Some(sealed)
+            } else {
+                claimed.filter(|claimed| [sealed, complement].contains(claimed))
+            }
+        } else {
+            claimed
         };
         Ok(once.map_or(Found::Nothing, Found::Damaged))
     }
 
-    /// Sequence number in the seal of a slot.
-    pub(super) fn sealed(&mut self, at: usize, slot: Slot) -> Result<Option<u32>, StorageError> {
+    /// Sequence number in the seal of a slot, and that of which its complement lies there; equal where the seal is whole.
+    fn seal(&mut self, at: usize, slot: Slot) -> Result<(u32, u32), StorageError> {
         let mut piece = [0; PIECE];
         self.flash.read((at + slot.size - SEAL) as u32, &mut piece).map_err(of_flash)?;
-        let Some([a, b, c, d, na, nb, nc, nd]) = piece.first_chunk::<8>().copied() else { return Ok(None) };
-        let sequence = u32::from_le_bytes([a, b, c, d]);
-        Ok((sequence == !u32::from_le_bytes([na, nb, nc, nd])).then_some(sequence))
+        let [a, b, c, d, na, nb, nc, nd, ..] = piece;
+        Ok((u32::from_le_bytes([a, b, c, d]), !u32::from_le_bytes([na, nb, nc, nd])))
+    }
+
+    /// Sequence number in the seal of a slot, where the seal is whole.
+    pub(super) fn sealed(&mut self, at: usize, slot: Slot) -> Result<Option<u32>, StorageError> {
+        let (sealed, complement) = self.seal(at, slot)?;
+        Ok((sealed == complement).then_some(sealed))
     }
 
     /// The CRC behind the first `end` bytes of a slot is theirs.
