@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
 use rayon::prelude::*;
 
 /// s.
-const DELAYS: [f64; 8] = [-0.05, -0.02, -0.005, -0.002, 0.002, 0.005, 0.02, 0.05];
+const DELAYS: [f64; 4] = [-0.05, -0.002, 0.005, 0.02];
 
 /// The clock's offset and its standard error, s; `None` where it is not named.
 fn offset(diagnosis: &Diagnosis) -> Option<(f64, f64)> {

@@ -6,11 +6,9 @@ use std::sync::OnceLock;
 use imucal_host::{
     diagnosis::{Diagnosis, Options, Verdict, diagnose},
     effect::class::class,
-    observe::motion,
     recording::Recording,
 };
 use imucal_tests::{data, golden, part::part};
-use nalgebra::{Quaternion, UnitQuaternion};
 use serde_json::Value;
 
 /// Recordings with positions.
@@ -127,33 +125,5 @@ fn without_the_position_no_arm_is_asserted() {
         assert!(found.iter().all(|id| !id.starts_with("gyr.") || *id == "gyr.stuck_samples"), "{found:?}");
         let because = diagnosis.not_testable.iter().find(|effect| effect.effect == "acc.lever_arm");
         assert!(because.is_some_and(|why| why.because.contains("linear acceleration")), "{because:?}");
-    }
-}
-
-#[test]
-fn a_delay_of_the_reference_is_reported_with_its_sign_and_size() {
-    let Some(recording) = read("broad-02-rotation") else { return };
-    let delays = [-0.05, 0.0, 0.05];
-    let offsets: Vec<f64> = delays
-        .iter()
-        .map(|delay| {
-            let mut late = recording.clone();
-            // The cameras' row of t shows what was at t - delay.
-            let attitudes = motion::of_reference(recording.reference.as_ref().expect("attitudes"));
-            let later = motion::later(&recording.time, &attitudes, *delay);
-            let quaternion = |attitude: &Option<nalgebra::Matrix3<f64>>| {
-                let none = Quaternion::new(f64::NAN, f64::NAN, f64::NAN, f64::NAN);
-                let q = attitude.map_or(none, |c| *UnitQuaternion::from_matrix(&c).quaternion());
-                [q.w, q.i, q.j, q.k]
-            };
-            late.reference = Some(later.iter().map(quaternion).collect());
-            late.position = None;
-            let diagnosis = diagnose(&late, &Options::default(), &|_| ());
-            let cause = diagnosis.causes.iter().find(|cause| cause.effect == "clk.time_offset");
-            cause.expect("it is named").parameters[0].value.expect("known")
-        })
-        .collect();
-    for (offset, delay) in offsets.iter().zip(delays) {
-        assert!((offset - offsets[1] - delay).abs() < 3e-4, "{offsets:?}");
     }
 }

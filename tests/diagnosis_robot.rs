@@ -118,19 +118,23 @@ fn stretches_in_which_the_machine_moved_otherwise_are_found_with_their_ends() {
 
 #[test]
 fn a_delay_that_is_put_in_is_reported_with_its_sign_and_size() {
-    for (name, own) in [("open-01", 0.0), ("open-07", 0.0), ("open-02", -0.034_810_7)] {
-        for delay in [-0.05, -0.02, -0.002, 0.002, 0.02, 0.05] {
-            let Some((real, mut stream)) = pair(name) else { return };
-            // The row of t then shows the stream of t + delay.
-            stream.time.iter_mut().for_each(|time| *time += delay);
-            let diagnosis = diagnosed((real, stream));
-            let truth: f64 = own + delay;
-            let found = amount(&diagnosis, "clk.time_offset", "offset");
-            let found = found.unwrap_or_else(|| panic!("{name}, {delay}: {:?}", names(&diagnosis)));
-            let (value, error) = (found.value.expect("known"), found.std_error.expect("known"));
-            assert!((value - truth).abs() < 3.0 * error.max(3e-5), "{name}, {delay}: {value} ± {error}");
-            assert_eq!(names(&diagnosis), ["clk.time_offset"], "{name}, {delay}");
-        }
+    let own_of_02 = -0.034_810_7;
+    for (name, own, delay) in [
+        ("open-01", 0.0, -0.05),
+        ("open-01", 0.0, 0.002),
+        ("open-07", 0.0, 0.02),
+        ("open-02", own_of_02, 0.05),
+    ] {
+        let Some((real, mut stream)) = pair(name) else { return };
+        // The row of t then shows the stream of t + delay.
+        stream.time.iter_mut().for_each(|time| *time += delay);
+        let diagnosis = diagnosed((real, stream));
+        let truth: f64 = own + delay;
+        let found = amount(&diagnosis, "clk.time_offset", "offset");
+        let found = found.unwrap_or_else(|| panic!("{name}, {delay}: {:?}", names(&diagnosis)));
+        let (value, error) = (found.value.expect("known"), found.std_error.expect("known"));
+        assert!((value - truth).abs() < 3.0 * error.max(3e-5), "{name}, {delay}: {value} ± {error}");
+        assert_eq!(names(&diagnosis), ["clk.time_offset"], "{name}, {delay}");
     }
 }
 

@@ -51,22 +51,21 @@ fn is_near(found: &Amount, truth: f64, off: f64) -> bool {
 
 #[test]
 fn a_simulator_s_field_with_another_declination_and_dip_is_named_with_both_angles() {
-    for (seed, kind) in KINDS.into_iter().enumerate() {
-        for (declination, dip) in [(0.2, 0.0), (-0.6, 0.15), (0.05, -0.03)] {
-            let simulator = scene(kind, seed as u64);
-            let mut real = simulator.clone();
-            let field_n = simulator.place.field_n;
-            let across = field_n.cross(&Vector3::z()).normalize();
-            let turn = Rotation3::new(Vector3::z() * declination) * Rotation3::new(across * dip);
-            real.place.field_n = turn * field_n;
-            let diagnosis = diagnosed(&real, &simulator);
-            let case = format!("{kind:?} {declination} {dip}");
-            assert_eq!(named(&diagnosis), ["mag.field_direction"], "{case}");
-            assert_eq!(diagnosis.verdict, Verdict::Explained, "{case}");
-            for (name, truth) in [("declination", declination), ("dip", dip)] {
-                let found = amount(&diagnosis, "mag.field_direction", name);
-                assert!(is_near(found, truth, OFF), "{case} {name}: {found:?}");
-            }
+    let angles = [(-0.6, 0.15), (0.2, 0.0), (0.05, -0.03)];
+    for (seed, (kind, (declination, dip))) in KINDS.into_iter().zip(angles).enumerate() {
+        let simulator = scene(kind, seed as u64);
+        let mut real = simulator.clone();
+        let field_n = simulator.place.field_n;
+        let across = field_n.cross(&Vector3::z()).normalize();
+        let turn = Rotation3::new(Vector3::z() * declination) * Rotation3::new(across * dip);
+        real.place.field_n = turn * field_n;
+        let diagnosis = diagnosed(&real, &simulator);
+        let case = format!("{kind:?} {declination} {dip}");
+        assert_eq!(named(&diagnosis), ["mag.field_direction"], "{case}");
+        assert_eq!(diagnosis.verdict, Verdict::Explained, "{case}");
+        for (name, truth) in [("declination", declination), ("dip", dip)] {
+            let found = amount(&diagnosis, "mag.field_direction", name);
+            assert!(is_near(found, truth, OFF), "{case} {name}: {found:?}");
         }
     }
 }

@@ -55,7 +55,8 @@ fn a_deliberate_panic_does_not_link() {
     if !ready() {
         return;
     }
-    for board in BOARDS.into_iter().chain([RISC_V]) {
+    // One of each architecture: the symbol that is missing is the core's, whatever the board.
+    for board in [BOARDS[0], RISC_V] {
         let refusal =
             build(board, "gate", &["control-panic", "key"]).expect_err("the gate lets a panic through");
         assert!(

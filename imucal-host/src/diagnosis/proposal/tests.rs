@@ -29,8 +29,14 @@ fn crosstalk() -> &'static Effect {
 
 fn recorded(dose: Option<Dose>, seed: u64) -> Recording {
     let doses = dose.into_iter().collect();
-    let simulation =
-        Simulation { programme: Programme::Full, rate: 25.0, seed, doses, ..Simulation::default() };
+    let simulation = Simulation {
+        programme: Programme::Mixed,
+        rate: 25.0,
+        duration: Some(200.0),
+        seed,
+        doses,
+        ..Simulation::default()
+    };
     simulation.record("outside.csv").unwrap()
 }
 

@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_clock_that_runs_evenly_neither_jumps_nor_wanders() {
-        for (seed, kind) in KINDS.into_iter().cycle().take(9).enumerate() {
+        for (seed, kind) in KINDS.into_iter().enumerate() {
             let pair = scene(kind, None, 20 + seed as u64).record("even").unwrap();
             let diagnosis = diagnosed(&pair.real, &pair.simulated);
             for id in ["clk.jump", "clk.wander"] {
