@@ -40,6 +40,7 @@ pub(super) fn reach_all() {
     for k in 0..40 {
         let point = scene::spiral(k, 40) * 50.0;
         reach!(observer::cloud::CloudObserver::push(&mut points, &point));
+        reach!(observer::cloud::CloudObserver::judged(&points));
     }
     for slot in reach!(observer::cloud::CloudObserver::slots(&points)) {
         reach!(observer::cloud::Slot::on_shell(slot, 50.0));

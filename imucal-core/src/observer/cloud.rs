@@ -117,6 +117,12 @@ impl<T: Scalar, const N: usize> CloudObserver<T, N> {
         self.take(&newer)
     }
 
+    /// The sample that the last one has judged: the one before it, in the unit of the samples. `None` where that was none.
+    pub fn judged(&self) -> Option<&Vector3<T>> {
+        let [judged, _] = &self.before;
+        judged.as_ref()
+    }
+
     /// A sample is far from both its neighbours, which are near to one another.
     fn is_spike(&self, before: &Vector3<T>, sample: &Vector3<T>, after: &Vector3<T>) -> bool {
         let least = self.apart * self.apart;

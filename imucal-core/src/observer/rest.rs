@@ -126,7 +126,8 @@ impl<T: Scalar> Stretch<T> {
 
     #[inline]
     fn push(&mut self, sample: &Sample<T>) {
-        self.rows = self.rows.saturating_add(1);
+        // Of a quarter: four billion samples of one time would come round.
+        self.rows = self.rows.wrapping_add(1);
         if sample.is_whole() {
             self.acc.take(&sample.acc);
             if let Some(rate) = &sample.gyr {
@@ -135,7 +136,7 @@ impl<T: Scalar> Stretch<T> {
         }
         if let Some(temperature) = sample.temperature.filter(|value| value.finite()) {
             self.temperature += temperature;
-            self.temperatures = self.temperatures.saturating_add(1);
+            self.temperatures = self.temperatures.wrapping_add(1);
         }
     }
 

@@ -106,6 +106,8 @@ pub struct Session<const N: usize, const B: usize, const M: usize> {
     thermometer: ThermometerObserver<f32>,
     /// The field while a rest goes on.
     field: Moments<f32>,
+    /// The last sample of the field came while it did.
+    field_rests: bool,
     poses: Poses<N, B>,
     /// A turn to the rest that goes on.
     pending: Option<ObservedTurn<f32, B>>,
@@ -135,6 +137,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             cloud: CloudObserver::new(settings.apart),
             thermometer: ThermometerObserver::default(),
             field: Moments::default(),
+            field_rests: false,
             poses: Poses::default(),
             pending: None,
             fit: None,
@@ -180,7 +183,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
                 if self.pending.take().is_some() {
                     self.poses.break_off();
                 }
-                self.field = Moments::default();
+                (self.field, self.field_rests) = (Moments::default(), false);
             }
             Seen::Turn(turn) => self.pending = Some(turn.clone()),
         }
@@ -193,7 +196,10 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             return;
         }
         match self.cloud.push(field) {
-            Chosen::Unusable => return,
+            Chosen::Unusable => {
+                self.field_rests = false;
+                return;
+            }
             Chosen::Near => {}
             Chosen::New => {
                 self.new_points = self.new_points.saturating_add(1);
@@ -202,9 +208,15 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
                 }
             }
         }
-        if self.observer.rests().stage() != Stage::Moving {
-            self.field.push(field);
+        let rests = self.observer.rests().stage() != Stage::Moving;
+        // A spike is known by the sample after it.
+        if rests
+            && self.field_rests
+            && let Some(judged) = self.cloud.judged()
+        {
+            self.field.push(judged);
         }
+        self.field_rests = rests;
     }
 
     /// No more samples come: what goes on ends, and what has changed is fitted.
@@ -256,6 +268,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
 
     /// A rest has ended.
     fn keep(&mut self, rest: &crate::observer::rest::ObservedRest<f32>) {
+        self.field_rests = false;
         let field = core::mem::take(&mut self.field);
         let field = (field.count() > 0).then(|| field.mean());
         let turn = self.pending.take();

@@ -32,6 +32,8 @@ struct Hand {
     every: [u64; 2],
     /// How many times as much the accelerometer scatters.
     shaken: f64,
+    /// Each so many samples of the magnetometer one is 30 µT off.
+    spikes: Option<u64>,
 }
 
 const FORCE: Vector3<f64> = Vector3::new(0.0, 0.0, -9.80665);
@@ -73,6 +75,7 @@ impl Hand {
             warmth: [none; 2],
             every: [1; 2],
             shaken: 1.0,
+            spikes: None,
         }
     }
 
@@ -86,7 +89,9 @@ impl Hand {
     fn sample(&mut self, session: &mut Held, rate: &Vector3<f64>) {
         let noise = [0.01 * self.shaken, 0.002, 0.3].map(|size| self.normals(size));
         let at = self.c_n_s.inverse();
-        let true_values = [at * FORCE, *rate, at * self.field + self.magnet];
+        let spike = self.spikes.is_some_and(|every| (self.time / 10_000) % every == every / 2);
+        let spike = Vector3::new(0.0, 30.0, 0.0) * f64::from(u8::from(spike));
+        let true_values = [at * FORCE, *rate, at * self.field + self.magnet + spike];
         let temperature = self.climate.map(|climate| climate(self.time as f64 * 1e-6));
         let warmth = |k: usize| temperature.zip(self.warmth.get(k));
         let raw = |k: usize| {
@@ -290,6 +295,27 @@ fn a_magnet_that_is_brought_near_for_a_part_of_a_session_leaves_no_wrong_magneto
     }
     std::println!("{refused} refused, {right} accepted and right");
     assert!(refused > 0, "the magnet is in no session");
+}
+
+#[test]
+fn a_spike_of_the_field_is_in_no_rest_s_mean() {
+    for seed in 0..4 {
+        let fields = [None, Some(40)].map(|spikes| {
+            let (mut session, mut hand) = (Held::new(SessionSettings::default()), Hand::new(seed));
+            hand.spikes = spikes;
+            hand.rest(&mut session, 5.0);
+            for to in [Vector3::x(), Vector3::y(), -Vector3::z()] {
+                hand.pose(&mut session, &to);
+            }
+            session.poses().list().iter().map(|pose| pose.field).collect::<std::vec::Vec<_>>()
+        });
+        let [plain, spiked] = &fields;
+        assert_eq!((plain.len(), spiked.len()), (3, 3));
+        for (plain, spiked) in plain.iter().zip(spiked) {
+            // One sample of forty is 30 µT off, and is left out: the others have a mean that is less sure.
+            assert!((plain - spiked).norm() < 0.1, "seed {seed}: {plain} {spiked}");
+        }
+    }
 }
 
 #[test]
