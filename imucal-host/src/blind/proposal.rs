@@ -19,7 +19,7 @@ use crate::{
     },
     effect::Effect,
     recording::{Recording, Stream},
-    simulator::{Dose, Simulation, SimulationError, robot::RobotScene},
+    simulator::{Dose, SimulationError},
 };
 
 /// Correlation of what a formula and the truth change from which on they are the same.
@@ -53,8 +53,7 @@ impl Proposed {
 pub fn of_rig(drawn: &Drawn, diagnosis: &Diagnosis) -> Result<Vec<Proposed>, SimulationError> {
     let (lambda, doses) = (&drawn.lambda, &drawn.simulation.doses);
     let second = |options: &Options| {
-        let seed = drawn.simulation.seed.wrapping_add(1);
-        let recording = Simulation { seed, ..drawn.simulation.clone() }.record("second.csv")?;
+        let recording = drawn.simulation.again().record("second.csv")?;
         Ok(diagnose(&recording, options, &|_| ()))
     };
     let of = |proposal: &Proposal| {
@@ -77,8 +76,7 @@ pub fn of_robot(drawn: &RobotDrawn, diagnosis: &Diagnosis) -> Result<Vec<Propose
     }
     let lambda = RobotLambda::new(&drawn.scene)?;
     let second = |options: &Options| {
-        let seed = drawn.scene.seed.wrapping_add(1);
-        let pair = RobotScene { seed, ..drawn.scene.clone() }.record("second")?;
+        let pair = drawn.scene.again().record("second")?;
         let options = Options { stream: Stream::of(&pair.simulated), ..options.clone() };
         Ok(diagnose(&pair.real as &Recording, &options, &|_| ()))
     };

@@ -84,6 +84,13 @@ impl Simulation {
         Ok(schedule.scattered(self.conditions.scatter, &mut random))
     }
 
+    /// Another recording of the same unit.
+    #[must_use]
+    pub fn again(&self) -> Self {
+        let unit_seed = self.unit_seed.or(Some(self.seed));
+        Self { seed: self.seed.wrapping_add(1), unit_seed, ..self.clone() }
+    }
+
     /// The unit, without effects.
     pub fn unit_under_test(&self) -> UnitUnderTest {
         let drawn = UnitUnderTest::draw(self.unit, self.unit_seed.unwrap_or(self.seed), self.rate);

@@ -40,6 +40,8 @@ pub struct RobotScene {
     pub kind: RobotKind,
     /// Everything random follows from it.
     pub seed: u64,
+    /// The unit's own seed, for further recordings of one unit; `None`: that of the recording.
+    pub unit_seed: Option<u64>,
     /// Length, s, 40 to 3600.
     pub duration: f64,
     /// Rate of the recording, Hz, 10 to 1000.
@@ -77,6 +79,7 @@ impl Default for RobotScene {
         Self {
             kind: RobotKind::default(),
             seed: 1,
+            unit_seed: None,
             duration: 120.0,
             real_rate: 200.0,
             sim_rate: 200.0,
@@ -152,9 +155,16 @@ impl RobotScene {
         Ok(motion)
     }
 
+    /// Another recording of the same unit.
+    #[must_use]
+    pub fn again(&self) -> Self {
+        let unit_seed = self.unit_seed.or(Some(self.seed));
+        Self { seed: self.seed.wrapping_add(1), unit_seed, ..self.clone() }
+    }
+
     /// The unit on the body, without effects.
     pub fn unit_under_test(&self) -> UnitUnderTest {
-        let mut unit = UnitUnderTest::draw(self.unit, self.seed, self.real_rate);
+        let mut unit = UnitUnderTest::draw(self.unit, self.unit_seed.unwrap_or(self.seed), self.real_rate);
         unit.apply(self.levels);
         // The unit is turned; components go the other way.
         unit.c_t_q = rotation::exp(&-self.mounting);

@@ -76,6 +76,14 @@ fn the_same_seed_gives_the_same_bits_on_every_machine() {
 }
 
 #[test]
+fn another_recording_of_a_unit_is_of_the_same_one_and_scatters_otherwise() {
+    let again = short().again();
+    assert_eq!(again.unit_under_test(), short().unit_under_test());
+    assert_eq!(again.again().unit_under_test(), short().unit_under_test());
+    assert_ne!(again.record("again.csv").unwrap().acc, short().record("short.csv").unwrap().acc);
+}
+
+#[test]
 fn every_effect_alters_its_sensors_and_no_other_and_at_size_zero_nothing() {
     for effect in CATALOGUE.iter() {
         let recorded = with(&effect.id, 1.0).record("on.csv").unwrap();

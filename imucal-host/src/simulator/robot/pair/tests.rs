@@ -101,6 +101,15 @@ fn a_seed_gives_one_pair() {
 }
 
 #[test]
+fn another_recording_of_a_unit_moves_and_scatters_otherwise() {
+    let scene = RobotScene { duration: 40.0, seed: 7, ..RobotScene::default() };
+    let again = scene.again();
+    assert_eq!(again.unit_under_test(), scene.unit_under_test());
+    assert_eq!(again.again().unit_under_test(), scene.unit_under_test());
+    assert_ne!(again.record("pair").unwrap(), scene.record("pair").unwrap());
+}
+
+#[test]
 fn lost_rows_are_not_there_and_the_others_are_what_they_were() {
     let whole = RobotScene { duration: 50.0, ..RobotScene::default() };
     let holed = RobotScene { dropped: 0.05, ..whole.clone() };
