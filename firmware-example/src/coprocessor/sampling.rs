@@ -196,6 +196,7 @@ impl<
             Err(NotStored::HigherOrder) => CaptureOutcome::HigherOrder,
             Err(NotStored::OwnAxes) => CaptureOutcome::OwnAxes,
             Err(NotStored::OtherAxes { strain, most }) => CaptureOutcome::OtherAxes { strain, most },
+            Err(NotStored::OtherUnit) => CaptureOutcome::OtherUnit,
             Ok(triad) => match self.calibration.adopt(sensor, &triad, date) {
                 Ok(()) => CaptureOutcome::Adopted,
                 Err(Fault::Implausible(defect)) => CaptureOutcome::Implausible(defect),

@@ -161,6 +161,8 @@ pub enum CaptureOutcome {
         /// Allowed at most.
         most: f32,
     },
+    /// The one in use gives its values in another unit.
+    OtherUnit,
 }
 
 /// Samples of a message.

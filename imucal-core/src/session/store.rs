@@ -13,7 +13,7 @@ use super::{
 use crate::{
     accept::{Quantity, Refusal, relative_error},
     fit::Units,
-    record::{FitQuality, Order, Sensor, TriadRecord},
+    record::{FitQuality, Order, RawUnit, Sensor, TriadRecord},
     temperature::TemperatureTerms,
     triad::Triad,
 };
@@ -43,10 +43,13 @@ pub enum NotStored {
         /// Allowed at most.
         most: f32,
     },
+    /// The stored one gives its values in another unit, on which what reads them relies.
+    OtherUnit,
 }
 
 impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
-    /// A sensor's calibration for the record, in the `axes` of that, if it is accepted and surer than the one `stored`. Terms of
+    /// A sensor's calibration for the record, in the `axes` of that, if it is accepted and surer than the one `stored`, in whose unit it
+    /// is: that of the raw values, where a field of unknown length was kept so, or the calibrated one of `units`. Terms of
     /// temperature are those of the stored one, from the mean temperature of the session's rests on. One with terms beyond the first
     /// order stays, since gain and bias were fitted with them, and a session fits none.
     ///
@@ -65,7 +68,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         let mut new = estimate.record(model_of(sensor), units);
         // What warmth does is not seen here, and stays as it is known.
         new.temperature = known_terms(&new, stored, self.poses.temperature());
-        self.surer(sensor, new, stored, axes)
+        self.surer(sensor, new, units, stored, axes)
     }
 
     /// A new calibration, if it is surer than the one `stored`. A magnetometer in the accelerometer's axes takes the place of one in axes
@@ -75,6 +78,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
         &self,
         sensor: Sensor,
         mut new: TriadRecord,
+        units: &Units,
         stored: Option<&TriadRecord<O>>,
         axes: &Axes,
     ) -> Result<TriadRecord, NotStored> {
@@ -85,6 +89,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             if !stored.order.is_first_order() {
                 return Err(NotStored::HigherOrder);
             }
+            give_in(stored.unit_out, &mut new, units)?;
             match (is_turned(sensor, &stored.gain), is_turned(sensor, &new.gain)) {
                 (true, false) => return Err(NotStored::OwnAxes),
                 (false, true) => return Ok(new),
@@ -127,6 +132,24 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             }
         }
     }
+}
+
+/// Gives a triad's values in the unit of the stored one. An arbitrary unit has no size that anything relies on.
+#[inline]
+fn give_in(unit: RawUnit, new: &mut TriadRecord, units: &Units) -> Result<(), NotStored> {
+    if unit == new.unit_out || unit == RawUnit::Arbitrary {
+        return Ok(());
+    }
+    if unit != units.raw {
+        return Err(NotStored::OtherUnit);
+    }
+    let size = libm::fabsf(units.per_unit);
+    new.unit_out = unit;
+    new.gain = new.gain.map(|row| row.map(|entry| entry * units.per_unit));
+    new.quality.gain_std = new.quality.gain_std.map(|row| row.map(|std| std * size));
+    new.quality.rms *= size;
+    new.quality.field_norm = new.quality.field_norm.map(|norm| norm * size);
+    Ok(())
 }
 
 /// Brings a triad from the session's axes into those of the record.
@@ -200,7 +223,6 @@ pub fn bias_of_the_day<O>(still: &MeanRate<f32>, stored: &TriadRecord<O>, most: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::RawUnit;
 
     /// A gyroscope in counts, a thousand a rad/s, whose bias is known to 2 counts.
     fn stored() -> TriadRecord {

@@ -203,7 +203,7 @@ impl<const N: usize, const B: usize, const M: usize> Session<N, B, M> {
             }
         }
         new.temperature = Some(terms);
-        self.surer(sensor, new, stored, axes)
+        self.surer(sensor, new, units, stored, axes)
     }
 }
 

@@ -114,7 +114,17 @@ fn a_magnetometer_is_compared_with_one_in_another_unit_by_the_field_of_each() {
         stored
     };
     assert!(matches!(better(Some(&in_counts(0.5))), Err(NotStored::Surer { .. })));
-    assert_eq!(better(Some(&in_counts(2.0))), Ok(new.clone()));
+    // What is stored instead gives its values in that unit too.
+    let stored = better(Some(&in_counts(2.0))).expect("surer");
+    let mut expected = in_counts(1.0);
+    expected.quality.rms = 100.0 * new.quality.rms;
+    assert_eq!(stored, expected);
+    let arbitrary = TriadRecord { unit_out: RawUnit::Arbitrary, ..in_counts(2.0) };
+    assert_eq!(better(Some(&arbitrary)), Ok(new.clone()));
+    let units = Units { calibrated: RawUnit::Arbitrary, ..units };
+    let stored = TriadRecord { unit_out: RawUnit::MicroTesla, ..in_counts(2.0) };
+    let refused = session.better(Sensor::Magnetometer, &units, Some(&stored), &Axes::Own);
+    assert_eq!(refused, Err(NotStored::OtherUnit));
 }
 
 /// What an alignment says, and the verdicts of accelerometer and magnetometer after it.

@@ -230,11 +230,13 @@ fn reason(why: &NotStored, kind: SensorKind, task: &CaptureTask) -> String {
         NotStored::HigherOrder => HIGHER_ORDER.into(),
         NotStored::OwnAxes => OWN_AXES.into(),
         NotStored::OtherAxes { strain, .. } => other_axes(*strain),
+        NotStored::OtherUnit => OTHER_UNIT.into(),
     }
 }
 
 const HIGHER_ORDER: &str = "the one in use has nonlinear terms, or terms of temperature to second order, which a session does not fit";
 const OWN_AXES: &str = "the one in use is in the accelerometer's axes, this one in its own";
+const OTHER_UNIT: &str = "the one in use gives its values in another unit, on which what reads them relies";
 const TOO_LITTLE: &str = "too few rests, turns or places of the field for a fit";
 
 /// A refusal, and what would mend axes on which the sensors disagree.

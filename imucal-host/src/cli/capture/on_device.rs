@@ -8,13 +8,13 @@ use std::{
 
 use imucal_core::{
     link::{CaptureOutcome, CaptureTask, RecordState, SAMPLES},
-    record::{self, CalibrationRecord, HigherOrder, TriadRecord},
+    record::{self, CalibrationRecord, HigherOrder},
     session::guide::{Advice, Guide},
 };
 
 use super::{
-    Arguments, HIGHER_ORDER, Lines, OWN_AXES, TOO_LITTLE, other_axes, recorded, refused, settings_of, shares,
-    surer, task_of, warn_of_nothing, write,
+    Arguments, HIGHER_ORDER, Lines, OTHER_UNIT, OWN_AXES, TOO_LITTLE, other_axes, recorded, refused,
+    settings_of, shares, surer, task_of, warn_of_nothing, write,
 };
 use crate::{
     capture::{self, Capture},
@@ -151,8 +151,8 @@ fn held(session: &mut Session) -> anyhow::Result<Option<CalibrationRecord<Higher
     Ok(bytes.as_deref().map(record::decode_as).transpose()?)
 }
 
-/// Gain, bias and terms of temperature that the device has stored are those of the session here, to the bit, in the axes of the record
-/// that it used before. Without terms here the device may have kept those of that record.
+/// Gain, bias and terms of temperature that the device has stored are those of the session here, to the bit, in the axes and the unit of
+/// the record that it used before.
 fn is_equal(
     here: &Capture,
     task: &CaptureTask,
@@ -163,13 +163,13 @@ fn is_equal(
     let sensor = kind.into();
     let units = |kind: SensorKind| task.sensors[kind as usize].units(kind.into());
     let axes = here.axes(&units(SensorKind::Acc), before.and_then(|before| before.acc.as_ref()));
-    let own = here.better_at_temperatures(sensor, &units(kind), None::<&TriadRecord>, &axes);
+    let stored = before.and_then(|before| before.triad(sensor));
+    let own = here.better_at_temperatures(sensor, &units(kind), stored, &axes);
     let (Ok(own), Some(there)) = (own, record.triad(sensor)) else { return false };
     let bits = |gain: &[[f32; 3]; 3], bias: &[f32; 3]| -> Vec<u32> {
         gain.as_flattened().iter().chain(bias).map(|value| value.to_bits()).collect()
     };
-    let warmth = own.temperature.is_none() || own.temperature == there.temperature;
-    warmth && bits(&own.gain, &own.bias) == bits(&there.gain, &there.bias)
+    own.temperature == there.temperature && bits(&own.gain, &own.bias) == bits(&there.gain, &there.bias)
 }
 
 fn reason(outcome: &CaptureOutcome, kind: SensorKind, task: &CaptureTask) -> String {
@@ -180,6 +180,7 @@ fn reason(outcome: &CaptureOutcome, kind: SensorKind, task: &CaptureTask) -> Str
         CaptureOutcome::HigherOrder => HIGHER_ORDER.into(),
         CaptureOutcome::OwnAxes => OWN_AXES.into(),
         CaptureOutcome::OtherAxes { strain, .. } => other_axes(*strain),
+        CaptureOutcome::OtherUnit => OTHER_UNIT.into(),
         _ => TOO_LITTLE.into(),
     }
 }
