@@ -33,13 +33,9 @@ impl<F: NorFlash> Slots<F> {
         let claimed = header.map(|(sequence, _)| sequence);
         let once = if slot.sealed {
             let (sealed, complement) = self.seal(at, slot)?;
-            // A seal that has lost bits itself confirms a header by either half. An erase that was cut leaves bits of both at
-            // random, and one that is blank has cut off the writing.
-            if sealed == complement {
-                Some(sealed)
-            } else {
-                claimed.filter(|claimed| [sealed, complement].contains(claimed))
-            }
+            // An erase that was cut has turned zeros into ones: it has added bits to a number, and taken some from one that is kept as
+            // its complement. Where the two agree, neither has changed. A seal that is blank was never written.
+            (sealed == complement || claimed == Some(complement)).then_some(complement)
         } else {
             claimed
         };

@@ -8,9 +8,9 @@
 //! | --- | --- |
 //! | σ²_min | variance of the quietest window so far that shows noise in each of its quarters |
 //! | σ²_0 | least variance: [`RestSettings::least_variance`](super::RestSettings::least_variance) |
-//! | q | step of the accelerometer: the least difference of two samples a quarter of a second apart, of windows that seem noisier |
+//! | q | step of the accelerometer: the least difference of two samples a quarter of a second apart, on any axis |
 //!
-//! Noise below a step comes and goes with the attitude: at one, all samples are equal; at another, an axis steps to and fro with
+//! A step is looked for in windows that seem too noisy, and counts once two samples were equal on an axis and not on all. Noise below a step comes and goes with the attitude: at one, all samples are equal; at another, an axis steps to and fro with
 //! a variance of up to q²/4. A quarter of equal samples therefore says nothing of the noise, whether the step hides it or the
 //! sensor repeats an old sample.
 
@@ -25,6 +25,8 @@ pub(super) struct RestNoise<T: Scalar> {
     quietest: T,
     /// Square of the least difference of two samples, (m/s²)²; the largest number before two differ.
     step: T,
+    /// Two samples that differ were equal on an axis: there is a step.
+    rounds: bool,
     /// A window had a quarter of equal samples.
     repeats: bool,
     /// Windows that hold the last quarter of equal samples, this one and later ones.
@@ -33,7 +35,7 @@ pub(super) struct RestNoise<T: Scalar> {
 
 impl<T: Scalar> Default for RestNoise<T> {
     fn default() -> Self {
-        Self { quietest: T::LARGEST, step: T::LARGEST, repeats: false, holding: 0 }
+        Self { quietest: T::LARGEST, step: T::LARGEST, rounds: false, repeats: false, holding: 0 }
     }
 }
 
@@ -59,21 +61,29 @@ impl<T: Scalar> RestNoise<T> {
     /// Takes in what the axes of two samples differ by, m/s².
     #[inline]
     pub(super) fn take_step(&mut self, one: &Vector3<T>, other: &Vector3<T>) {
+        let (mut equal, mut least) = (0u8, T::LARGEST);
         let mut axis = |apart: T| {
             let square = apart * apart;
-            if square > T::zero() && square < self.step {
-                self.step = square;
+            if square == T::zero() {
+                equal += 1;
+            } else if square < least {
+                least = square;
             }
         };
         axis(one.x - other.x);
         axis(one.y - other.y);
         axis(one.z - other.z);
+        // Samples that are not rounded are hardly equal on an axis, and those that are repeated are on all.
+        self.rounds |= equal > 0 && least < T::LARGEST;
+        if least < self.step {
+            self.step = least;
+        }
     }
 
     /// Variance of a window at rest, sum of the axes, (m/s²)²; the largest number before the first window.
     #[inline]
     pub(super) fn variance(&self, least: T) -> T {
-        let stepping = if self.step < T::LARGEST { T::of(0.25) * self.step } else { T::zero() };
+        let stepping = if self.rounds { T::of(0.25) * self.step } else { T::zero() };
         let is_coarse = stepping > least;
         let hidden = if is_coarse { stepping } else { least };
         let is_hidden = self.repeats && (is_coarse || self.quietest == T::LARGEST);
