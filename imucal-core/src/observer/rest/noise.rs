@@ -10,9 +10,10 @@
 //! | σ²_0 | least variance: [`RestSettings::least_variance`](super::RestSettings::least_variance) |
 //! | q | step of the accelerometer: the least difference of two samples a quarter of a second apart, on any axis |
 //!
-//! A step is looked for in windows that seem too noisy, and counts once two samples were equal on an axis and not on all. Noise below a step comes and goes with the attitude: at one, all samples are equal; at another, an axis steps to and fro with
+//! Noise below a step comes and goes with the attitude: at one, all samples are equal; at another, an axis steps to and fro with
 //! a variance of up to q²/4. A quarter of equal samples therefore says nothing of the noise, whether the step hides it or the
-//! sensor repeats an old sample.
+//! sensor repeats an old sample. A step is looked for in windows that seem too noisy, and counts once two samples that differ
+//! were equal on an axis: those that are not rounded hardly are.
 
 use nalgebra::Vector3;
 
@@ -61,20 +62,18 @@ impl<T: Scalar> RestNoise<T> {
     /// Takes in what the axes of two samples differ by, m/s².
     #[inline]
     pub(super) fn take_step(&mut self, one: &Vector3<T>, other: &Vector3<T>) {
-        let (mut equal, mut least) = (0u8, T::LARGEST);
+        let (mut equal, mut least) = (false, T::LARGEST);
         let mut axis = |apart: T| {
             let square = apart * apart;
-            if square == T::zero() {
-                equal += 1;
-            } else if square < least {
+            equal |= square == T::zero();
+            if square > T::zero() && square < least {
                 least = square;
             }
         };
         axis(one.x - other.x);
         axis(one.y - other.y);
         axis(one.z - other.z);
-        // Samples that are not rounded are hardly equal on an axis, and those that are repeated are on all.
-        self.rounds |= equal > 0 && least < T::LARGEST;
+        self.rounds |= equal && least < T::LARGEST;
         if least < self.step {
             self.step = least;
         }
