@@ -189,6 +189,21 @@ fn an_accelerometer_of_coarse_steps_is_at_rest_whether_or_not_a_window_shows_noi
 }
 
 #[test]
+fn what_a_coarse_accelerometer_may_show_of_its_noise_can_be_set_or_is_learnt() {
+    let mut session = Session::new(7, &[(6.0, 0.0, 0.0), (2.0, 1.0, 2.0), (6.0, 0.0, 0.0)]);
+    let coarse = |value: f64| (value / 0.04).round() * 0.04;
+    session.samples.iter_mut().for_each(|sample| sample.acc = sample.acc.map(coarse));
+    session.samples.iter_mut().take(150).for_each(|sample| sample.acc = Vector3::new(0.28, -0.2, -9.8));
+    let set = RestSettings { least_variance: 3.0 * 0.02 * 0.02, ..Default::default() };
+    for settings in [set, RestSettings::default()] {
+        let mut observer = RestObserver::new(settings);
+        let mut rests: List<_> = session.samples.iter().filter_map(|sample| observer.push(sample)).collect();
+        rests.extend(observer.finish());
+        assert_eq!(rests.len(), 2, "{settings:?}");
+    }
+}
+
+#[test]
 fn an_observer_that_is_kept_and_gone_on_with_finds_the_same() {
     let session = Session::new(8, &[(6.0, 0.0, 0.0), (2.0, 1.5, 2.0), (4.0, 0.0, 0.0)]);
     let (mut kept, mut rests) = (RestObserver::default(), List::new());
